@@ -1,0 +1,9 @@
+//! Clarke solves dynamic contact of viscoplastic bodies with Clarke-subdifferential
+//! (nonmonotone) boundary laws, in parallel.
+//!
+//! A module uses only modules that stand above it in this list.
+
+pub mod error;
+pub mod tensor;
+pub mod mesh;
+pub mod cli;

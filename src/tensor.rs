@@ -1,0 +1,150 @@
+//! Vectors and symmetric tensors.
+//!
+//! Symmetric tensors are kept in Mandel form: shear components are multiplied by the square root of two, so that the
+//! tensor product `s : t` is the plain dot product of the components. `S` is the number of stored components:
+//!
+//! | S | hypothesis | components |
+//! |---|---|---|
+//! | 3 | plane stress | 11, 22, √2·12 |
+//! | 4 | plane strain | 11, 22, 33, √2·12 |
+//! | 6 | 3D | 11, 22, 33, √2·23, √2·13, √2·12 |
+
+use std::f64::consts::SQRT_2;
+
+/// A vector of `D` Cartesian components.
+pub type Vector<const D: usize> = [f64; D];
+
+/// A symmetric second-order tensor in Mandel form (see the module's table).
+pub type Mandel<const S: usize> = [f64; S];
+
+/// Scalar product of two vectors, or `s : t` of two tensors in Mandel form.
+#[inline(always)]
+pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..N {
+        sum += a[i] * b[i];
+    }
+    sum
+}
+
+/// Euclidean norm.
+#[inline(always)]
+pub fn norm<const N: usize>(a: &[f64; N]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `a + factor * b`.
+#[inline(always)]
+pub fn add_scaled<const N: usize>(a: &[f64; N], factor: f64, b: &[f64; N]) -> [f64; N] {
+    let mut out = *a;
+    for i in 0..N {
+        out[i] += factor * b[i];
+    }
+    out
+}
+
+/// The tensor indices and the Mandel factor of component `c` among `S`.
+#[inline(always)]
+pub const fn component<const S: usize>(c: usize) -> (usize, usize, f64) {
+    match (S, c) {
+        (_, 0) => (0, 0, 1.0),
+        (_, 1) => (1, 1, 1.0),
+        (3, 2) | (4, 3) | (6, 5) => (0, 1, SQRT_2),
+        (4 | 6, 2) => (2, 2, 1.0),
+        (6, 3) => (1, 2, SQRT_2),
+        (6, 4) => (0, 2, SQRT_2),
+        _ => panic!("a symmetric tensor has 3, 4 or 6 components"),
+    }
+}
+
+/// Number of normal components (the diagonal): they come first.
+#[inline(always)]
+pub const fn normal_components<const S: usize>() -> usize {
+    if S == 3 { 2 } else { 3 }
+}
+
+/// Sum of the stored normal components.
+#[inline(always)]
+pub fn trace<const S: usize>(t: &Mandel<S>) -> f64 {
+    let mut sum = 0.0;
+    for c in 0..normal_components::<S>() {
+        sum += t[c];
+    }
+    sum
+}
+
+/// Symmetric part of a velocity or displacement gradient `g[i][j] = d u_i / d x_j`; missing components are zero.
+#[inline(always)]
+pub fn symmetric_part<const D: usize, const S: usize>(gradient: &[[f64; D]; D]) -> Mandel<S> {
+    let mut out = [0.0; S];
+    for c in 0..S {
+        let (i, j, factor) = component::<S>(c);
+        if i < D && j < D {
+            out[c] = 0.5 * factor * (gradient[i][j] + gradient[j][i]);
+        }
+    }
+    out
+}
+
+/// `t n`, the tensor applied to a vector in the first `D` directions.
+#[inline(always)]
+pub fn apply<const D: usize, const S: usize>(t: &Mandel<S>, n: &Vector<D>) -> Vector<D> {
+    let mut out = [0.0; D];
+    for c in 0..S {
+        let (i, j, factor) = component::<S>(c);
+        if i < D && j < D {
+            let value = t[c] / factor;
+            out[i] += value * n[j];
+            if i != j {
+                out[j] += value * n[i];
+            }
+        }
+    }
+    out
+}
+
+/// Von Mises norm of a stress: `sqrt(3/2 dev : dev)`, for plane stress with the out-of-plane stress zero.
+#[inline(always)]
+pub fn von_mises<const S: usize>(t: &Mandel<S>) -> f64 {
+    let shear: f64 = {
+        let mut sum = 0.0;
+        for c in normal_components::<S>()..S {
+            sum += t[c] * t[c];
+        }
+        1.5 * sum
+    };
+    let zz = if S == 3 { 0.0 } else { t[2] };
+    let (a, b, c) = (t[0] - t[1], t[1] - zz, zz - t[0]);
+    (0.5 * (a * a + b * b + c * c) + shear).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mandel_product_is_the_tensor_product() {
+        let a: Mandel<3> = [1.0, 2.0, 3.0 * SQRT_2];
+        let b: Mandel<3> = [4.0, 5.0, 6.0 * SQRT_2];
+        assert!((dot(&a, &b) - (4.0 + 10.0 + 2.0 * 18.0)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn symmetric_part_and_apply_agree_with_hand_values() {
+        let strain: Mandel<6> = symmetric_part(&[[1.0, 2.0, 0.0], [4.0, 5.0, 6.0], [0.0, 8.0, 9.0]]);
+        assert_eq!(apply(&strain, &[1.0, 0.0, 0.0]), [1.0, 3.0, 0.0]);
+        let traction = apply(&strain, &[0.0, 0.0, 1.0]);
+        assert!((traction[1] - 7.0).abs() < 1e-14 && traction[2] == 9.0);
+        let plane: Mandel<4> = symmetric_part(&[[1.0, 2.0], [4.0, 5.0]]);
+        assert_eq!(plane[2], 0.0);
+        assert!((plane[3] - 3.0 * SQRT_2).abs() < 1e-14);
+    }
+
+    #[test]
+    fn von_mises_of_uniaxial_and_shear_stress() {
+        assert!((von_mises(&[7.0, 0.0, 0.0]) - 7.0).abs() < 1e-14);
+        assert!((von_mises(&[0.0, 0.0, 2.0 * SQRT_2]) - 2.0 * 3f64.sqrt()).abs() < 1e-14);
+        assert!(von_mises(&[5.0, 5.0, 5.0, 0.0, 0.0, 0.0]) < 1e-14);
+        assert!((von_mises(&[3.0, 0.0, 0.0, 0.0]) - 3.0).abs() < 1e-14);
+    }
+}
