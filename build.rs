@@ -1,1 +1,107 @@
-fn main() {}
+//! Finds the system's PETSc through pkg-config and generates the raw bindings of what `src/petsc` calls.
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// Everything the safe layer calls, and nothing else: the generated file stays small.
+const FUNCTIONS: &[&str] = &[
+    "Petsc(InitializeNoPointers|Finalize|PushErrorHandler|ErrorMessage|GetVersionNumber)",
+    "PetscOptions(SetValue|HasName|ClearValue)",
+    "PetscLogStage(Register|Push|Pop)",
+    "Vec(CreateGhostBlock|Duplicate|Destroy|GetLocalSize|GetArray|RestoreArray|GetArrayRead|RestoreArrayRead)",
+    "VecGhost(GetLocalForm|RestoreLocalForm|UpdateBegin|UpdateEnd)",
+    "Vec(Copy|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize)",
+    "VecCreateMPIWithArray",
+    "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace)",
+    "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
+    "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",
+    "MatNullSpace(CreateRigidBody|Destroy)",
+    "KSP(Create|Destroy|SetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
+    "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
+    "KSP(SetOptionsPrefix|GetType)",
+    "PC(SetType|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
+    "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
+    "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
+    "SNESLineSearchSetType",
+];
+
+fn main() {
+    println!("cargo::rerun-if-changed=src/petsc/wrapper.h");
+    println!("cargo::rerun-if-changed=build.rs");
+    for name in ["PETSC_DIR", "PETSC_ARCH", "PKG_CONFIG_PATH"] {
+        println!("cargo::rerun-if-env-changed={name}");
+    }
+    println!("cargo::rustc-env=CLARKE_GIT_ID={}", git_id());
+
+    let petsc = find_petsc();
+    check_configuration(&petsc.include_paths);
+    let mpi = build_probe_mpi::probe()
+        .unwrap_or_else(|e| panic!("no MPI found (Debian: apt-get install libopenmpi-dev): {e:?}"));
+    let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
+    bindgen::builder()
+        .header("src/petsc/wrapper.h")
+        .clang_args(includes.map(|d| format!("-I{}", d.display())))
+        .rust_edition(bindgen::RustEdition::Edition2024)
+        .default_enum_style(bindgen::EnumVariation::Consts)
+        .prepend_enum_name(false)
+        .generate_cstr(true)
+        .allowlist_function(format!("({})", FUNCTIONS.join("|")))
+        .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*)")
+        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|KSP_NORM_.*)")
+        .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
+        .raw_line("pub use mpi_sys::MPI_Comm;")
+        .layout_tests(false)
+        .generate_comments(false)
+        .generate()
+        .expect("bindgen reads PETSc's headers")
+        .write_to_file(Path::new(&env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("petsc.rs"))
+        .expect("the bindings are written to OUT_DIR");
+}
+
+/// An explicit `PETSC_DIR[/PETSC_ARCH]` wins over the system's own `PETSc.pc`.
+fn find_petsc() -> pkg_config::Library {
+    if let Some(dir) = env::var_os("PETSC_DIR") {
+        let dir = PathBuf::from(dir).join(env::var_os("PETSC_ARCH").unwrap_or_default());
+        let searched = env::var("PKG_CONFIG_PATH").unwrap_or_default();
+        let path = format!("{}:{searched}", dir.join("lib/pkgconfig").display());
+        // SAFETY: the build script has one thread.
+        #[allow(unsafe_code)]
+        unsafe {
+            env::set_var("PKG_CONFIG_PATH", path)
+        };
+    }
+    let probe = |name| pkg_config::Config::new().atleast_version("3.18").probe(name);
+    probe("PETSc").or_else(|_| probe("petsc")).unwrap_or_else(|e| {
+        panic!("PETSc 3.18 or newer not found (run scripts/install-deps.sh, or set PETSC_DIR): {e}")
+    })
+}
+
+fn check_configuration(include_paths: &[PathBuf]) {
+    let file = include_paths
+        .iter()
+        .map(|d| d.join("petscconf.h"))
+        .find(|p| p.is_file())
+        .expect("petscconf.h stands beside petsc.h");
+    let text = std::fs::read_to_string(&file).expect("petscconf.h is readable");
+    let has = |name: &str| text.lines().any(|l| l.starts_with(&format!("#define {name} ")));
+    assert!(
+        !has("PETSC_USE_COMPLEX") && has("PETSC_USE_REAL_DOUBLE") && !has("PETSC_USE_64BIT_INDICES"),
+        "{}: this PETSc is complex, not double precision, or has 64-bit indices; \
+         a real, double, 32-bit-index build is needed (Debian: libpetsc-real-dev)",
+        file.display()
+    );
+}
+
+fn git_id() -> String {
+    println!("cargo::rerun-if-changed=.git/HEAD");
+    println!("cargo::rerun-if-changed=.git/logs/HEAD");
+    Command::new("git")
+        .args(["describe", "--always", "--dirty", "--abbrev=10"])
+        .output()
+        .ok()
+        .filter(|o| o.status.success())
+        .map_or_else(|| "unknown".into(), |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+}

@@ -5,5 +5,7 @@
 
 pub mod error;
 pub mod tensor;
+pub mod petsc;
+pub mod session;
 pub mod mesh;
 pub mod cli;

@@ -1,0 +1,159 @@
+use super::{DistributedVector, Matrix, c_string, check, index, library::communicator, sys};
+use crate::error::Result;
+use std::{marker::PhantomData, ptr};
+
+/// A Krylov solver with its preconditioner.
+///
+/// The preconditioner is set up at the first solve (or [`Ksp::set_up`]) and kept for as long as the matrix stands.
+#[derive(Debug)]
+pub struct Ksp {
+    pub(super) raw: sys::KSP,
+    owned: bool,
+    not_send: PhantomData<*mut ()>,
+}
+
+/// How a linear solve ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearOutcome {
+    /// PETSc's reason: positive is converged, negative is not.
+    pub reason: i32,
+    /// Krylov iterations.
+    pub iterations: usize,
+    /// Residual norm at the end.
+    pub residual: f64,
+}
+
+impl LinearOutcome {
+    /// Whether the tolerance was reached.
+    pub fn converged(&self) -> bool {
+        self.reason > 0
+    }
+
+    /// The reason in words.
+    pub fn words(&self) -> &'static str {
+        linear_reason(self.reason)
+    }
+}
+
+/// PETSc's `KSPConvergedReason` in words.
+pub(super) fn linear_reason(reason: i32) -> &'static str {
+    match reason {
+        1.. => "converged",
+        0 => "still iterating",
+        -3 => "too many linear iterations",
+        -4 => "the linear residual grew beyond the divergence limit",
+        -5 | -6 => "breakdown of the Krylov method",
+        -8 => "the preconditioner is not positive definite",
+        -9 => "not a number in the linear solve",
+        -10 => "the matrix is not positive definite",
+        -11 => "the preconditioner could not be set up",
+        _ => "the linear solve diverged",
+    }
+}
+
+impl Ksp {
+    /// A solver whose options carry this prefix.
+    pub fn new(prefix: &str) -> Result<Self> {
+        let mut raw = ptr::null_mut();
+        let prefix = c_string(prefix)?;
+        // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
+        unsafe {
+            check(sys::KSPCreate(communicator(), &mut raw))?;
+            let ksp = Self { raw, owned: true, not_send: PhantomData };
+            check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
+            Ok(ksp)
+        }
+    }
+
+    /// The solver inside another PETSc object, which stays its owner.
+    ///
+    /// # Safety
+    /// The owner must outlive the returned handle.
+    pub(super) unsafe fn inside(raw: sys::KSP) -> Self {
+        Self { raw, owned: false, not_send: PhantomData }
+    }
+
+    /// Solves with this matrix, which also makes the preconditioner.
+    pub fn set_matrix(&mut self, matrix: &Matrix) -> Result<()> {
+        // SAFETY: live objects; PETSc keeps its own references.
+        check(unsafe { sys::KSPSetOperators(self.raw, matrix.raw, matrix.raw) })
+    }
+
+    /// Krylov method by PETSc's name, such as `cg`; its norm is that of the residual itself.
+    pub fn set_method(&mut self, name: &str) -> Result<()> {
+        let name = c_string(name)?;
+        // SAFETY: live object; PETSc copies the name.
+        unsafe {
+            check(sys::KSPSetType(self.raw, name.as_ptr()))?;
+            check(sys::KSPSetNormType(self.raw, sys::KSP_NORM_UNPRECONDITIONED))
+        }
+    }
+
+    /// Preconditioner by PETSc's name, with the package that factors if it is a factorisation.
+    pub fn set_preconditioner(&mut self, name: &str, package: Option<&str>) -> Result<()> {
+        let name = c_string(name)?;
+        let mut pc = ptr::null_mut();
+        // SAFETY: the preconditioner belongs to the live solver; PETSc copies the names.
+        unsafe {
+            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::PCSetType(pc, name.as_ptr()))?;
+            if let Some(package) = package {
+                check(sys::PCFactorSetMatSolverType(pc, c_string(package)?.as_ptr()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Stops at `relative * |b|` or at `absolute`, whichever is larger, or after this many iterations.
+    pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
+        let iterations = index(iterations, "linear iterations")?;
+        // SAFETY: live object.
+        check(unsafe { sys::KSPSetTolerances(self.raw, relative, absolute, f64::from(sys::PETSC_DEFAULT), iterations) })
+    }
+
+    /// Starts from the values already in the solution.
+    pub fn start_from_solution(&mut self) -> Result<()> {
+        // SAFETY: live object.
+        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, 1) })
+    }
+
+    /// Lets PETSc options override what was set.
+    pub fn apply_options(&mut self) -> Result<()> {
+        // SAFETY: live object.
+        check(unsafe { sys::KSPSetFromOptions(self.raw) })
+    }
+
+    /// Sets up the preconditioner now. Collective.
+    pub fn set_up(&mut self) -> Result<()> {
+        // SAFETY: live object.
+        check(unsafe { sys::KSPSetUp(self.raw) })
+    }
+
+    /// Solves for `solution`. Collective. Non-convergence is an outcome, not an error.
+    pub fn solve(&mut self, right_hand_side: &DistributedVector, solution: &mut DistributedVector) -> Result<LinearOutcome> {
+        // SAFETY: live objects of matching layout; the two vectors differ.
+        check(unsafe { sys::KSPSolve(self.raw, right_hand_side.raw, solution.raw) })?;
+        self.outcome()
+    }
+
+    /// How the last solve ended.
+    pub fn outcome(&self) -> Result<LinearOutcome> {
+        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
+        // SAFETY: live object, live numbers.
+        unsafe {
+            check(sys::KSPGetConvergedReason(self.raw, &mut reason))?;
+            check(sys::KSPGetIterationNumber(self.raw, &mut iterations))?;
+            check(sys::KSPGetResidualNorm(self.raw, &mut residual))?;
+        }
+        Ok(LinearOutcome { reason, iterations: usize::try_from(iterations).unwrap_or(0), residual })
+    }
+}
+
+impl Drop for Ksp {
+    fn drop(&mut self) {
+        if self.owned {
+            // SAFETY: this handle owns one reference.
+            unsafe { sys::KSPDestroy(&mut self.raw) };
+        }
+    }
+}

@@ -1,0 +1,100 @@
+use super::{c_string, check, keep_fault, sys};
+use crate::error::Result;
+use mpi::{environment::Universe, topology::Communicator, traits::AsRaw};
+use std::{
+    ffi::{CString, c_char},
+    marker::PhantomData,
+    ptr,
+};
+
+/// PETSc, started; finalised when dropped, before the MPI universe it borrows.
+pub struct Petsc<'u> {
+    universe: PhantomData<&'u Universe>,
+    not_send: PhantomData<*mut ()>,
+}
+
+impl<'u> Petsc<'u> {
+    /// Starts PETSc on this communicator. PETSc reads `PETSC_OPTIONS` here; it installs no signal handlers and reads
+    /// no `.petscrc`.
+    pub fn start<C>(_universe: &'u Universe, communicator: &C) -> Result<Self>
+    where
+        C: Communicator + AsRaw<Raw = sys::MPI_Comm>,
+    {
+        let arguments = [c"solver", c"-skip_petscrc", c"-no_signal_handler"];
+        let mut pointers: Vec<*mut c_char> = arguments.iter().map(|a| a.as_ptr().cast_mut()).collect();
+        pointers.push(ptr::null_mut());
+        // PETSc keeps the argument vector for its whole life.
+        let pointers = Box::leak(pointers.into_boxed_slice());
+        // SAFETY: MPI is initialised (the universe is alive), the communicator is set before PETSc starts, and the
+        // arguments are static NUL-terminated strings in a leaked, NULL-terminated vector.
+        unsafe {
+            sys::PETSC_COMM_WORLD = communicator.as_raw();
+            check(sys::PetscInitializeNoPointers(3, pointers.as_mut_ptr(), ptr::null(), ptr::null()))?;
+            check(sys::PetscPushErrorHandler(Some(keep_fault), ptr::null_mut()))?;
+        }
+        Ok(Self { universe: PhantomData, not_send: PhantomData })
+    }
+
+    /// Version of the PETSc that is linked, such as `3.18.5`.
+    pub fn version(&self) -> Result<String> {
+        let (mut major, mut minor, mut patch) = (0, 0, 0);
+        // SAFETY: the pointers are to live integers; the last argument may be NULL.
+        check(unsafe { sys::PetscGetVersionNumber(&mut major, &mut minor, &mut patch, ptr::null_mut()) })?;
+        Ok(format!("{major}.{minor}.{patch}"))
+    }
+}
+
+impl Drop for Petsc<'_> {
+    fn drop(&mut self) {
+        // SAFETY: every handle borrows this token's lifetime or was dropped before; MPI is still up.
+        unsafe { sys::PetscFinalize() };
+    }
+}
+
+/// The communicator all handles are created on.
+pub(super) fn communicator() -> sys::MPI_Comm {
+    // SAFETY: written once, before PETSc starts, and only read afterwards.
+    unsafe { sys::PETSC_COMM_WORLD }
+}
+
+/// Sets a PETSc option; the name is without the leading dash, an empty value is a plain flag.
+pub fn set_option(name: &str, value: &str) -> Result<()> {
+    let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
+    let value = c_string(value)?;
+    // SAFETY: NUL-terminated strings that PETSc copies; NULL is the global options database.
+    check(unsafe { sys::PetscOptionsSetValue(ptr::null_mut(), name.as_ptr(), value.as_ptr()) })
+}
+
+/// Sets a PETSc option unless the user has set it already.
+pub fn set_default_option(name: &str, value: &str) -> Result<()> {
+    let key: CString = c_string(&format!("-{name}"))?;
+    let mut set = 0;
+    // SAFETY: as above; `set` is a live PetscBool.
+    check(unsafe { sys::PetscOptionsHasName(ptr::null_mut(), ptr::null(), key.as_ptr(), &mut set) })?;
+    if set == 0 { set_option(name, value) } else { Ok(()) }
+}
+
+/// A named stage of PETSc's `-log_view`; what runs while it is entered is attributed to it.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage(i32);
+
+impl Stage {
+    /// Registers a stage.
+    pub fn register(name: &str) -> Result<Self> {
+        let name = c_string(name)?;
+        let mut stage = 0;
+        // SAFETY: PETSc copies the name and fills the integer.
+        check(unsafe { sys::PetscLogStageRegister(name.as_ptr(), &mut stage) })?;
+        Ok(Self(stage))
+    }
+
+    /// Runs `body` inside the stage.
+    pub fn run<T>(self, body: impl FnOnce() -> Result<T>) -> Result<T> {
+        // SAFETY: the stage was registered.
+        check(unsafe { sys::PetscLogStagePush(self.0) })?;
+        let result = body();
+        // SAFETY: pops the stage pushed above.
+        check(unsafe { sys::PetscLogStagePop() })?;
+        result
+    }
+}

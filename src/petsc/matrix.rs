@@ -1,0 +1,139 @@
+use super::{DistributedVector, check, index, library::communicator, sys};
+use crate::error::Result;
+use std::{marker::PhantomData, mem::MaybeUninit, ptr};
+
+/// The rows this rank owns of a sparse matrix of dense blocks.
+#[derive(Debug, Clone, Default)]
+pub struct BlockRows {
+    /// Where each owned block row starts in `columns`; one more entry than rows.
+    pub offsets: Vec<usize>,
+    /// Global block columns, ascending within a row.
+    pub columns: Vec<u32>,
+    /// `block * block` values for each column, row by row.
+    pub values: Vec<f64>,
+}
+
+/// A sparse matrix spread over the ranks by rows.
+#[derive(Debug)]
+pub struct Matrix {
+    pub(super) raw: sys::Mat,
+    not_send: PhantomData<*mut ()>,
+}
+
+impl Matrix {
+    /// A symmetric positive definite matrix of `block x block` blocks. Collective.
+    pub fn symmetric(block: usize, rows: &BlockRows) -> Result<Self> {
+        let owned = rows.offsets.len() - 1;
+        let (starts, columns, values) = scalar_rows(block, rows)?;
+        let local = index(owned * block, "unknowns of a rank")?;
+        let mut raw = ptr::null_mut();
+        // SAFETY: `raw` receives one reference that the handle owns from here on; PETSc copies the row arrays, which
+        // describe `local` rows with ascending global columns.
+        unsafe {
+            check(sys::MatCreate(communicator(), &mut raw))?;
+            let matrix = Self { raw, not_send: PhantomData };
+            check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
+            check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
+            check(sys::MatSetType(raw, c"aij".as_ptr()))?;
+            check(sys::MatSeqAIJSetPreallocationCSR(raw, starts.as_ptr(), columns.as_ptr(), values.as_ptr()))?;
+            check(sys::MatMPIAIJSetPreallocationCSR(raw, starts.as_ptr(), columns.as_ptr(), values.as_ptr()))?;
+            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
+            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
+            Ok(matrix)
+        }
+    }
+
+    /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
+    pub fn attach_rigid_motions(&mut self, block: usize, coordinates: &[f64]) -> Result<()> {
+        let mut points = ptr::null_mut();
+        let mut motions = ptr::null_mut();
+        // SAFETY: the coordinate vector borrows `coordinates` and is destroyed before this returns; the matrix takes
+        // its own reference to the null space.
+        unsafe {
+            check(sys::VecCreateMPIWithArray(
+                communicator(),
+                index(block, "block size")?,
+                index(coordinates.len(), "unknowns of a rank")?,
+                sys::PETSC_DETERMINE,
+                coordinates.as_ptr(),
+                &mut points,
+            ))?;
+            check(sys::MatNullSpaceCreateRigidBody(points, &mut motions))?;
+            check(sys::MatSetNearNullSpace(self.raw, motions))?;
+            check(sys::MatNullSpaceDestroy(&mut motions))?;
+            check(sys::VecDestroy(&mut points))
+        }
+    }
+
+    /// `result = self * x`. Collective.
+    pub fn multiply(&self, x: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
+        // SAFETY: live objects of matching layout; `x` and `result` differ.
+        check(unsafe { sys::MatMult(self.raw, x.raw, result.raw) })
+    }
+
+    /// Stored scalar entries over all ranks. Collective.
+    pub fn stored_entries(&self) -> Result<f64> {
+        let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
+        // SAFETY: PETSc fills the struct of numbers.
+        unsafe {
+            check(sys::MatGetInfo(self.raw, sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
+            Ok(counts.assume_init().nz_used)
+        }
+    }
+}
+
+impl Drop for Matrix {
+    fn drop(&mut self) {
+        // SAFETY: this handle owns one reference.
+        unsafe { sys::MatDestroy(&mut self.raw) };
+    }
+}
+
+type ScalarRows = (Vec<sys::PetscInt>, Vec<sys::PetscInt>, Vec<f64>);
+
+/// Expands blocks to scalar rows with ascending columns.
+fn scalar_rows(block: usize, rows: &BlockRows) -> Result<ScalarRows> {
+    let entries = rows.columns.len() * block * block;
+    index(entries, "matrix entries of a rank")?;
+    let mut starts = Vec::with_capacity((rows.offsets.len() - 1) * block + 1);
+    let mut columns = Vec::with_capacity(entries);
+    let mut values = Vec::with_capacity(entries);
+    starts.push(0);
+    for range in rows.offsets.windows(2) {
+        for row in 0..block {
+            for at in range[0]..range[1] {
+                let first = rows.columns[at] as usize * block;
+                for column in 0..block {
+                    columns.push(index(first + column, "global unknown")?);
+                    values.push(rows.values[(at * block + row) * block + column]);
+                }
+            }
+            starts.push(index(columns.len(), "matrix entries of a rank")?);
+        }
+    }
+    Ok((starts, columns, values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_expand_to_ascending_scalar_rows() {
+        let rows = BlockRows {
+            offsets: vec![0, 2],
+            columns: vec![0, 3],
+            values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
+        };
+        let (starts, columns, values) = scalar_rows(2, &rows).unwrap();
+        assert_eq!(starts, [0, 4, 8]);
+        assert_eq!(columns, [0, 1, 6, 7, 0, 1, 6, 7]);
+        assert_eq!(values, [1.0, 2.0, 5.0, 6.0, 3.0, 4.0, 7.0, 8.0]);
+    }
+
+    #[test]
+    fn columns_beyond_32_bit_indices_are_refused() {
+        let rows = BlockRows { offsets: vec![0, 1], columns: vec![u32::MAX], values: vec![1.0] };
+        assert!(scalar_rows(1, &rows).unwrap_err().to_string().contains("32-bit"));
+    }
+}

@@ -1,0 +1,86 @@
+//! PETSc: raw bindings in [`sys`], and owned, safe handles for what the solver calls. One file a PETSc class.
+//!
+//! Every call that can fail returns `Result` with PETSc's own message and trace. All handles are collective over
+//! the communicator given to [`Petsc::start`]: every rank creates, uses and drops them in the same order.
+//! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
+#![allow(unsafe_code)]
+
+mod ksp;
+mod library;
+mod matrix;
+mod snes;
+pub mod sys;
+mod vector;
+
+pub use ksp::{Ksp, LinearOutcome};
+pub use library::{Petsc, Stage, set_default_option, set_option};
+pub use matrix::{BlockRows, Matrix};
+pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
+pub use vector::{DistributedVector, LocalRead, LocalWrite};
+
+use crate::error::{Error, Result};
+use std::{
+    cell::RefCell,
+    ffi::{CStr, CString, c_char, c_int, c_void},
+};
+
+thread_local! {
+    static FAULT: RefCell<(String, Vec<String>)> = const { RefCell::new((String::new(), Vec::new())) };
+}
+
+fn text(pointer: *const c_char) -> String {
+    if pointer.is_null() {
+        return String::new();
+    }
+    // SAFETY: PETSc passes NUL-terminated strings that live for the call.
+    unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
+}
+
+unsafe extern "C" fn keep_fault(
+    _comm: sys::MPI_Comm,
+    line: c_int,
+    function: *const c_char,
+    file: *const c_char,
+    code: sys::PetscErrorCode,
+    kind: sys::PetscErrorType,
+    message: *const c_char,
+    _context: *mut c_void,
+) -> sys::PetscErrorCode {
+    FAULT.with_borrow_mut(|(kept, trace)| {
+        if kind == sys::PETSC_ERROR_INITIAL {
+            *kept = text(message);
+            trace.clear();
+        }
+        let file = text(file);
+        trace.push(format!("{} ({}:{line})", text(function), file.rsplit('/').next().unwrap_or("")));
+    });
+    code
+}
+
+/// Turns a PETSc return code into a result with the message and trace that the error handler kept.
+fn check(code: sys::PetscErrorCode) -> Result<()> {
+    if code == 0 {
+        return Ok(());
+    }
+    let (mut message, trace) = FAULT.with_borrow_mut(std::mem::take);
+    if message.is_empty() {
+        let mut words = std::ptr::null();
+        // SAFETY: PETSc fills the pointer with a static string.
+        unsafe { sys::PetscErrorMessage(code, &mut words, std::ptr::null_mut()) };
+        message = text(words);
+    }
+    Err(Error::Internal(format!("PETSc error {code}: {} [{}]", message.trim(), trace.join(" <- "))))
+}
+
+fn c_string(words: &str) -> Result<CString> {
+    CString::new(words).map_err(|_| Error::Refused(format!("PETSc option {words:?} has a NUL character")))
+}
+
+/// A count as PETSc's 32-bit index, or an error that says which count is too large.
+fn index(count: usize, what: &str) -> Result<sys::PetscInt> {
+    sys::PetscInt::try_from(count).map_err(|_| {
+        Error::Refused(format!(
+            "{what}: {count} exceeds the 32-bit indices of this PETSc; use a coarser mesh or a PETSc with 64-bit indices"
+        ))
+    })
+}

@@ -1,0 +1,249 @@
+use super::{check, index, library::communicator, sys};
+use crate::error::Result;
+use std::{
+    marker::PhantomData,
+    mem::ManuallyDrop,
+    ops::{Deref, DerefMut},
+    ptr,
+};
+
+/// A nodal field spread over the ranks: owned values first, then copies of ghost values from other ranks.
+///
+/// Values are grouped by node: component `c` of local node `i` is at `i * block + c`.
+#[derive(Debug)]
+pub struct DistributedVector {
+    pub(super) raw: sys::Vec,
+    not_send: PhantomData<*mut ()>,
+}
+
+impl DistributedVector {
+    /// A zero field of `block` values a node, for `owned` nodes here and ghosts with these global node numbers.
+    pub fn ghosted(block: usize, owned: usize, ghosts: &[u32]) -> Result<Self> {
+        let ghost_blocks: Vec<sys::PetscInt> =
+            ghosts.iter().map(|&g| index(g as usize, "ghost node number")).collect::<Result<_>>()?;
+        let mut raw = ptr::null_mut();
+        // SAFETY: PETSc copies the ghost list; `raw` receives one reference that this handle owns.
+        check(unsafe {
+            sys::VecCreateGhostBlock(
+                communicator(),
+                index(block, "block size")?,
+                index(block * owned, "unknowns of a rank")?,
+                sys::PETSC_DETERMINE,
+                index(ghosts.len(), "ghost nodes of a rank")?,
+                ghost_blocks.as_ptr(),
+                &mut raw,
+            )
+        })?;
+        let vector = Self { raw, not_send: PhantomData };
+        vector.fill(0.0)?;
+        vector.update_ghosts()?;
+        Ok(vector)
+    }
+
+    /// A zero field of the same layout.
+    pub fn like(&self) -> Result<Self> {
+        let mut raw = ptr::null_mut();
+        // SAFETY: `self.raw` is alive; `raw` receives one reference that the new handle owns.
+        check(unsafe { sys::VecDuplicate(self.raw, &mut raw) })?;
+        let vector = Self { raw, not_send: PhantomData };
+        vector.fill(0.0)?;
+        Ok(vector)
+    }
+
+    /// Views a vector that PETSc owns, for the length of a callback.
+    ///
+    /// # Safety
+    /// `raw` must stay alive while the view is used; the view is never dropped.
+    pub(super) unsafe fn view(raw: sys::Vec) -> ManuallyDrop<Self> {
+        ManuallyDrop::new(Self { raw, not_send: PhantomData })
+    }
+
+    /// Owned values, for reading.
+    pub fn owned(&self) -> Result<LocalRead<'_>> {
+        LocalRead::of(self.raw, None)
+    }
+
+    /// Owned values, for writing.
+    pub fn owned_mut(&mut self) -> Result<LocalWrite<'_>> {
+        LocalWrite::of(self.raw, None)
+    }
+
+    /// Owned values followed by ghost values, for reading.
+    pub fn local(&self) -> Result<LocalRead<'_>> {
+        LocalRead::of(self.raw, Some(self.local_form()?))
+    }
+
+    /// Owned values followed by ghost values, for writing.
+    pub fn local_mut(&mut self) -> Result<LocalWrite<'_>> {
+        LocalWrite::of(self.raw, Some(self.local_form()?))
+    }
+
+    fn local_form(&self) -> Result<sys::Vec> {
+        let mut form = ptr::null_mut();
+        // SAFETY: `self.raw` is alive; the form is given back when the guard is dropped.
+        check(unsafe { sys::VecGhostGetLocalForm(self.raw, &mut form) })?;
+        Ok(form)
+    }
+
+    /// Copies owned values to their ghost copies on other ranks. Collective.
+    pub fn update_ghosts(&self) -> Result<()> {
+        self.exchange(sys::INSERT_VALUES, sys::SCATTER_FORWARD)
+    }
+
+    /// Adds ghost values to their owners. Collective; ghost values here stay as they are.
+    pub fn add_ghosts_to_owners(&self) -> Result<()> {
+        self.exchange(sys::ADD_VALUES, sys::SCATTER_REVERSE)
+    }
+
+    fn exchange(&self, mode: sys::InsertMode, direction: sys::ScatterMode) -> Result<()> {
+        // SAFETY: `self.raw` is a live ghosted vector; no array of it is borrowed (guards borrow `self`).
+        unsafe {
+            check(sys::VecGhostUpdateBegin(self.raw, mode, direction))?;
+            check(sys::VecGhostUpdateEnd(self.raw, mode, direction))
+        }
+    }
+
+    /// Sets every owned value.
+    pub fn fill(&self, value: f64) -> Result<()> {
+        // SAFETY: live vector, as in all calls below.
+        check(unsafe { sys::VecSet(self.raw, value) })
+    }
+
+    /// Copies the owned values of `from`.
+    pub fn copy_from(&mut self, from: &Self) -> Result<()> {
+        // SAFETY: two live vectors of one layout.
+        check(unsafe { sys::VecCopy(from.raw, self.raw) })
+    }
+
+    /// Adds `factor * other` to the owned values.
+    pub fn add_scaled(&mut self, factor: f64, other: &Self) -> Result<()> {
+        // SAFETY: two live vectors of one layout; they differ, as `self` is borrowed mutably.
+        check(unsafe { sys::VecAXPY(self.raw, factor, other.raw) })
+    }
+
+    /// Euclidean norm over all ranks. Collective.
+    pub fn norm(&self) -> Result<f64> {
+        let mut norm = 0.0;
+        // SAFETY: live vector and a live number.
+        check(unsafe { sys::VecNorm(self.raw, sys::NORM_2, &mut norm) })?;
+        Ok(norm)
+    }
+
+    /// Scalar product over all ranks. Collective.
+    pub fn dot(&self, other: &Self) -> Result<f64> {
+        let mut product = 0.0;
+        // SAFETY: live vectors and a live number.
+        check(unsafe { sys::VecDot(self.raw, other.raw, &mut product) })?;
+        Ok(product)
+    }
+}
+
+impl Drop for DistributedVector {
+    fn drop(&mut self) {
+        // SAFETY: this handle owns one reference.
+        unsafe { sys::VecDestroy(&mut self.raw) };
+    }
+}
+
+fn length(raw: sys::Vec) -> Result<usize> {
+    let mut length = 0;
+    // SAFETY: live vector and a live integer.
+    check(unsafe { sys::VecGetLocalSize(raw, &mut length) })?;
+    Ok(usize::try_from(length).unwrap_or(0))
+}
+
+/// Values of a vector on this rank, borrowed for reading.
+#[derive(Debug)]
+pub struct LocalRead<'v> {
+    raw: sys::Vec,
+    form: Option<sys::Vec>,
+    pointer: *const f64,
+    length: usize,
+    vector: PhantomData<&'v DistributedVector>,
+}
+
+impl LocalRead<'_> {
+    fn of(raw: sys::Vec, form: Option<sys::Vec>) -> Result<Self> {
+        let source = form.unwrap_or(raw);
+        let mut pointer = ptr::null();
+        // SAFETY: live vector; the array is given back on drop.
+        check(unsafe { sys::VecGetArrayRead(source, &mut pointer) })?;
+        Ok(Self { raw, form, pointer, length: length(source)?, vector: PhantomData })
+    }
+}
+
+impl Deref for LocalRead<'_> {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        if self.length == 0 {
+            return &[];
+        }
+        // SAFETY: PETSc gave `length` values at `pointer`, valid until the array is restored on drop.
+        unsafe { std::slice::from_raw_parts(self.pointer, self.length) }
+    }
+}
+
+impl Drop for LocalRead<'_> {
+    fn drop(&mut self) {
+        // SAFETY: gives back what `of` and `local_form` took, in the opposite order.
+        unsafe {
+            sys::VecRestoreArrayRead(self.form.unwrap_or(self.raw), &mut self.pointer);
+            if let Some(form) = self.form.as_mut() {
+                sys::VecGhostRestoreLocalForm(self.raw, form);
+            }
+        }
+    }
+}
+
+/// Values of a vector on this rank, borrowed for writing.
+#[derive(Debug)]
+pub struct LocalWrite<'v> {
+    raw: sys::Vec,
+    form: Option<sys::Vec>,
+    pointer: *mut f64,
+    length: usize,
+    vector: PhantomData<&'v mut DistributedVector>,
+}
+
+impl LocalWrite<'_> {
+    fn of(raw: sys::Vec, form: Option<sys::Vec>) -> Result<Self> {
+        let source = form.unwrap_or(raw);
+        let mut pointer = ptr::null_mut();
+        // SAFETY: live vector, borrowed mutably through its handle; the array is given back on drop.
+        check(unsafe { sys::VecGetArray(source, &mut pointer) })?;
+        Ok(Self { raw, form, pointer, length: length(source)?, vector: PhantomData })
+    }
+}
+
+impl Deref for LocalWrite<'_> {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        if self.length == 0 {
+            return &[];
+        }
+        // SAFETY: PETSc gave `length` values at `pointer`, valid until the array is restored on drop.
+        unsafe { std::slice::from_raw_parts(self.pointer, self.length) }
+    }
+}
+
+impl DerefMut for LocalWrite<'_> {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        if self.length == 0 {
+            return &mut [];
+        }
+        // SAFETY: as above, and the vector's handle is borrowed mutably for the guard's life.
+        unsafe { std::slice::from_raw_parts_mut(self.pointer, self.length) }
+    }
+}
+
+impl Drop for LocalWrite<'_> {
+    fn drop(&mut self) {
+        // SAFETY: gives back what `of` and `local_form` took, in the opposite order.
+        unsafe {
+            sys::VecRestoreArray(self.form.unwrap_or(self.raw), &mut self.pointer);
+            if let Some(form) = self.form.as_mut() {
+                sys::VecGhostRestoreLocalForm(self.raw, form);
+            }
+        }
+    }
+}

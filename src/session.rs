@@ -1,0 +1,191 @@
+//! One process of a parallel run: MPI, PETSc, collective failure, and requests to stop.
+
+use crate::{
+    error::{Error, Exit, Result},
+    petsc::Petsc,
+};
+use mpi::{
+    Threading,
+    collective::SystemOperation,
+    environment::Universe,
+    topology::{Communicator, SimpleCommunicator},
+    traits::{CommunicatorCollectives, Root},
+};
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
+
+/// MPI, initialised; everything parallel borrows it.
+pub struct Mpi {
+    universe: Universe,
+}
+
+impl Mpi {
+    /// Initialises MPI and makes a panic on any rank end the whole run with exit code 4, so that no rank waits for
+    /// one that is gone.
+    pub fn start() -> Result<Self> {
+        let (universe, _) = mpi::initialize_with_threading(Threading::Funneled)
+            .ok_or_else(|| Error::Internal("MPI is already initialised in this process".into()))?;
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            print(panic);
+            if mpi::environment::is_initialized() && !mpi::environment::is_finalized() {
+                SimpleCommunicator::world().abort(Exit::Internal as i32);
+            }
+        }));
+        Ok(Self { universe })
+    }
+
+    /// Starts PETSc and the signal flags on all ranks.
+    pub fn session(&self) -> Result<Session<'_>> {
+        let world = self.universe.world();
+        let petsc = Petsc::start(&self.universe, &world)?;
+        Ok(Session { world, petsc, signal: watch_signals()? })
+    }
+}
+
+/// What every parallel part of the solver is given.
+pub struct Session<'u> {
+    world: SimpleCommunicator,
+    petsc: Petsc<'u>,
+    signal: Arc<AtomicUsize>,
+}
+
+impl Session<'_> {
+    /// The communicator of all ranks.
+    pub fn world(&self) -> &SimpleCommunicator {
+        &self.world
+    }
+
+    /// This process's number, from 0.
+    pub fn rank(&self) -> usize {
+        usize::try_from(self.world.rank()).unwrap_or(0)
+    }
+
+    /// Number of processes.
+    pub fn ranks(&self) -> usize {
+        usize::try_from(self.world.size()).unwrap_or(1)
+    }
+
+    /// Whether this is the process that talks to the user.
+    pub fn is_first(&self) -> bool {
+        self.world.rank() == 0
+    }
+
+    /// PETSc, for its version.
+    pub fn petsc(&self) -> &Petsc<'_> {
+        &self.petsc
+    }
+
+    /// Makes a failure on any rank a failure on all: the lowest failing rank keeps its own error, the others get its
+    /// words. Collective; stands at the end of every phase in which one rank alone can fail.
+    pub fn agree<T>(&self, result: Result<T>) -> Result<T> {
+        let fine = self.world.size();
+        let mine = if result.is_err() { self.world.rank() } else { fine };
+        let mut lowest = fine;
+        self.world.all_reduce_into(&mine, &mut lowest, SystemOperation::min());
+        if lowest == fine {
+            return result;
+        }
+        let root = self.world.process_at_rank(lowest);
+        let (mut words, mut code) = match &result {
+            Err(error) if mine == lowest => (error.to_string().into_bytes(), error.exit() as i32),
+            _ => (Vec::new(), 0),
+        };
+        let mut length = words.len();
+        root.broadcast_into(&mut length);
+        words.resize(length, 0);
+        root.broadcast_into(&mut words[..]);
+        root.broadcast_into(&mut code);
+        match result {
+            Err(error) if mine == lowest => Err(error),
+            _ => Err(Error::Elsewhere {
+                rank: usize::try_from(lowest).unwrap_or(0),
+                exit: Exit::from_code(code),
+                message: String::from_utf8_lossy(&words).into_owned(),
+            }),
+        }
+    }
+
+    /// Sum over all ranks of each entry. Collective.
+    pub fn sum<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
+        self.reduce(mine, SystemOperation::sum())
+    }
+
+    /// Largest of each entry over all ranks. Collective.
+    pub fn largest<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
+        self.reduce(mine, SystemOperation::max())
+    }
+
+    fn reduce<const N: usize>(&self, mine: [f64; N], operation: SystemOperation) -> [f64; N] {
+        let mut all = [0.0; N];
+        self.world.all_reduce_into(&mine[..], &mut all[..], operation);
+        all
+    }
+
+    /// Sum over all ranks of a count. Collective.
+    pub fn total(&self, mine: usize) -> usize {
+        let mut all = 0u64;
+        self.world.all_reduce_into(&(mine as u64), &mut all, SystemOperation::sum());
+        usize::try_from(all).unwrap_or(usize::MAX)
+    }
+
+    /// Where this rank's share starts when the shares of all ranks stand one after another. Collective.
+    pub fn share_start(&self, mine: usize) -> usize {
+        let mut end = 0u64;
+        self.world.scan_into(&(mine as u64), &mut end, SystemOperation::sum());
+        usize::try_from(end).unwrap_or(usize::MAX) - mine
+    }
+
+    /// The signal that asked any rank to stop, if one did. Collective.
+    pub fn stop_requested(&self) -> Option<Signal> {
+        let seen = self.signal.load(Ordering::Relaxed) as i32;
+        let mut any = 0;
+        self.world.all_reduce_into(&seen, &mut any, SystemOperation::max());
+        Signal::ALL.into_iter().find(|s| s.number() == any)
+    }
+}
+
+/// A request to write a checkpoint and stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// SIGINT, as sent by Ctrl-C.
+    Interrupt,
+    /// SIGUSR1, as sent by batch systems before the time limit.
+    User1,
+    /// SIGTERM, as sent by batch systems that preempt.
+    Terminate,
+}
+
+impl Signal {
+    const ALL: [Self; 3] = [Self::Interrupt, Self::User1, Self::Terminate];
+
+    fn number(self) -> i32 {
+        match self {
+            Self::Interrupt => signal_hook::consts::SIGINT,
+            Self::User1 => signal_hook::consts::SIGUSR1,
+            Self::Terminate => signal_hook::consts::SIGTERM,
+        }
+    }
+}
+
+impl std::fmt::Display for Signal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Interrupt => "SIGINT",
+            Self::User1 => "SIGUSR1",
+            Self::Terminate => "SIGTERM",
+        })
+    }
+}
+
+fn watch_signals() -> Result<Arc<AtomicUsize>> {
+    let seen = Arc::new(AtomicUsize::new(0));
+    for signal in Signal::ALL {
+        let number = signal.number();
+        signal_hook::flag::register_usize(number, Arc::clone(&seen), number.unsigned_abs() as usize)
+            .map_err(|e| Error::Internal(format!("cannot watch {signal}: {e}")))?;
+    }
+    Ok(seen)
+}
