@@ -7,5 +7,8 @@ pub mod error;
 pub mod tensor;
 pub mod petsc;
 pub mod session;
+pub mod exchange;
+pub mod material;
+pub mod contact;
 pub mod mesh;
 pub mod cli;

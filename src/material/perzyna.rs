@@ -1,0 +1,226 @@
+//! Viscoplasticity of Perzyna type.
+//!
+//! `G(s) = -1/(2 lambda) E (s - P_K s)` (section 5 of Wang and Cheng 2022), where `P_K` projects on the stresses
+//! whose von Mises norm is at most the yield stress, orthogonally in one of three metrics.
+//!
+//! Plane strain and 3D: every isotropic metric separates pressure from deviator, so the projection scales the deviator
+//! by `yield stress / von Mises norm`. Plane stress: with `p = (s11 + s22)/√2`, `q = (s11 - s22)/√2`, `r = √2 s12` the
+//! squared norm is `p²/2 + 3 (q² + r²)/2` and every isotropic metric is diagonal, `a` on `p` and `b` on `q`, `r`. The
+//! stationary point is `p a/(a + m)`, `(q, r) b/(b + 3 m)` with the multiplier `m >= 0` that puts it on the surface: one
+//! scalar, monotone equation, solved by Newton's method on the reciprocal of the norm.
+
+use super::Isotropic;
+use crate::tensor::{Mandel, dot, normal_components, trace, von_mises};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The norm in which the projection is orthogonal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Metric {
+    /// `(E t, t)`, as the paper writes it.
+    Elasticity,
+    /// `(E^-1 t, t)`, usual in plasticity.
+    Compliance,
+    /// `(t, t)`.
+    Frobenius,
+}
+
+/// A Perzyna law at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Perzyna {
+    /// `lambda` in Pa s, positive.
+    pub relaxation: f64,
+    /// Uniaxial yield stress in Pa, not negative.
+    pub yield_stress: f64,
+    /// The elastic tensor `E`.
+    pub elasticity: Isotropic,
+    /// Metric of the projection.
+    pub metric: Metric,
+}
+
+impl Perzyna {
+    /// `(s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s: zero inside the yield surface.
+    ///
+    /// The stress rate is `G(s) = -E` of it, the dissipation `s :` it.
+    #[inline]
+    pub fn strain_rate<const S: usize>(&self, s: &Mandel<S>) -> Mandel<S> {
+        let mut out = [0.0; S];
+        let norm = von_mises(s);
+        if norm <= self.yield_stress {
+            return out;
+        }
+        let factor = 0.5 / self.relaxation;
+        let projected = self.project_outside(s, norm);
+        for c in 0..S {
+            out[c] = factor * (s[c] - projected[c]);
+        }
+        out
+    }
+
+    /// `P_K s`, the closest stress with von Mises norm at most the yield stress.
+    pub fn project<const S: usize>(&self, s: &Mandel<S>) -> Mandel<S> {
+        let norm = von_mises(s);
+        if norm <= self.yield_stress { *s } else { self.project_outside(s, norm) }
+    }
+
+    #[inline(always)]
+    fn project_outside<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
+        if S == 3 {
+            return self.project_plane_stress(s, norm);
+        }
+        let n = normal_components::<S>();
+        let mean = trace(s) / n as f64;
+        let scale = self.yield_stress / norm;
+        let mut out = [0.0; S];
+        for c in 0..S {
+            let pressure = if c < n { mean } else { 0.0 };
+            out[c] = pressure + scale * (s[c] - pressure);
+        }
+        out
+    }
+
+    fn project_plane_stress<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
+        if self.yield_stress == 0.0 {
+            return [0.0; S];
+        }
+        let p = (s[0] + s[1]) * FRAC_1_SQRT_2;
+        let q = (s[0] - s[1]) * FRAC_1_SQRT_2;
+        let (along, across) = self.inverse_metric();
+        let across = 3.0 * across;
+        let (volumetric, deviatoric) = (0.5 * p * p, 1.5 * (q * q + s[2] * s[2]));
+        let mut multiplier = (norm / self.yield_stress - 1.0) / along.max(across);
+        for _ in 0..60 {
+            let (a, b) = (1.0 / (1.0 + along * multiplier), 1.0 / (1.0 + across * multiplier));
+            let square = volumetric * a * a + deviatoric * b * b;
+            let fall = along * volumetric * a * a * a + across * deviatoric * b * b * b;
+            let step = (square.sqrt() / self.yield_stress - 1.0) * square / fall;
+            multiplier += step;
+            if step.abs() <= 1e-15 * multiplier {
+                break;
+            }
+        }
+        let p = p / (1.0 + along * multiplier) * FRAC_1_SQRT_2;
+        let b = 1.0 / (1.0 + across * multiplier);
+        let q = q * b * FRAC_1_SQRT_2;
+        let mut out = [0.0; S];
+        (out[0], out[1], out[2]) = (p + q, p - q, s[2] * b);
+        out
+    }
+
+    /// Inverse eigenvalues of the metric in plane stress: on `p`, and on `q` and `r`.
+    fn inverse_metric(&self) -> (f64, f64) {
+        let Isotropic { volumetric, shear } = self.elasticity;
+        let (p, q) = (shear + 2.0 * volumetric, shear);
+        match self.metric {
+            Metric::Elasticity => (1.0 / p, 1.0 / q),
+            Metric::Compliance => (p, q),
+            Metric::Frobenius => (1.0, 1.0),
+        }
+    }
+
+    /// `t : t` in the metric of the projection.
+    pub fn metric_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
+        match self.metric {
+            Metric::Elasticity => dot(t, &self.elasticity.apply(t)),
+            Metric::Compliance => self.elasticity.inverse_square(t),
+            Metric::Frobenius => dot(t, t),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Elasticity, Hypothesis};
+    use proptest::prelude::*;
+
+    const PAPER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+    const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
+
+    fn law(metric: Metric, hypothesis: Hypothesis) -> Perzyna {
+        Perzyna { relaxation: 100.0, yield_stress: 19.0, elasticity: PAPER.tensor(hypothesis), metric }
+    }
+
+    #[test]
+    fn stress_inside_the_yield_surface_flows_not_at_all() {
+        let law = law(Metric::Elasticity, Hypothesis::PlaneStress);
+        assert_eq!(law.strain_rate(&[18.9, 0.0, 0.0]), [0.0; 3]);
+        assert_eq!(law.project(&[18.9, 0.0, 0.0]), [18.9, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn pure_shear_is_scaled_to_the_surface_in_every_metric() {
+        for metric in METRICS {
+            let projected = law(metric, Hypothesis::PlaneStress).project(&[0.0, 0.0, 100.0]);
+            assert!((projected[2] - 19.0 / 1.5f64.sqrt()).abs() < 1e-12, "{projected:?}");
+        }
+    }
+
+    #[test]
+    fn equibiaxial_stress_is_scaled_in_plane_stress_and_free_in_space() {
+        for metric in METRICS {
+            let plane = law(metric, Hypothesis::PlaneStress).project(&[38.0, 38.0, 0.0]);
+            assert!((plane[0] - 19.0).abs() < 1e-12 && (plane[1] - 19.0).abs() < 1e-12, "{plane:?}");
+        }
+        let pressure = [50.0, 50.0, 50.0, 0.0, 0.0, 0.0];
+        assert_eq!(law(Metric::Elasticity, Hypothesis::Space).project(&pressure), pressure);
+    }
+
+    #[test]
+    fn uniaxial_viscoplastic_strain_rate_in_space_by_hand() {
+        // s = (31, 0, 0): deviator (62/3, -31/3, -31/3), scaled by 1 - 19/31, over 2 lambda = 200.
+        let rate = law(Metric::Frobenius, Hypothesis::Space).strain_rate(&[31.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!((rate[0] - 8.0 / 200.0).abs() < 1e-15, "{rate:?}");
+        assert!((rate[1] + 4.0 / 200.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn zero_yield_stress_leaves_no_plane_stress() {
+        let mut law = law(Metric::Elasticity, Hypothesis::PlaneStress);
+        law.yield_stress = 0.0;
+        assert_eq!(law.project(&[3.0, 4.0, 5.0]), [0.0; 3]);
+    }
+
+    fn check_projection<const S: usize>(law: &Perzyna, s: &Mandel<S>, other: &Mandel<S>) {
+        let scale = 1.0 + dot(s, s).sqrt() + dot(other, other).sqrt();
+        let p = law.project(s);
+        let again = law.project(&p);
+        assert!(von_mises(&p) <= 19.0 * (1.0 + 1e-12));
+        if von_mises(s) > 19.0 {
+            assert!((von_mises(&p) - 19.0).abs() < 1e-10 * 19.0, "on the surface");
+        }
+        for c in 0..S {
+            assert!((again[c] - p[c]).abs() < 1e-9 * scale, "idempotent");
+        }
+        let inside = law.project(other);
+        let mut to_other = [0.0; S];
+        let mut away = [0.0; S];
+        for c in 0..S {
+            (to_other[c], away[c]) = (inside[c] - p[c], s[c] - p[c]);
+        }
+        let mut sum = [0.0; S];
+        for c in 0..S {
+            sum[c] = to_other[c] + away[c];
+        }
+        // <away, to_other> in the metric, by polarisation: not positive for a projection on a convex set.
+        let product =
+            0.5 * (law.metric_square(&sum) - law.metric_square(&away) - law.metric_square(&to_other));
+        let size = law.metric_square(&sum) + law.metric_square(&away) + law.metric_square(&to_other);
+        assert!(product <= 1e-10 * size, "orthogonal: {product} of {size}");
+        assert!(dot(s, &law.strain_rate(s)) >= -1e-12 * scale * scale, "dissipation");
+    }
+
+    proptest! {
+        #[test]
+        fn projections_are_idempotent_on_the_surface_orthogonal_and_dissipative(
+            s in proptest::array::uniform6(-200.0f64..200.0),
+            other in proptest::array::uniform6(-200.0f64..200.0),
+            metric in proptest::sample::select(&METRICS[..]),
+        ) {
+            let first = |t: &[f64; 6]| [t[0], t[1], t[3]];
+            let plane = |t: &[f64; 6]| [t[0], t[1], t[2], t[3]];
+            check_projection(&law(metric, Hypothesis::PlaneStress), &first(&s), &first(&other));
+            check_projection(&law(metric, Hypothesis::PlaneStrain), &plane(&s), &plane(&other));
+            check_projection(&law(metric, Hypothesis::Space), &s, &other);
+        }
+    }
+}
