@@ -1,5 +1,13 @@
 //! Simplicial meshes with named boundaries and regions.
 
+pub mod generate;
+pub mod shape;
+pub mod surface;
+mod tags;
+pub mod tree;
+
+pub use tags::Tags;
+
 use crate::tensor::Vector;
 
 /// Triangles in the plane (`D = 2`) or tetrahedra in space (`D = 3`), whole, as read or generated on rank 0.

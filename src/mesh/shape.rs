@@ -1,0 +1,169 @@
+//! Measures of simplices and facets.
+
+use super::GlobalMesh;
+use crate::tensor::{Vector, add_scaled, norm};
+
+/// The facet of a positively oriented cell opposite to its node `opposite`, its normal pointing outward.
+#[inline]
+pub fn facet_of<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D] {
+    const TRIANGLE: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+    const TETRAHEDRON: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+    std::array::from_fn(|i| match D {
+        2 => cell[TRIANGLE[opposite][i]],
+        _ => cell[TETRAHEDRON[opposite][i]],
+    })
+}
+
+/// Signed measure of the simplex spanned by `D + 1` corners: area in m² or volume in m³, positive when the corners
+/// are positively oriented.
+#[inline]
+pub fn signed_measure<const D: usize>(corners: &[Vector<D>]) -> f64 {
+    let edge = |i: usize| add_scaled(&corners[i], -1.0, &corners[0]);
+    let (a, b) = (edge(1), edge(2));
+    match D {
+        2 => 0.5 * (a[0] * b[1] - a[1] * b[0]),
+        _ => {
+            let c = edge(3);
+            (a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                / 6.0
+        }
+    }
+}
+
+/// The outward normal of a facet, its length the facet's measure (m or m²).
+#[inline]
+pub fn facet_normal<const D: usize>(corners: &[Vector<D>; D]) -> Vector<D> {
+    let a = add_scaled(&corners[1], -1.0, &corners[0]);
+    let mut normal = [0.0; D];
+    if D == 2 {
+        (normal[0], normal[1]) = (a[1], -a[0]);
+    } else {
+        let b = add_scaled(&corners[2], -1.0, &corners[0]);
+        for i in 0..D {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            normal[i] = 0.5 * (a[j] * b[k] - a[k] * b[j]);
+        }
+    }
+    normal
+}
+
+/// The mean of points (m).
+pub fn centroid<const D: usize>(points: &[Vector<D>]) -> Vector<D> {
+    let share = 1.0 / points.len() as f64;
+    points.iter().fold([0.0; D], |sum, point| add_scaled(&sum, share, point))
+}
+
+/// The longest edge between any two of the corners (m).
+pub fn longest_edge<const D: usize>(corners: &[Vector<D>]) -> f64 {
+    edges(corners).fold(0.0, f64::max)
+}
+
+/// Shape quality of a simplex: `D` times the inradius over the circumradius, 1 for the regular simplex and toward 0
+/// for a degenerate one.
+pub fn quality<const D: usize>(corners: &[Vector<D>]) -> f64 {
+    let measure = signed_measure(corners).abs();
+    let local: Vec<u32> = (0..=D as u32).collect();
+    let surface: f64 = (0..=D)
+        .map(|opposite| norm(&facet_normal(&facet_of::<D>(&local, opposite).map(|i| corners[i as usize]))))
+        .sum();
+    let inradius = D as f64 * measure / surface;
+    let length = |i: usize, j: usize| norm(&add_scaled(&corners[i], -1.0, &corners[j]));
+    let circumradius = if D == 2 {
+        length(0, 1) * length(1, 2) * length(2, 0) / (4.0 * measure)
+    } else {
+        // Crelle: the products of opposite edges are the sides of a triangle of area 6 V R.
+        let sides = [length(0, 1) * length(2, 3), length(0, 2) * length(1, 3), length(0, 3) * length(1, 2)];
+        let half = 0.5 * sides.iter().sum::<f64>();
+        (half * sides.iter().map(|side| half - side).product::<f64>()).max(0.0).sqrt() / (6.0 * measure)
+    };
+    let quality = D as f64 * inradius / circumradius;
+    if quality.is_finite() { quality.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+fn edges<const D: usize>(corners: &[Vector<D>]) -> impl Iterator<Item = f64> {
+    (0..corners.len())
+        .flat_map(move |i| (0..i).map(move |j| norm(&add_scaled(&corners[i], -1.0, &corners[j]))))
+}
+
+impl<const D: usize> GlobalMesh<D> {
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len() / (D + 1)
+    }
+
+    /// The node ids of a cell.
+    #[inline]
+    pub fn cell(&self, cell: usize) -> &[u32] {
+        &self.cells[cell * (D + 1)..(cell + 1) * (D + 1)]
+    }
+
+    /// The corners of a cell; only the first `D + 1` of the four are meant.
+    #[inline]
+    pub fn corners(&self, cell: usize) -> [Vector<D>; 4] {
+        let ids = self.cell(cell);
+        std::array::from_fn(|i| self.nodes[ids[i.min(D)] as usize])
+    }
+
+    /// Signed area (m²) or volume (m³) of a cell.
+    #[inline]
+    pub fn measure(&self, cell: usize) -> f64 {
+        signed_measure(&self.corners(cell)[..=D])
+    }
+
+    /// Centroid of a cell (m).
+    pub fn centroid(&self, cell: usize) -> Vector<D> {
+        centroid(&self.corners(cell)[..=D])
+    }
+
+    /// Shape quality of a cell, see [`quality`].
+    pub fn quality(&self, cell: usize) -> f64 {
+        quality(&self.corners(cell)[..=D])
+    }
+
+    /// The corners of a facet (m).
+    pub fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
+        self.facets[facet].map(|node| self.nodes[node as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_regular_simplex_has_quality_one_and_a_sliver_almost_none() {
+        let h = 3f64.sqrt() / 2.0;
+        assert!((quality(&[[0.0, 0.0], [1.0, 0.0], [0.5, h]]) - 1.0).abs() < 1e-14);
+        let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        assert!((quality(&regular) - 1.0).abs() < 1e-14);
+        assert!(quality(&[[0.0, 0.0], [1.0, 0.0], [0.5, 1e-3]]) < 0.01);
+        assert_eq!(quality(&[[0.0, 0.0], [1.0, 0.0], [0.5, 0.0]]), 0.0);
+        let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-4], [1.0, 1.0, 0.0], [0.0, 1.0, 1e-4]];
+        assert!(quality(&flat) < 0.01);
+        // Right isosceles: inradius (2 - √2)/2, circumradius √2/2.
+        let right = quality(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert!((right - 2.0 * (2.0 - 2f64.sqrt()) / 2f64.sqrt()).abs() < 1e-14);
+    }
+
+    #[test]
+    fn facets_of_a_positive_cell_face_away_from_the_opposite_node() {
+        let triangle = [[0.1, 0.0], [1.0, 0.2], [0.3, 1.0]];
+        assert!(signed_measure(&triangle) > 0.0);
+        outward(&triangle);
+        let tetrahedron = [[0.1, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 1.0, 0.0], [0.2, 0.1, 0.9]];
+        assert!(signed_measure(&tetrahedron) > 0.0);
+        outward(&tetrahedron);
+    }
+
+    fn outward<const D: usize>(corners: &[Vector<D>]) {
+        let ids: Vec<u32> = (0..=D as u32).collect();
+        for opposite in 0..=D {
+            let facet = facet_of::<D>(&ids, opposite).map(|i| corners[i as usize]);
+            let away = add_scaled(&centroid(&facet), -1.0, &corners[opposite]);
+            let product = crate::tensor::dot(&facet_normal(&facet), &away);
+            assert!((product - D as f64 * signed_measure(corners)).abs() < 1e-14);
+        }
+    }
+}
