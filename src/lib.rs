@@ -11,4 +11,5 @@ pub mod exchange;
 pub mod material;
 pub mod contact;
 pub mod mesh;
+pub mod job;
 pub mod cli;

@@ -1,0 +1,162 @@
+//! `[[contact]]`: the laws on boundaries that touch an obstacle.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::job::Scalar;
+
+/// Boundaries that touch an obstacle, and the laws there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// Names of boundaries.
+    #[schemars(length(min = 1), example = ["bottom"])]
+    pub on: Vec<String>,
+    /// Where on a facet the laws hold.
+    #[serde(default)]
+    pub quadrature: Quadrature,
+    /// The contact pressure -sigma_nu.
+    pub normal: NormalLaw,
+    /// The friction traction; absent: sigma_tau = 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+}
+
+/// Where on a facet the contact laws hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Quadrature {
+    /// At its nodes (trapezoidal rule): each node has its own law.
+    #[default]
+    Nodal,
+    /// At Gauss points.
+    Gauss,
+}
+
+/// The normal law; exactly one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalLaw {
+    /// A piecewise linear function of the normal velocity that may fall, equation (72).
+    DampedResponse(DampedResponse),
+    /// Any polyline of pressure over normal velocity, with upward jumps.
+    Graph(Graph),
+    /// A spring that is felt beyond the gap.
+    Compliance(Compliance),
+    /// A rigid obstacle: the normal displacement never exceeds the gap.
+    Unilateral(Unilateral),
+}
+
+/// Pressure as a continuous piecewise linear function of the normal velocity, zero at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DampedResponse {
+    /// Normal velocities r_1 < r_2 < ... above zero where the slope changes.
+    #[schemars(extend("unit" = "m/s"), example = [0.003, 0.005])]
+    pub breakpoints: Vec<f64>,
+    /// Slopes before, between and after the breakpoints: one more than breakpoints; negative ones fall.
+    #[schemars(length(min = 1), extend("unit" = "Pa s/m"), example = [10.0, -10.0, 10.0])]
+    pub slopes: Vec<f64>,
+    /// How the function goes on for negative velocities.
+    #[serde(default)]
+    pub symmetry: Symmetry,
+}
+
+/// How a function of velocities above zero goes on below.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Symmetry {
+    /// p(-r) = p(r): the potential of (72) as printed.
+    #[default]
+    Even,
+    /// p(-r) = -p(r): resists both ways.
+    Odd,
+    /// p(r) = 0 below zero: only approach is resisted.
+    OneSided,
+}
+
+/// Pressure over normal velocity as a polyline.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Graph {
+    /// Corners [normal velocity, pressure], velocities ascending; two with the same velocity are an upward jump.
+    #[schemars(length(min = 1), extend("unit" = "[m/s, Pa]"), example = [[0.0, 0.0], [0.003, 0.03]])]
+    pub points: Vec<[f64; 2]>,
+    /// Slope below the first point.
+    #[serde(default)]
+    #[schemars(extend("unit" = "Pa s/m"))]
+    pub slope_before: f64,
+    /// Slope above the last point.
+    #[serde(default)]
+    #[schemars(extend("unit" = "Pa s/m"))]
+    pub slope_after: f64,
+}
+
+/// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Compliance {
+    /// Pressure per penetration.
+    #[schemars(extend("unit" = "Pa/m", "exclusiveMinimum" = 0), example = 1e4)]
+    pub stiffness: f64,
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z.
+    #[serde(default)]
+    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    pub gap: Scalar,
+}
+
+/// Unilateral constraint: normal displacement <= gap.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Unilateral {
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z.
+    #[serde(default)]
+    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    pub gap: Scalar,
+}
+
+/// The friction law; exactly one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Friction {
+    /// A given bound on the friction traction.
+    Tresca(Tresca),
+    /// A bound proportional to the contact pressure.
+    Coulomb(Coulomb),
+    /// A coefficient that falls with the sliding velocity.
+    SlipWeakening(SlipWeakening),
+}
+
+/// Tresca friction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tresca {
+    /// Largest friction traction.
+    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 2.0)]
+    pub bound: f64,
+}
+
+/// Coulomb friction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Coulomb {
+    /// Largest friction traction per contact pressure.
+    #[schemars(range(min = 0), example = 0.3)]
+    pub coefficient: f64,
+}
+
+/// Friction whose coefficient falls from static to dynamic with the sliding velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SlipWeakening {
+    /// Coefficient at rest; not below the dynamic one.
+    #[serde(rename = "static")]
+    #[schemars(range(min = 0), example = 0.5)]
+    pub at_rest: f64,
+    /// Coefficient when sliding fast.
+    #[schemars(range(min = 0), example = 0.3)]
+    pub dynamic: f64,
+    /// Sliding velocity over which the coefficient falls.
+    #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 0.01)]
+    pub decay_velocity: f64,
+}

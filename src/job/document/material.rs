@@ -1,0 +1,107 @@
+//! `[material]` and `[[region]]`: what the body is made of.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A material; each effect is there only if its table or key is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// What a 2D body stands for; must be absent in 3D.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hypothesis: Option<Hypothesis>,
+    /// Mass per volume. Absent: no inertia, the problem is quasistatic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
+    pub density: Option<f64>,
+    /// Isotropic linear elasticity; absent: no elastic stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elasticity: Option<Elasticity>,
+    /// Linear viscosity; absent: no viscous stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscosity: Option<Viscosity>,
+    /// Viscoplastic flow; absent: no stress history is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscoplasticity: Option<Viscoplasticity>,
+}
+
+/// What a 2D body stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Hypothesis {
+    /// A thin plate, free of stress across its thickness.
+    PlaneStress,
+    /// A slice of a long body that can't strain along its length.
+    PlaneStrain,
+}
+
+/// Isotropic linear elasticity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Elasticity {
+    /// Young's modulus.
+    #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
+    pub youngs_modulus: f64,
+    /// Poisson's ratio.
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
+    pub poisson_ratio: f64,
+}
+
+/// Viscous stress `volumetric tr(e) I + shear e` of the strain rate e.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Viscosity {
+    /// Factor of the strain rate's trace; may be negative as long as d volumetric + shear stays positive.
+    #[schemars(extend("unit" = "Pa s"), example = 25.0)]
+    pub volumetric: f64,
+    /// Factor of the strain rate itself.
+    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
+    pub shear: f64,
+}
+
+/// The viscoplastic law; exactly one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Viscoplasticity {
+    /// Overstress law with the von Mises yield set.
+    Perzyna(Perzyna),
+}
+
+/// Perzyna's law `G(s) = -(1/(2 relaxation)) E (s - P_K s)`, where P_K projects on the von Mises yield set K.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Perzyna {
+    /// The viscosity lambda: the larger, the slower stress beyond the yield set relaxes.
+    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
+    pub relaxation: f64,
+    /// Von Mises norm at which flow begins.
+    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 19.0)]
+    pub yield_stress: f64,
+    /// The norm in which the projection on the yield set is the nearest point.
+    #[serde(default)]
+    pub metric: Metric,
+}
+
+/// A norm of stresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Metric {
+    /// (E t, t): Wang and Cheng's.
+    #[default]
+    Elasticity,
+    /// (E^-1 t, t): the usual choice in plasticity.
+    Compliance,
+    /// (t, t).
+    Frobenius,
+}
+
+/// A part of the body, named by a physical group of the mesh, with its own material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// The physical group's name.
+    #[schemars(length(min = 1), example = &"core")]
+    pub name: String,
+    /// Its material; the hypothesis is the body's and stands in the main material only.
+    pub material: Material,
+}

@@ -1,0 +1,113 @@
+//! `[time]` and `[solver]`.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How long and in which steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// The time to reach; the run starts at 0.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
+    pub end: f64,
+    /// Length of a step; with [time.adaptive] of the first one tried.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.015625)]
+    pub step: f64,
+    /// How a step is taken.
+    #[serde(default)]
+    pub scheme: Scheme,
+    /// Steps chosen by their error; absent: fixed steps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<Adaptive>,
+}
+
+/// How a step is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scheme {
+    /// Wang and Cheng's (24)-(25): elastic and viscoplastic stress lag by a step; stable for small steps only.
+    #[default]
+    LaggedEuler,
+    /// Every stress at the end of the step: no bound on the step.
+    ImplicitEuler,
+    /// Second order in time.
+    Bdf2,
+}
+
+/// Steps chosen by their error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptive {
+    /// Accepted error of a step, relative to the largest velocity so far.
+    #[serde(default = "adaptive_tolerance")]
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub tolerance: f64,
+    /// The run fails when a shorter step would be needed.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1e-5)]
+    pub smallest_step: f64,
+    /// No step is longer.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
+    pub largest_step: f64,
+}
+
+fn adaptive_tolerance() -> f64 {
+    1e-3
+}
+
+/// How the equations of a step are solved; every key is optional.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// Residual at which a step counts as solved, relative to the forces that act.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub tolerance: f64,
+    /// How linear systems are preconditioned.
+    pub preconditioner: Preconditioner,
+    /// Newton iterations after which a step counts as failed.
+    #[schemars(range(min = 1))]
+    pub max_newton_iterations: u32,
+    /// Warnings that should not stop the run.
+    pub accept: Vec<Accept>,
+    /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
+    #[schemars(example = serde_json::json!({ "snes_monitor": "" }))]
+    pub petsc: BTreeMap<String, String>,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-10,
+            preconditioner: Preconditioner::Auto,
+            max_newton_iterations: 50,
+            accept: Vec::new(),
+            petsc: BTreeMap::new(),
+        }
+    }
+}
+
+/// How linear systems are preconditioned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preconditioner {
+    /// Chosen by the size of the problem and the number of ranks.
+    #[default]
+    Auto,
+    /// A sparse factorisation.
+    Cholesky,
+    /// PETSc's algebraic multigrid.
+    Gamg,
+    /// Hypre's algebraic multigrid.
+    Boomeramg,
+}
+
+/// A refusal that the user takes upon himself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Accept {
+    /// Run although theta_step >= 1: a step may have several solutions.
+    Uniqueness,
+    /// Run although the step is beyond the scheme's bound k_max.
+    ExplicitStability,
+}

@@ -1,0 +1,63 @@
+//! The names an expression may use.
+
+use super::{Binary, Instruction, Unary, Variable};
+
+/// What a name stands for.
+#[derive(Clone, Copy)]
+pub enum Meaning {
+    /// A variable or a constant.
+    Value(Instruction),
+    /// A function of one argument.
+    One(Unary),
+    /// A function of two arguments.
+    Two(Binary),
+    /// A function of two or more arguments, applied from left to right.
+    Many(Binary),
+}
+
+const NAMES: &[(&str, Meaning)] = &[
+    ("t", Meaning::Value(Instruction::Variable(Variable::T))),
+    ("x", Meaning::Value(Instruction::Variable(Variable::X))),
+    ("y", Meaning::Value(Instruction::Variable(Variable::Y))),
+    ("z", Meaning::Value(Instruction::Variable(Variable::Z))),
+    ("pi", Meaning::Value(Instruction::Number(std::f64::consts::PI))),
+    ("e", Meaning::Value(Instruction::Number(std::f64::consts::E))),
+    ("min", Meaning::Many(Binary(f64::min))),
+    ("max", Meaning::Many(Binary(f64::max))),
+    ("atan2", Meaning::Two(Binary(f64::atan2))),
+    ("hypot", Meaning::Two(Binary(f64::hypot))),
+    ("abs", Meaning::One(Unary(f64::abs))),
+    ("sign", Meaning::One(Unary(sign))),
+    ("floor", Meaning::One(Unary(f64::floor))),
+    ("ceil", Meaning::One(Unary(f64::ceil))),
+    ("round", Meaning::One(Unary(f64::round))),
+    ("sqrt", Meaning::One(Unary(f64::sqrt))),
+    ("cbrt", Meaning::One(Unary(f64::cbrt))),
+    ("exp", Meaning::One(Unary(f64::exp))),
+    ("ln", Meaning::One(Unary(f64::ln))),
+    ("log10", Meaning::One(Unary(f64::log10))),
+    ("sin", Meaning::One(Unary(f64::sin))),
+    ("cos", Meaning::One(Unary(f64::cos))),
+    ("tan", Meaning::One(Unary(f64::tan))),
+    ("asin", Meaning::One(Unary(f64::asin))),
+    ("acos", Meaning::One(Unary(f64::acos))),
+    ("atan", Meaning::One(Unary(f64::atan))),
+    ("sinh", Meaning::One(Unary(f64::sinh))),
+    ("cosh", Meaning::One(Unary(f64::cosh))),
+    ("tanh", Meaning::One(Unary(f64::tanh))),
+];
+
+/// What `name` stands for.
+pub fn meaning(name: &str) -> Option<Meaning> {
+    NAMES.iter().find(|(known, _)| *known == name).map(|(_, meaning)| *meaning)
+}
+
+/// Every name, variables first.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    NAMES.iter().map(|(name, _)| *name)
+}
+
+/// -1, 0 or 1.
+fn sign(number: f64) -> f64 {
+    if number == 0.0 { 0.0 } else { number.signum() }
+}

@@ -1,0 +1,94 @@
+use super::{Expression, Scalar};
+
+fn value(text: &str) -> f64 {
+    Expression::parse(text)
+        .unwrap_or_else(|fault| panic!("{text}: {fault:?}"))
+        .evaluate(0.5, &[2.0, 3.0, 4.0])
+}
+
+#[test]
+fn operators_bind_as_in_mathematics() {
+    for (text, expected) in [
+        ("1 + 2*3", 7.0),
+        ("1 - 2 - 3", -4.0),
+        ("12/2/3", 2.0),
+        ("12/2*3", 18.0),
+        ("-x^2", -4.0),
+        ("(-x)^2", 4.0),
+        ("2^3^2", 512.0),
+        ("2^-1", 0.5),
+        ("--3", 3.0),
+        ("2*-3", -6.0),
+        ("1e-3*x", 2e-3),
+        (".5e1", 5.0),
+        ("2.", 2.0),
+        ("t + 10*x + 100*y + 1000*z", 4320.5),
+        ("-10*min(t/0.1, 1)", -10.0),
+        ("min(max(t, 0), 1)", 0.5),
+        ("max(0, min(1, x/4))", 0.5),
+        ("min(3, 2, 1, 2)", 1.0),
+        ("3*max(1, 2)^2", 12.0),
+        ("abs(-x) + sqrt(y + 1)", 4.0),
+        ("cos(pi) + ln(e)", 0.0),
+        ("sign(-2) + sign(0)", -1.0),
+        ("\t x\n", 2.0),
+    ] {
+        assert!((value(text) - expected).abs() < 1e-12, "{text} is {}, not {expected}", value(text));
+    }
+}
+
+#[test]
+fn faults_point_into_the_text() {
+    for (text, at, message, help) in [
+        ("", 0..0, "empty", "number"),
+        ("1 +", 3..3, "ends too early", "follow"),
+        ("2x", 1..2, "operator is missing", "2*x"),
+        ("(1)(2)", 3..4, "operator is missing", "2*x"),
+        ("(1", 0..1, "never closed", ")"),
+        ("1)", 1..2, "closes nothing", "delete"),
+        ("0,5", 1..2, "comma", "0.5"),
+        ("x**2", 2..3, "two stars", "x^2"),
+        ("x > 1", 2..3, "comparisons", "min"),
+        ("(x < 1)*2", 3..4, "comparisons", "min"),
+        ("1 + T", 4..5, "unknown name `T`", "did you mean `t`?"),
+        ("sine(x)", 0..4, "unknown name `sine`", "did you mean `sin`?"),
+        ("temperature", 0..11, "unknown name", "known names: t, x, y, z"),
+        ("sin", 0..3, "no arguments", "sin(...)"),
+        ("x(1)", 0..1, "not a function", "x*("),
+        ("sin(1, 2)", 0..9, "2 arguments", "takes 1"),
+        ("min(1)", 0..6, "1 argument", "at least 2"),
+        ("1.2.3", 0..5, "not a number", "1e-3"),
+        ("1e999", 0..5, "not a number", "1e-3"),
+        ("x + é", 4..6, "unexpected `é`", "numbers"),
+    ] {
+        let fault = Expression::parse(text).expect_err(text);
+        assert_eq!(fault.at, at, "{text}: {fault:?}");
+        assert!(fault.message.contains(message), "{text}: {fault:?}");
+        assert!(fault.help.contains(help), "{text}: {fault:?}");
+    }
+}
+
+#[test]
+fn deep_and_long_expressions_are_refused_before_they_can_hurt() {
+    let nested = |levels: usize| format!("{}x{}", "(".repeat(levels), ")".repeat(levels));
+    assert!(Expression::parse(&nested(150)).is_ok());
+    assert!(Expression::parse(&nested(4000)).expect_err("nested").message.contains("too deeply"));
+    assert!(Expression::parse(&"2^".repeat(3000)).expect_err("powers").message.contains("too deeply"));
+    assert!(Expression::parse(&"1+".repeat(6000)).expect_err("long").message.contains("12000 characters"));
+    assert_eq!(value(&format!("{}1", "-".repeat(9000))), 1.0);
+}
+
+#[test]
+fn values_that_need_a_deep_stack_are_right() {
+    let levels = 150;
+    assert_eq!(value(&format!("{}0{}", "1+(".repeat(levels), ")".repeat(levels))), levels as f64);
+}
+
+#[test]
+fn dependence_follows_the_variables_that_occur() {
+    let scalar = |text: &str| Scalar::Expression(Expression::parse(text).expect(text));
+    assert!(Scalar::Number(3.0).is_constant());
+    assert!(scalar("sin(pi)").is_constant());
+    assert!(scalar("2*t").depends_on_time() && !scalar("2*t").depends_on_position());
+    assert!(scalar("y").depends_on_position() && !scalar("y").depends_on_time());
+}
