@@ -3,7 +3,8 @@
 //!
 //! A module uses only modules that stand above it in this list.
 
-pub mod error;
-pub mod tensor;
-pub mod mesh;
 pub mod cli;
+pub mod error;
+pub mod mesh;
+pub mod output;
+pub mod tensor;
