@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod tensor;
+pub mod job;
 pub mod petsc;
 pub mod session;
 pub mod exchange;
@@ -14,8 +15,7 @@ pub mod mesh;
 pub mod space;
 pub mod state;
 pub mod effect;
+pub mod body;
 pub mod stepping;
 pub mod output;
-pub mod job;
-pub mod run;
 pub mod cli;

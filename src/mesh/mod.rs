@@ -1,11 +1,14 @@
 //! Simplicial meshes with named boundaries and regions.
 
+mod distributed;
 pub mod generate;
+pub mod partition;
 pub mod shape;
 pub mod surface;
 mod tags;
 pub mod tree;
 
+pub use distributed::{Mesh, distribute};
 pub use tags::Tags;
 
 use crate::tensor::Vector;

@@ -105,7 +105,7 @@ mod tests {
     use crate::mesh::{
         generate::{Diagonal, rectangle},
         surface::Topology,
-        tags::Tags,
+        Tags,
     };
 
     fn square(n: usize) -> (GlobalMesh<2>, DualGraph) {

@@ -168,6 +168,11 @@ impl Snes {
         self.outcome()
     }
 
+    /// The residual at the end of the last solve.
+    pub fn residual(&self) -> &DistributedVector {
+        &self.residual
+    }
+
     fn outcome(&mut self) -> Result<NonlinearOutcome> {
         let (mut reason, mut iterations, mut linear_iterations, mut residual) = (0, 0, 0, 0.0);
         // SAFETY: live object, live numbers.

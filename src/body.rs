@@ -1,0 +1,127 @@
+//! A body on a mesh with all that acts on it: what a run advances in time.
+
+use crate::{
+    effect::{Contact, Effect, Energy, Load, Phases, Step},
+    error::Result,
+    mesh::Mesh,
+    petsc::{BlockRows, DistributedVector},
+    session::Session,
+    space::{Batch, Geometry, Needs, Nodal, assemble},
+    state::State,
+    tensor::Mandel,
+};
+
+/// A body of `D` dimensions whose stresses have `S` components.
+pub struct Body<const D: usize, const S: usize> {
+    /// This rank's part of the mesh.
+    pub mesh: Mesh<D>,
+    /// Geometry of its cells.
+    pub geometry: Geometry<D>,
+    /// What the interior feels.
+    pub effects: Vec<Box<dyn Effect<D, S>>>,
+    /// What the surface touches.
+    pub contacts: Vec<Contact<D>>,
+    /// What pulls.
+    pub load: Load,
+    /// One flag a local component: held by a support.
+    pub fixed: Vec<bool>,
+}
+
+impl<const D: usize, const S: usize> Body<D, S> {
+    /// The constant matrix of a step of this length. Collective.
+    pub fn matrix(&self, session: &Session, step_length: f64) -> Result<BlockRows> {
+        let effects: Vec<_> = self.effects.iter().filter(|e| e.phases().matrix).collect();
+        assemble(session, &self.mesh, &self.geometry, &self.fixed, |cell, geometry, matrix| {
+            effects.iter().for_each(|effect| effect.add_matrix(cell, geometry, step_length, matrix));
+        })
+    }
+
+    /// Adds explicit forces at the start of a step to `forces` (with ghosts); effects write their trial histories.
+    pub fn add_explicit_forces(&mut self, state: &State, step: Step, forces: &mut [f64]) -> Result<Energy> {
+        let mut energy = Energy::default();
+        let Some(needs) = self.needs(|p| p.explicit) else { return Ok(energy) };
+        let (mesh, effects) = (&self.mesh, &mut self.effects);
+        with_nodal(state, |nodal| {
+            Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
+                for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
+                    effect.add_explicit(step, batch, &mut energy);
+                }
+                batch.scatter(mesh, forces);
+            });
+        })?;
+        Ok(energy)
+    }
+
+    /// Energies of this rank's cells after a committed step.
+    pub fn energy(&self, state: &State, step: Step) -> Result<Energy> {
+        let mut energy = Energy::default();
+        let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                for effect in self.effects.iter().filter(|e| e.phases().energy.is_some()) {
+                    effect.add_energy(step, batch, &mut energy);
+                }
+            });
+        })?;
+        Ok(energy)
+    }
+
+    /// Total stress in Pa after a committed step, one a cell.
+    pub fn stress(&self, state: &State) -> Result<Vec<Mandel<S>>> {
+        let mut out = vec![[0.0; S]; self.mesh.cell_count()];
+        let Some(needs) = self.needs(|p| p.stress) else { return Ok(out) };
+        let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
+                for effect in self.effects.iter().filter(|e| e.phases().stress.is_some()) {
+                    effect.add_stress(step, batch);
+                }
+                out[batch.first..][..batch.cells.len()].copy_from_slice(&batch.stress[..batch.cells.len()]);
+            });
+        })?;
+        Ok(out)
+    }
+
+    /// Writes the nodal forces of the loads at `time`. Collective, also where a rank fails.
+    pub fn write_loads(&self, time: f64, forces: &mut DistributedVector) -> Result<()> {
+        let result = {
+            let mut values = forces.local_mut()?;
+            values.fill(0.0);
+            self.load.add(&self.mesh, &self.geometry, time, &mut values)
+        };
+        forces.add_ghosts_to_owners()?;
+        result
+    }
+
+    /// Makes all trial histories the converged ones.
+    pub fn commit(&mut self) {
+        self.effects.iter_mut().for_each(|effect| effect.commit());
+    }
+
+    /// Names of all that is simulated.
+    pub fn effect_names(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> = self.effects.iter().map(|e| e.name()).collect();
+        if !self.load.tractions.is_empty() {
+            names.push("traction");
+        }
+        if !self.load.body_forces.is_empty() {
+            names.push("body_force");
+        }
+        if !self.contacts.is_empty() {
+            names.push("contact");
+        }
+        names
+    }
+
+    fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
+        self.effects.iter().filter_map(|e| phase(e.phases())).reduce(Needs::or)
+    }
+}
+
+fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
+    let displacement = state.displacement.local()?;
+    let velocity = state.velocity.local()?;
+    let previous_velocity = state.previous_velocity.local()?;
+    body(Nodal { displacement: &displacement, velocity: &velocity, previous_velocity: &previous_velocity });
+    Ok(())
+}

@@ -1,0 +1,52 @@
+use super::{Effect, Energy, Phases, Step};
+use crate::{
+    material::Isotropic,
+    space::{Batch, Needs},
+    tensor::{add_scaled, dot},
+};
+
+/// Elastic stress of the displacement before the step: `E e(u_{n-1})` in (24).
+#[derive(Debug)]
+pub struct ElasticStress {
+    /// The elastic tensor `E` in Pa.
+    pub tensor: Isotropic,
+    /// Whether a history adds to the elastic stress, which then accounts for its energy.
+    pub with_history: bool,
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
+    fn name(&self) -> &'static str {
+        "elasticity"
+    }
+
+    fn phases(&self) -> Phases {
+        let strain = Needs { strain: true, ..Needs::default() };
+        let both = Needs { strain_rate: true, ..strain };
+        Phases { matrix: false, explicit: Some(strain), energy: Some(both), stress: Some(both) }
+    }
+
+    fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+        for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
+            *stress = add_scaled(stress, 1.0, &self.tensor.apply(strain));
+        }
+    }
+
+    fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let strains = batch.strain.iter().zip(&batch.strain_rate);
+        for (cell, (strain, rate)) in batch.cells.iter().zip(strains) {
+            if !self.with_history {
+                energy.elastic += 0.5 * cell.volume * dot(strain, &self.tensor.apply(strain));
+            }
+            let lag = dot(rate, &self.tensor.apply(rate));
+            energy.numerical += 0.5 * cell.volume * step.length * step.length * lag;
+        }
+    }
+
+    fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
+        let strains = batch.strain.iter().zip(&batch.strain_rate).take(batch.cells.len());
+        for (stress, (strain, rate)) in batch.stress.iter_mut().zip(strains) {
+            let before = add_scaled(strain, -step.length, rate);
+            *stress = add_scaled(stress, 1.0, &self.tensor.apply(&before));
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The energy balance of a step.
+
+use std::ops::AddAssign;
+
+/// Energies of a body in J (J/m in the plane), after a step or released in it.
+///
+/// For `lagged_euler` with `s_n = E e(u_{n-1}) + H_n` and `S_n = E e(u_n) + H_n`, testing (25) with `k v_n` gives exactly
+///
+/// ```text
+/// d(1/2 v.Mv) + d(1/2 S:E^-1 S) + k v.Av + k s_{n-1}:X + k g(v).v - k f.v = numerical
+/// numerical = 1/2 |k E e(v_n)|^2 - 1/2 |v_n - v_{n-1}|^2_M - k (S_{n-1} - s_{n-1}):X + 1/2 |k E X|^2
+/// ```
+///
+/// with `X = (s_{n-1} - P_K s_{n-1}) / (2 lambda)` and stresses measured by `E^-1`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Energy {
+    /// Kinetic energy at the end of the step.
+    pub kinetic: f64,
+    /// Elastic energy at the end of the step.
+    pub elastic: f64,
+    /// Dissipated by viscosity in the step.
+    pub viscous: f64,
+    /// Dissipated by viscoplastic flow in the step.
+    pub viscoplastic: f64,
+    /// Dissipated by contact in the step.
+    pub contact: f64,
+    /// Work of loads in the step.
+    pub work: f64,
+    /// The scheme's own terms in the step, known exactly.
+    pub numerical: f64,
+}
+
+impl Energy {
+    /// As an array, for sums over ranks.
+    pub fn to_array(self) -> [f64; 7] {
+        [self.kinetic, self.elastic, self.viscous, self.viscoplastic, self.contact, self.work, self.numerical]
+    }
+
+    /// Back from the array.
+    pub fn from_array(a: [f64; 7]) -> Self {
+        let [kinetic, elastic, viscous, viscoplastic, contact, work, numerical] = a;
+        Self { kinetic, elastic, viscous, viscoplastic, contact, work, numerical }
+    }
+}
+
+impl AddAssign for Energy {
+    fn add_assign(&mut self, other: Self) {
+        let (mut a, b) = (self.to_array(), other.to_array());
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        *self = Self::from_array(a);
+    }
+}

@@ -1,0 +1,67 @@
+use super::{Effect, Energy, Phases, Step};
+use crate::space::{Batch, CellMatrix, Needs, Simplex};
+
+/// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
+#[derive(Debug)]
+pub struct Inertia {
+    /// Density in kg/m^d.
+    pub density: f64,
+}
+
+impl Inertia {
+    /// `integral of density w . w` over a cell with these nodal values.
+    fn square<const D: usize>(&self, volume: f64, nodal: &[[f64; D]]) -> f64 {
+        let factor = self.density * volume / ((D + 1) * (D + 2)) as f64;
+        let mut sum = 0.0;
+        for i in 0..D {
+            let (mut total, mut squares) = (0.0, 0.0);
+            for w in nodal {
+                total += w[i];
+                squares += w[i] * w[i];
+            }
+            sum += total * total + squares;
+        }
+        factor * sum
+    }
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
+    fn name(&self) -> &'static str {
+        "inertia"
+    }
+
+    fn phases(&self) -> Phases {
+        let velocity = Needs { velocity: true, ..Needs::default() };
+        let both = Needs { velocity_change: true, ..velocity };
+        Phases { matrix: true, explicit: Some(velocity), energy: Some(both), stress: None }
+    }
+
+    fn add_matrix(&self, _cell: usize, geometry: &Simplex<D>, step_length: f64, matrix: &mut CellMatrix<D>) {
+        matrix.add_mass(geometry, self.density / step_length);
+    }
+
+    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+        let factor = self.density / (step.length * ((D + 1) * (D + 2)) as f64);
+        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.force.chunks_exact_mut(D + 1));
+        for (cell, (velocity, force)) in batch.cells.iter().zip(nodal) {
+            let factor = factor * cell.volume;
+            for i in 0..D {
+                let mut total = 0.0;
+                for v in velocity {
+                    total += v[i];
+                }
+                for (f, v) in force.iter_mut().zip(velocity) {
+                    f[i] += factor * (total + v[i]);
+                }
+            }
+        }
+    }
+
+    fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.velocity_change.chunks_exact(D + 1));
+        for (cell, (velocity, change)) in batch.cells.iter().zip(nodal) {
+            energy.kinetic += 0.5 * self.square(cell.volume, velocity);
+            energy.numerical -= 0.5 * self.square(cell.volume, change);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Effects: what a body feels. A run holds only the effects its job calls for; one file an effect.
+//!
+//! Each effect takes part in the phases it names in [`Effect::phases`]; the others never call it.
+
+mod contact;
+mod elastic_stress;
+mod energy;
+mod inertia;
+mod load;
+mod support;
+mod viscoplastic_history;
+mod viscous_stress;
+
+pub use contact::{Contact, Quadrature};
+pub use elastic_stress::ElasticStress;
+pub use energy::Energy;
+pub use inertia::Inertia;
+pub use load::{BodyForce, Load, Traction};
+pub use support::{Held, Support, fixed_components};
+pub use viscoplastic_history::ViscoplasticHistory;
+pub use viscous_stress::ViscousStress;
+
+use crate::space::{Batch, CellMatrix, Needs, Simplex};
+
+/// The step being taken, or the last one taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Time at its end in s.
+    pub time: f64,
+    /// Its length in s.
+    pub length: f64,
+    /// Length of the step before it in s; 0 for the first step.
+    pub previous_length: f64,
+}
+
+/// Phases of a run in which an effect has work to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Phases {
+    /// Adds to the constant matrix.
+    pub matrix: bool,
+    /// Adds explicit stress or force at the start of a step; what that needs.
+    pub explicit: Option<Needs>,
+    /// Adds to the energy balance at the end of a step; what that needs.
+    pub energy: Option<Needs>,
+    /// Adds to the total stress that is written to files; what that needs.
+    pub stress: Option<Needs>,
+}
+
+/// An effect of the body's interior.
+pub trait Effect<const D: usize, const S: usize> {
+    /// Its name in logs and `summary.json`.
+    fn name(&self) -> &'static str;
+
+    /// Where it takes part.
+    fn phases(&self) -> Phases;
+
+    /// Adds its part of the matrix that multiplies the velocity in a step of this length.
+    fn add_matrix(&self, _cell: usize, _geometry: &Simplex<D>, _step_length: f64, _matrix: &mut CellMatrix<D>) {}
+
+    /// Adds its explicit stress or force, from the converged state, to the batch; may write its trial history.
+    fn add_explicit(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
+
+    /// Adds its energies after the step was committed.
+    fn add_energy(&self, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
+
+    /// Adds its part of the total stress after the step was committed.
+    fn add_stress(&self, _step: Step, _batch: &mut Batch<D, S>) {}
+
+    /// Makes the trial history the converged one.
+    fn commit(&mut self) {}
+
+    /// The converged history, if it keeps one: name and `width` values a cell.
+    fn history(&self) -> Option<History<'_>> {
+        None
+    }
+
+    /// Takes a saved history over, laid out as [`Effect::history`] gives it.
+    fn restore(&mut self, _values: &[f64]) {}
+}
+
+/// Values that an effect keeps for every cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct History<'a> {
+    /// Name in checkpoints and field files.
+    pub name: &'static str,
+    /// Values a cell.
+    pub width: usize,
+    /// `width` values for each cell of this rank.
+    pub values: &'a [f64],
+}

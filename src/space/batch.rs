@@ -1,0 +1,165 @@
+//! Passes over cells in batches that stay in cache: gather nodal values, let the effects work, scatter forces.
+
+use super::{Geometry, Simplex};
+use crate::{
+    mesh::Mesh,
+    tensor::{Mandel, Vector, component, symmetric_part},
+};
+
+/// Cells of a batch.
+pub const BATCH: usize = 128;
+
+/// What a pass gathers for its effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Needs {
+    /// Strain of the displacement.
+    pub strain: bool,
+    /// Strain of the velocity.
+    pub strain_rate: bool,
+    /// Velocity at the cell's nodes.
+    pub velocity: bool,
+    /// Change of the velocity over the last step at the cell's nodes.
+    pub velocity_change: bool,
+}
+
+impl Needs {
+    /// What either needs.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            strain: self.strain || other.strain,
+            strain_rate: self.strain_rate || other.strain_rate,
+            velocity: self.velocity || other.velocity,
+            velocity_change: self.velocity_change || other.velocity_change,
+        }
+    }
+}
+
+/// Nodal values with ghosts, `D` a node.
+#[derive(Debug, Clone, Copy)]
+pub struct Nodal<'a> {
+    /// Displacement in m.
+    pub displacement: &'a [f64],
+    /// Velocity in m/s.
+    pub velocity: &'a [f64],
+    /// Velocity before the last step in m/s.
+    pub previous_velocity: &'a [f64],
+}
+
+/// A run of cells with their gathered inputs and the outputs that effects add to.
+#[derive(Debug)]
+pub struct Batch<'g, const D: usize, const S: usize> {
+    /// Local number of the first cell.
+    pub first: usize,
+    /// Geometry of the cells of the batch.
+    pub cells: &'g [Simplex<D>],
+    /// Strain of the displacement, one a cell, if needed.
+    pub strain: Vec<Mandel<S>>,
+    /// Strain of the velocity in 1/s, one a cell, if needed.
+    pub strain_rate: Vec<Mandel<S>>,
+    /// Velocity, `D + 1` nodes a cell, if needed.
+    pub velocity: Vec<Vector<D>>,
+    /// Change of the velocity over the last step, `D + 1` nodes a cell, if needed.
+    pub velocity_change: Vec<Vector<D>>,
+    /// Output: stress in Pa, one a cell.
+    pub stress: Vec<Mandel<S>>,
+    /// Output: force in N on the cell's nodes, `D + 1` a cell.
+    pub force: Vec<Vector<D>>,
+}
+
+impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
+    /// Visits all cells of the mesh in batches with the outputs zero; `visit` may read them afterwards.
+    pub fn for_all(
+        mesh: &Mesh<D>,
+        geometry: &'g Geometry<D>,
+        nodal: Nodal<'_>,
+        needs: Needs,
+        mut visit: impl FnMut(&mut Self),
+    ) {
+        let mut batch = Self {
+            first: 0,
+            cells: &[],
+            strain: vec![[0.0; S]; if needs.strain { BATCH } else { 0 }],
+            strain_rate: vec![[0.0; S]; if needs.strain_rate { BATCH } else { 0 }],
+            velocity: vec![[0.0; D]; if needs.velocity { BATCH * (D + 1) } else { 0 }],
+            velocity_change: vec![[0.0; D]; if needs.velocity_change { BATCH * (D + 1) } else { 0 }],
+            stress: vec![[0.0; S]; BATCH],
+            force: vec![[0.0; D]; BATCH * (D + 1)],
+        };
+        for (number, cells) in geometry.cells.chunks(BATCH).enumerate() {
+            batch.first = number * BATCH;
+            batch.cells = cells;
+            batch.stress.fill([0.0; S]);
+            batch.force.fill([0.0; D]);
+            batch.gather(mesh, nodal, needs);
+            visit(&mut batch);
+        }
+    }
+
+    fn gather(&mut self, mesh: &Mesh<D>, nodal: Nodal<'_>, needs: Needs) {
+        let nodes = &mesh.cells[self.first * (D + 1)..(self.first + self.cells.len()) * (D + 1)];
+        for (at, (cell, nodes)) in self.cells.iter().zip(nodes.chunks_exact(D + 1)).enumerate() {
+            if needs.strain {
+                let values = values_at::<D>(nodal.displacement, nodes);
+                self.strain[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
+            }
+            if !(needs.strain_rate || needs.velocity || needs.velocity_change) {
+                continue;
+            }
+            let values = values_at::<D>(nodal.velocity, nodes);
+            if needs.strain_rate {
+                self.strain_rate[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
+            }
+            if needs.velocity {
+                self.velocity[at * (D + 1)..][..=D].copy_from_slice(&values[..=D]);
+            }
+            if needs.velocity_change {
+                let before = values_at::<D>(nodal.previous_velocity, nodes);
+                for a in 0..=D {
+                    self.velocity_change[at * (D + 1) + a] = std::array::from_fn(|i| values[a][i] - before[a][i]);
+                }
+            }
+        }
+    }
+
+    /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts).
+    pub fn scatter(&self, mesh: &Mesh<D>, forces: &mut [f64]) {
+        let nodes = &mesh.cells[self.first * (D + 1)..(self.first + self.cells.len()) * (D + 1)];
+        for (at, (cell, nodes)) in self.cells.iter().zip(nodes.chunks_exact(D + 1)).enumerate() {
+            let mut matrix = [[0.0; D]; D];
+            for c in 0..S {
+                let (i, j, factor) = component::<S>(c);
+                if i < D && j < D {
+                    matrix[i][j] = self.stress[at][c] / factor;
+                    matrix[j][i] = matrix[i][j];
+                }
+            }
+            let mut first = [0.0; D];
+            for a in 1..=D {
+                let gradient = &cell.gradients[a - 1];
+                let target = &mut forces[nodes[a] as usize * D..][..D];
+                for i in 0..D {
+                    let mut inner = 0.0;
+                    for j in 0..D {
+                        inner += matrix[i][j] * gradient[j];
+                    }
+                    inner *= cell.volume;
+                    first[i] += inner;
+                    target[i] += self.force[at * (D + 1) + a][i] - inner;
+                }
+            }
+            let target = &mut forces[nodes[0] as usize * D..][..D];
+            for i in 0..D {
+                target[i] += self.force[at * (D + 1)][i] + first[i];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn values_at<const D: usize>(nodal: &[f64], nodes: &[u32]) -> [Vector<D>; 4] {
+    let mut out = [[0.0; D]; 4];
+    for a in 0..=D {
+        out[a].copy_from_slice(&nodal[nodes[a] as usize * D..][..D]);
+    }
+    out
+}

@@ -1,0 +1,46 @@
+//! The converged state of a run: nodal fields and time. Cell histories live with their effects.
+
+use crate::{error::Result, mesh::Mesh, petsc::DistributedVector};
+
+/// Nodal fields, `D` values a node, with ghosts up to date.
+#[derive(Debug)]
+pub struct State {
+    /// Displacement in m.
+    pub displacement: DistributedVector,
+    /// Velocity in m/s.
+    pub velocity: DistributedVector,
+    /// Velocity before the last step in m/s.
+    pub previous_velocity: DistributedVector,
+    /// Time in s.
+    pub time: f64,
+    /// Steps taken.
+    pub step: u64,
+    /// Length of the last step in s; 0 before the first.
+    pub step_length: f64,
+}
+
+impl State {
+    /// At rest, undeformed, at time 0. Collective.
+    pub fn at_rest<const D: usize>(mesh: &Mesh<D>) -> Result<Self> {
+        let displacement = DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts)?;
+        let velocity = displacement.like()?;
+        let previous_velocity = displacement.like()?;
+        Ok(Self { displacement, velocity, previous_velocity, time: 0.0, step: 0, step_length: 0.0 })
+    }
+
+    /// Takes the velocity of a solved step over and moves the body with it: `u_n = u_{n-1} + k v_n`. Collective.
+    pub fn commit(&mut self, solved: &DistributedVector, time: f64, step_length: f64) -> Result<()> {
+        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
+        self.velocity.copy_from(solved)?;
+        self.velocity.update_ghosts()?;
+        {
+            let velocity = self.velocity.local()?;
+            let mut displacement = self.displacement.local_mut()?;
+            displacement.iter_mut().zip(velocity.iter()).for_each(|(u, v)| *u += step_length * v);
+        }
+        self.time = time;
+        self.step += 1;
+        self.step_length = step_length;
+        Ok(())
+    }
+}

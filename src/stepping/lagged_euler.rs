@@ -1,0 +1,312 @@
+//! The scheme of Wang and Cheng (2022), (24)-(25): backward difference for inertia, implicit viscosity and contact,
+//! elastic and viscoplastic stress from the step before.
+//!
+//! ```text
+//! H_n = H_{n-1} + k G(s_{n-1}),   s_n = E e(u_{n-1}) + H_n
+//! (1/k) M (v_n - v_{n-1}) + A v_n + C(v_n) + B^T s_n = f_n
+//! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
+//! ```
+
+use super::{
+    equations::ContactEquations,
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
+};
+use crate::{
+    body::Body,
+    effect::{Energy, Step},
+    error::{Error, Result},
+    petsc::{DistributedVector, Ksp, Matrix, Snes},
+    session::Session,
+    state::State,
+};
+use std::time::{Duration, Instant};
+
+/// Linear solves stop at this share of what the step needs.
+const LINEAR_SHARE: f64 = 0.3;
+/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
+const LINEAR_REDUCTION: f64 = 1e-3;
+
+/// What a step cost and how well it was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepOutcome {
+    /// Newton iterations; 0 where a step is linear.
+    pub newton_iterations: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Contact points that changed their branch, over all ranks.
+    pub active_changes: usize,
+    /// Largest scaled distance to the contact graphs.
+    pub inclusion_residual: f64,
+    /// Energies of the step, over all ranks.
+    pub energy: Energy,
+}
+
+/// Seconds spent by phase.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepClock {
+    /// Explicit stress, history and forces.
+    pub history: Duration,
+    /// Newton and linear solves.
+    pub solve: Duration,
+    /// Energy balance and certificates of the step.
+    pub balance: Duration,
+    /// Matrix assembly and preconditioner, whenever the step length changes.
+    pub assembly: Duration,
+}
+
+/// The solver of a linear or of a nonlinear step: only the one that is needed exists.
+enum Solver {
+    Linear(Ksp),
+    Newton { snes: Snes, scratch: Option<[DistributedVector; 2]>, before: Vec<u8>, after: Vec<u8> },
+}
+
+/// The scheme with its matrix, solver and work vectors.
+pub struct LaggedEuler {
+    settings: SolverSettings,
+    matrix: Option<(f64, Matrix)>,
+    solver: Solver,
+    load: Option<DistributedVector>,
+    load_is_current: bool,
+    right_hand_side: DistributedVector,
+    trial: DistributedVector,
+    /// Seconds by phase.
+    pub clock: StepClock,
+}
+
+impl LaggedEuler {
+    /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        body: &Body<D, S>,
+        state: &State,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        let unknowns = body.mesh.total_nodes * D;
+        let preconditioner = settings.preconditioner.resolve(D, unknowns);
+        let solver = if body.contacts.is_empty() {
+            let mut ksp = Ksp::new("")?;
+            prepare(&mut ksp, preconditioner)?;
+            ksp.start_from_solution()?;
+            ksp.apply_options()?;
+            Solver::Linear(ksp)
+        } else {
+            let mut snes = Snes::new("", &state.velocity, D)?;
+            prepare(&mut snes.linear_solver()?, preconditioner)?;
+            snes.apply_options()?;
+            let scratch = if body.contacts.iter().any(|c| c.needs_ghosts()) {
+                Some([state.velocity.like()?, state.velocity.like()?])
+            } else {
+                None
+            };
+            Solver::Newton { snes, scratch, before: Vec::new(), after: Vec::new() }
+        };
+        Ok(Self {
+            settings: SolverSettings { preconditioner, ..settings },
+            matrix: None,
+            solver,
+            load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
+            load_is_current: false,
+            right_hand_side: state.velocity.like()?,
+            trial: state.velocity.like()?,
+            clock: StepClock::default(),
+        })
+    }
+
+    /// The preconditioner in use.
+    pub fn preconditioner(&self) -> Preconditioner {
+        self.settings.preconditioner
+    }
+
+    /// Assembles the matrix for steps of this length, if the last one was of another. Collective.
+    pub fn prepare_length<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        length: f64,
+    ) -> Result<()> {
+        if self.matrix.as_ref().is_some_and(|(known, _)| *known == length) {
+            return Ok(());
+        }
+        let start = Instant::now();
+        self.matrix = None;
+        let rows = session.agree(body.matrix(session, length))?;
+        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        drop(rows);
+        if self.settings.preconditioner == Preconditioner::Gamg {
+            let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
+            matrix.attach_rigid_motions(D, coordinates)?;
+        }
+        let ksp = match &mut self.solver {
+            Solver::Linear(ksp) => ksp,
+            Solver::Newton { snes, .. } => &mut snes.linear_solver()?,
+        };
+        ksp.set_matrix(&matrix)?;
+        session.agree(ksp.set_up())?;
+        self.matrix = Some((length, matrix));
+        self.clock.assembly += start.elapsed();
+        Ok(())
+    }
+
+    /// Takes a step and commits it; on failure the state stays as it was. Collective.
+    pub fn advance<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        self.prepare_length(session, body, step.length)?;
+        let start = Instant::now();
+        let explicit = self.write_right_hand_side(session, body, state, step)?;
+        self.extrapolate(state, step)?;
+        let solving = Instant::now();
+        self.clock.history += solving - start;
+        let mut outcome = self.solve(session, body, state, step)?;
+        state.commit(&self.trial, step.time, step.length)?;
+        body.commit();
+        let balancing = Instant::now();
+        self.clock.solve += balancing - solving;
+        let mut energy = body.energy(state, step)?;
+        energy += explicit;
+        {
+            let velocity = state.velocity.local()?;
+            for contact in &body.contacts {
+                energy.contact += step.length * contact.dissipation(&velocity);
+            }
+        }
+        outcome.energy = Energy::from_array(session.sum(energy.to_array()));
+        if let Some(load) = &self.load {
+            outcome.energy.work = step.length * load.dot(&state.velocity)?;
+        }
+        self.clock.balance += balancing.elapsed();
+        Ok(outcome)
+    }
+
+    /// `b = f_n + M v_{n-1} / k - B^T s_n`, zero at held components.
+    fn write_right_hand_side<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<Energy> {
+        if let Some(load) = &mut self.load {
+            if !self.load_is_current {
+                session.agree(body.write_loads(step.time, load))?;
+                self.load_is_current = body.load.is_steady();
+            }
+        }
+        let energy = {
+            let mut forces = self.right_hand_side.local_mut()?;
+            forces.fill(0.0);
+            body.add_explicit_forces(state, step, &mut forces)?
+        };
+        self.right_hand_side.add_ghosts_to_owners()?;
+        if let Some(load) = &self.load {
+            self.right_hand_side.add_scaled(1.0, load)?;
+        }
+        let mut values = self.right_hand_side.owned_mut()?;
+        values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+        Ok(energy)
+    }
+
+    /// Starts from the velocity extrapolated linearly in time.
+    fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
+        self.trial.copy_from(&state.velocity)?;
+        if step.previous_length > 0.0 && state.step > 1 {
+            let ratio = step.length / step.previous_length;
+            self.trial.add_scaled(ratio, &state.velocity)?;
+            self.trial.add_scaled(-ratio, &state.previous_velocity)?;
+        }
+        Ok(())
+    }
+
+    fn solve<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        let norm = self.right_hand_side.norm()?;
+        if !norm.is_finite() {
+            return Err(failed(step, "the forces are not finite", "check loads and initial values; use smaller steps"));
+        }
+        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE);
+        let Some((_, matrix)) = &self.matrix else {
+            return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
+        };
+        match &mut self.solver {
+            Solver::Linear(ksp) => {
+                ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
+                let outcome = session.agree(ksp.solve(&self.right_hand_side, &mut self.trial))?;
+                if !outcome.converged() {
+                    return Err(failed(step, outcome.words(), REMEDY));
+                }
+                Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
+            }
+            Solver::Newton { snes, scratch, before, after } => {
+                branches(body, &state.velocity, before)?;
+                snes.linear_solver()?.set_tolerances(
+                    LINEAR_REDUCTION,
+                    LINEAR_SHARE * tolerance,
+                    LINEAR_ITERATIONS,
+                )?;
+                let mut equations = ContactEquations {
+                    matrix,
+                    contacts: &mut body.contacts,
+                    right_hand_side: &self.right_hand_side,
+                    ghosted: scratch.as_mut(),
+                    residuals: 0,
+                };
+                let solved = snes.solve(
+                    &mut equations,
+                    matrix,
+                    &mut self.trial,
+                    tolerance,
+                    self.settings.newton_iterations,
+                );
+                let outcome = session.agree(solved)?;
+                if !outcome.converged() {
+                    return Err(failed(step, outcome.words(), REMEDY));
+                }
+                self.trial.update_ghosts()?;
+                branches(body, &self.trial, after)?;
+                let changes = before.iter().zip(after.iter()).filter(|(a, b)| a != b).count();
+                let inclusion = {
+                    let (velocity, residual) = (self.trial.local()?, snes.residual().owned()?);
+                    let each = body.contacts.iter().map(|c| c.inclusion_residual(&velocity, &residual));
+                    each.fold(0.0, f64::max)
+                };
+                Ok(StepOutcome {
+                    newton_iterations: outcome.iterations,
+                    linear_iterations: outcome.linear_iterations,
+                    active_changes: session.total(changes),
+                    inclusion_residual: session.largest([inclusion])[0],
+                    energy: Energy::default(),
+                })
+            }
+        }
+    }
+}
+
+const REMEDY: &str = "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
+
+fn failed(step: Step, what: &str, remedy: &str) -> Error {
+    Error::Failed(format!("step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}", step.time, step.length))
+}
+
+fn prepare(ksp: &mut Ksp, preconditioner: Preconditioner) -> Result<()> {
+    preconditioner.configure(ksp)
+}
+
+/// Branches of all contact points at owned or ghost velocities.
+fn branches<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    velocity: &DistributedVector,
+    out: &mut Vec<u8>,
+) -> Result<()> {
+    let velocity = velocity.local()?;
+    out.clear();
+    body.contacts.iter().for_each(|contact| contact.branches(&velocity, out));
+    Ok(())
+}

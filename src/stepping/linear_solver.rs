@@ -1,0 +1,83 @@
+//! Which Krylov method and preconditioner solve with the constant matrix.
+
+use crate::{
+    error::Result,
+    petsc::{Ksp, set_default_option},
+};
+
+/// The preconditioner a job asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preconditioner {
+    /// Chosen by size.
+    Auto,
+    /// Cholesky factorisation by MUMPS.
+    Cholesky,
+    /// PETSc's smoothed aggregation multigrid with the rigid motions.
+    Gamg,
+    /// hypre's BoomerAMG.
+    Boomeramg,
+}
+
+/// How the equations of a step are solved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolverSettings {
+    /// Residual norm relative to the norm of the right-hand side.
+    pub tolerance: f64,
+    /// The preconditioner.
+    pub preconditioner: Preconditioner,
+    /// Newton iterations after which a step has failed.
+    pub newton_iterations: usize,
+}
+
+/// Most unknowns for which a factorisation is faster than multigrid, by dimension.
+const DIRECT_2D: usize = 20_000;
+const DIRECT_3D: usize = 6_000;
+/// Krylov iterations after which a linear solve has failed.
+pub(super) const LINEAR_ITERATIONS: usize = 2_000;
+
+impl Preconditioner {
+    /// Replaces `Auto` by the choice for this many unknowns in this many dimensions.
+    pub fn resolve(self, dimension: usize, unknowns: usize) -> Self {
+        let direct = if dimension == 2 { DIRECT_2D } else { DIRECT_3D };
+        match self {
+            Self::Auto if unknowns <= direct => Self::Cholesky,
+            Self::Auto => Self::Gamg,
+            chosen => chosen,
+        }
+    }
+
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Cholesky => "cholesky",
+            Self::Gamg => "gamg",
+            Self::Boomeramg => "boomeramg",
+        }
+    }
+
+    /// Sets the method and the preconditioner; PETSc options that the user gave stay.
+    pub(super) fn configure(self, ksp: &mut Ksp) -> Result<()> {
+        ksp.set_method("cg")?;
+        match self {
+            Self::Auto | Self::Cholesky => ksp.set_preconditioner("cholesky", Some("mumps")),
+            Self::Gamg => {
+                ksp.set_preconditioner("gamg", None)?;
+                set_default_option("pc_gamg_threshold", "0.01")?;
+                set_default_option("pc_gamg_agg_nsmooths", "1")?;
+                set_default_option("mg_levels_ksp_type", "chebyshev")?;
+                set_default_option("mg_levels_ksp_max_it", "2")?;
+                set_default_option("mg_levels_pc_type", "jacobi")
+            }
+            Self::Boomeramg => {
+                ksp.set_preconditioner("hypre", None)?;
+                set_default_option("pc_hypre_type", "boomeramg")?;
+                set_default_option("pc_hypre_boomeramg_strong_threshold", "0.5")?;
+                set_default_option("pc_hypre_boomeramg_coarsen_type", "HMIS")?;
+                set_default_option("pc_hypre_boomeramg_interp_type", "ext+i")?;
+                set_default_option("pc_hypre_boomeramg_P_max", "4")?;
+                set_default_option("pc_hypre_boomeramg_relax_type_all", "Chebyshev")
+            }
+        }
+    }
+}

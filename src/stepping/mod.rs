@@ -1,0 +1,8 @@
+//! Steps in time: the equations of a step, their solution, and the schemes.
+
+mod equations;
+mod lagged_euler;
+mod linear_solver;
+
+pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
+pub use linear_solver::{Preconditioner, SolverSettings};
