@@ -1,8 +1,26 @@
 //! The job: a TOML document that says everything about a run.
+//!
+//! A document is parsed with the place of every key ([`source`]), changed by overrides ([`set`]), held against
+//! the schema of the structs ([`validate`]), against itself ([`semantic`]) and against what is built
+//! ([`available`]). All faults come in one report ([`report`]); only a document without any becomes a [`Job`].
 
+mod available;
+mod describe;
 mod document;
+mod effective;
 mod expression;
+mod load;
 mod nearest;
+mod report;
+mod schema;
+mod semantic;
+mod set;
+mod source;
+mod validate;
 
+pub use describe::{describe, describe_json};
 pub use document::*;
-pub use expression::{Expression, Scalar, Variable};
+pub use effective::differing_keys;
+pub use expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
+pub use load::Loaded;
+pub use semantic::MeshNames;

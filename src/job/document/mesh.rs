@@ -16,8 +16,7 @@ pub enum Mesh {
     Box(Cuboid),
     /// A Gmsh 4.1 file (ASCII or binary), relative to the job file; its physical groups name boundaries and
     /// regions.
-    #[schemars(extend("format" = "path"), example = "../../meshes/block.msh")]
-    File(PathBuf),
+    File(#[schemars(extend("format" = "path"), example = "../../meshes/block.msh")] PathBuf),
 }
 
 /// A rectangle with its low corner at the origin, cut into triangles.

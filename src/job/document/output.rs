@@ -30,11 +30,9 @@ pub struct Output {
 #[serde(rename_all = "snake_case")]
 pub enum Every {
     /// After this many steps.
-    #[schemars(extend("unit" = "steps"))]
-    Every(#[schemars(range(min = 1))] u64),
+    Every(#[schemars(range(min = 1), extend("unit" = "steps"), example = 8)] u64),
     /// After this much simulated time.
-    #[schemars(extend("unit" = "s"))]
-    Interval(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    Interval(#[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.1)] f64),
 }
 
 /// A point of the body that is followed in every step.

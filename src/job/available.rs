@@ -1,0 +1,54 @@
+//! What a job can say but the solver can't do yet. A feature that is built deletes its line here.
+
+use super::report::Fault;
+use super::source::{Node, Value};
+
+/// Path (`*` is any position in a list), the word that is not available (or any), and what it is called.
+const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
+    ("region.*", None, "a region with its own material is"),
+    ("contact.*.normal.compliance", None, "normal compliance is"),
+    ("contact.*.normal.unilateral", None, "unilateral contact is"),
+    ("contact.*.friction.tresca", None, "Tresca friction is"),
+    ("contact.*.friction.coulomb", None, "Coulomb friction is"),
+    ("contact.*.friction.slip_weakening", None, "slip weakening friction is"),
+    ("time.scheme", Some("implicit_euler"), "the scheme \"implicit_euler\" is"),
+    ("time.scheme", Some("bdf2"), "the scheme \"bdf2\" is"),
+    ("time.adaptive", None, "adaptive time stepping is"),
+];
+
+/// A fault for everything in the document that is not available yet.
+pub fn faults(root: &Node) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (path, word, what) in UNAVAILABLE {
+        let parts: Vec<&str> = path.split('.').collect();
+        for node in matching(root, &parts) {
+            let text = if let Value::Text(text) = &node.value { Some(text.as_str()) } else { None };
+            if word.is_none() || *word == text {
+                let place = if word.is_none() { &node.key } else { &node.at };
+                let message = format!("{what} not available yet");
+                faults.push(Fault::new(place.clone(), message, "not available yet"));
+            }
+        }
+    }
+    for graph in matching(root, &["contact", "*", "normal", "graph"]) {
+        let points: Vec<[f64; 2]> = graph.read("points").unwrap_or_default();
+        for index in 1..points.len() {
+            if points[index - 1][0] == points[index][0] && points[index - 1][1] < points[index][1] {
+                let place = graph.deepest(&format!("points.{index}")).at.clone();
+                let message = "a jump in a contact graph is not available yet";
+                faults.push(Fault::new(place, message, "not available yet"));
+            }
+        }
+    }
+    faults
+}
+
+fn matching<'a>(node: &'a Node, parts: &[&str]) -> Vec<&'a Node> {
+    match (parts, &node.value) {
+        ([], _) => vec![node],
+        (["*", rest @ ..], Value::Array(items)) => {
+            items.iter().flat_map(|item| matching(item, rest)).collect()
+        }
+        ([part, rest @ ..], _) => node.child(part).map(|child| matching(child, rest)).unwrap_or_default(),
+    }
+}

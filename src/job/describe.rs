@@ -1,0 +1,240 @@
+//! The reference of every key, from the structs.
+
+use serde_json::Value;
+
+use super::nearest::nearest;
+use super::schema::{Schema, resolve, schema};
+use crate::error::{Error, Result};
+
+const WIDTH: usize = 100;
+
+/// A table of the job and its keys.
+struct Table {
+    /// Keys joined by dots.
+    path: String,
+    /// Written with two brackets, any number of times.
+    several: bool,
+    /// Each key's own text: its name and its lines.
+    keys: Vec<(&'static str, String)>,
+    meaning: String,
+}
+
+/// Every key of the tables at or below `table` (of all if `None`): meaning, unit, range, default, example.
+pub fn describe(table: Option<&str>) -> Result<String> {
+    let all = tables();
+    let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
+    let shown: Vec<&Table> = all
+        .iter()
+        .filter(|table| {
+            wanted.is_empty()
+                || table
+                    .path
+                    .strip_prefix(wanted)
+                    .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
+        .collect();
+    if shown.is_empty() {
+        return Err(unknown_table(wanted, &all));
+    }
+    Ok(shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
+}
+
+/// The JSON Schema (draft 2020-12) of a job.
+pub fn describe_json() -> String {
+    format!("{:#}", schema())
+}
+
+fn unknown_table(wanted: &str, all: &[Table]) -> Error {
+    let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => match tables_with(wanted) {
+            Some(elsewhere) => format!("it is a key of {elsewhere}"),
+            None => {
+                let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
+                format!("tables: {}", names.join(", "))
+            }
+        },
+    };
+    Error::Refused(format!("no table of a job is called `{wanted}`; {help}"))
+}
+
+/// The tables that have a key of this name, as text.
+pub fn tables_with(key: &str) -> Option<String> {
+    let found: Vec<String> = tables()
+        .iter()
+        .filter(|table| table.keys.iter().any(|(name, _)| *name == key))
+        .map(|table| format!("[{}]", table.path))
+        .collect();
+    (!found.is_empty()).then(|| found.join(", "))
+}
+
+fn tables() -> Vec<Table> {
+    let mut all = Vec::new();
+    for (key, property) in resolve(schema()).properties() {
+        collect(key, property, &mut all);
+    }
+    all
+}
+
+fn collect(path: &str, schema: Schema, all: &mut Vec<Table>) {
+    let several = schema.accepts("array");
+    let body = if several { schema.items().unwrap_or(schema) } else { schema };
+    let mut meaning = flat(schema.text("description").unwrap_or_default());
+    let tagged = body.tagged();
+    let at = all.len();
+    let mut keys = Vec::new();
+    let properties: Vec<(&'static str, Schema, bool)> = if body.alternatives().is_empty() {
+        let required: Vec<&str> = body.required().collect();
+        body.properties()
+            .map(|(key, inner)| (key.as_str(), inner, required.contains(&key.as_str())))
+            .collect()
+    } else {
+        let names: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
+        meaning.push_str(&format!(" Exactly one of: {}.", names.join(", ")));
+        tagged.iter().filter_map(|(name, branch)| Some((*name, branch.property(name)?, false))).collect()
+    };
+    for (key, inner, required) in properties {
+        let branch = tagged.iter().find(|(name, _)| *name == key).map(|(_, branch)| *branch);
+        if inner.accepts("object") && inner.get("additionalProperties").is_boolean()
+            || is_tables(inner)
+            || !inner.tagged().is_empty()
+        {
+            collect(&format!("{path}.{key}"), inner, all);
+        } else {
+            keys.push((key, key_text(key, inner, branch, required)));
+        }
+    }
+    if let Some(free) = body.items().filter(|items| items.accepts("object")) {
+        for (key, inner) in free.properties() {
+            let required = free.required().any(|name| name == key);
+            keys.push((key, key_text(key, inner, None, required)));
+        }
+        meaning.push_str(&format!(" Each: [{path}.\"name\"] or \"name\" = {{ .. }}."));
+    }
+    all.insert(at, Table { path: path.to_owned(), several, keys, meaning });
+}
+
+fn is_tables(schema: Schema) -> bool {
+    schema.accepts("array") && schema.items().is_some_and(|items| items.accepts("object"))
+}
+
+impl Table {
+    fn text(&self) -> String {
+        let name = if self.several { format!("[[{}]]", self.path) } else { format!("[{}]", self.path) };
+        let mut text = format!("{name}\n{}", wrapped(&self.meaning, 2));
+        for (_, key) in &self.keys {
+            text.push_str(key);
+        }
+        text
+    }
+}
+
+fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
+    let mut facts = vec![kind(schema)];
+    let range = range(schema.items().filter(|_| schema.accepts("array")).unwrap_or(schema));
+    if range != "any number" {
+        facts.push(range);
+    }
+    facts.extend(schema.text("unit").map(|unit| format!("unit {unit}")));
+    match schema.get("default") {
+        Value::Null if required => facts.push("required".into()),
+        Value::Null => {}
+        default => facts.push(format!("default {}", toml(default))),
+    }
+    let mut text = format!("\n  {key}: {}\n", facts.join("; "));
+    let meaning = schema.text("description").or(branch.and_then(|branch| branch.text("description")));
+    text.push_str(&wrapped(&flat(meaning.unwrap_or_default()), 6));
+    for choice in schema.alternatives() {
+        if let (Some(word), Some(meaning)) = (choice.text("const"), choice.text("description")) {
+            text.push_str(&wrapped(&format!("\"{word}\": {}", flat(meaning)), 8));
+        }
+    }
+    for example in schema.get("examples").as_array().into_iter().flatten() {
+        text.push_str(&format!("      example: {key} = {}\n", toml(example)));
+    }
+    text
+}
+
+/// What may stand here, in words.
+pub fn kind(schema: Schema) -> String {
+    let alternatives = schema.alternatives();
+    if !alternatives.is_empty() {
+        let mut kinds: Vec<String> = schema.words().iter().map(|word| format!("\"{word}\"")).collect();
+        let tables: Vec<&str> = schema.tagged().iter().map(|(name, _)| *name).collect();
+        if !tables.is_empty() {
+            kinds.push(format!("a table with one of {}", tables.join(", ")));
+        }
+        kinds.extend(alternatives.iter().filter(|one| one.accepts("array")).map(|one| kind(*one)));
+        return kinds.join(" or ");
+    }
+    if schema.text("format") == Some("expression") {
+        return "a number or an expression in t, x, y, z".into();
+    }
+    if schema.accepts("array") {
+        let count = match (schema.number("minItems"), schema.number("maxItems")) {
+            (Some(least), Some(most)) if least == most => format!("{least} "),
+            _ => String::new(),
+        };
+        let item = schema.items().map(kind).unwrap_or_default();
+        return format!("a list of {count}items, each {item}");
+    }
+    let plain = [
+        ("object", "a table"),
+        ("integer", "a whole number"),
+        ("number", "a number"),
+        ("string", "a string"),
+        ("boolean", "true or false"),
+    ];
+    plain.iter().find(|(name, _)| schema.accepts(name)).map_or("a value", |(_, words)| words).into()
+}
+
+/// The range of a number, in words.
+pub fn range(schema: Schema) -> String {
+    let bounds = [
+        ("above", schema.number("exclusiveMinimum")),
+        ("at least", schema.number("minimum")),
+        ("below", schema.number("exclusiveMaximum")),
+        ("at most", schema.number("maximum")),
+    ];
+    let words: Vec<String> =
+        bounds.iter().filter_map(|(word, bound)| bound.map(|bound| format!("{word} {bound}"))).collect();
+    if words.is_empty() { "any number".into() } else { words.join(" and ") }
+}
+
+/// A JSON value as TOML spells it.
+pub fn toml(value: &Value) -> String {
+    match value {
+        Value::Object(object) if object.is_empty() => "{}".into(),
+        Value::Object(object) => {
+            let pairs: Vec<String> =
+                object.iter().map(|(key, value)| format!("{key} = {}", toml(value))).collect();
+            format!("{{ {} }}", pairs.join(", "))
+        }
+        Value::Array(items) => format!("[{}]", items.iter().map(toml).collect::<Vec<_>>().join(", ")),
+        other => other.to_string(),
+    }
+}
+
+fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The text in lines of at most WIDTH characters, each after `indent` blanks.
+fn wrapped(text: &str, indent: usize) -> String {
+    let mut out = String::new();
+    let mut line = String::new();
+    for word in text.split_whitespace() {
+        if !line.is_empty() && indent + line.chars().count() + 1 + word.chars().count() > WIDTH {
+            out.push_str(&format!("{:indent$}{line}\n", ""));
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    if !line.is_empty() {
+        out.push_str(&format!("{:indent$}{line}\n", ""));
+    }
+    out
+}

@@ -1,0 +1,96 @@
+//! The job as it was run: every default spelled out, and what of it changes the answer.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::{Job, Mesh};
+use crate::error::{Error, Result};
+
+/// Keys that don't change the answer, and all below them. The mesh counts by its file's name: its content is
+/// compared by whoever read it.
+const NO_PHYSICS: &[&str] = &[
+    "about",
+    "check",
+    "checkpoint",
+    "output",
+    "solver.accept",
+    "solver.max_newton_iterations",
+    "solver.petsc",
+    "solver.preconditioner",
+    "time.end",
+];
+
+impl Job {
+    /// 2 or 3; `None` for a mesh file, which has to be read first.
+    pub fn dimension(&self) -> Option<usize> {
+        match self.mesh {
+            Mesh::Rectangle(_) => Some(2),
+            Mesh::Box(_) => Some(3),
+            Mesh::File(_) => None,
+        }
+    }
+
+    /// The mesh's file, if it has one.
+    pub fn mesh_file(&self) -> Option<&Path> {
+        match &self.mesh {
+            Mesh::File(path) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Where the run leaves its files.
+    pub fn output_folder(&self) -> &Path {
+        self.output.folder.as_deref().unwrap_or(Path::new("out"))
+    }
+
+    /// The effective job: every default spelled out. Loaded from a file in the output folder it equals this job.
+    pub fn to_toml(&self) -> Result<String> {
+        let mut job = self.clone();
+        job.output.folder = Some(PathBuf::from("."));
+        toml::to_string(&job).map_err(|error| Error::Internal(format!("the job can't be written: {error}")))
+    }
+
+    /// Everything that changes the answer: keys joined by dots, and their values as TOML.
+    pub fn physics(&self) -> Result<BTreeMap<String, String>> {
+        let mut job = self.clone();
+        if let Mesh::File(path) = &mut job.mesh {
+            *path = path.file_name().map(PathBuf::from).unwrap_or_default();
+        }
+        job.output.folder = None;
+        let value = toml::Value::try_from(&job)
+            .map_err(|error| Error::Internal(format!("the job can't be written: {error}")))?;
+        let mut keys = BTreeMap::new();
+        flatten("", &value, &mut keys);
+        Ok(keys)
+    }
+}
+
+fn flatten(path: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
+    if NO_PHYSICS.contains(&path) {
+        return;
+    }
+    let inner = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match value {
+        toml::Value::Table(table) => {
+            table.iter().for_each(|(key, value)| flatten(&inner(key), value, keys));
+        }
+        toml::Value::Array(items) if items.iter().any(toml::Value::is_table) => {
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(index, item)| flatten(&inner(&index.to_string()), item, keys));
+        }
+        plain => {
+            keys.insert(path.to_owned(), plain.to_string());
+        }
+    }
+}
+
+/// Keys that differ, or that only one of the two has.
+pub fn differing_keys(one: &BTreeMap<String, String>, other: &BTreeMap<String, String>) -> Vec<String> {
+    let mut keys: Vec<String> =
+        one.keys().chain(other.keys()).filter(|key| one.get(*key) != other.get(*key)).cloned().collect();
+    keys.sort();
+    keys.dedup();
+    keys
+}

@@ -1,0 +1,132 @@
+//! From a file or a text to a job without faults.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::report::{Fault, Texts};
+use super::semantic::{self, MeshNames};
+use super::source::{Node, Place, parse};
+use super::{Job, Mesh, available, set, validate};
+use crate::error::{Error, Result};
+
+/// Longest job file in bytes.
+const LARGEST: usize = 1 << 20;
+
+/// A job without faults, with the places of its keys for faults that only the mesh shows.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The job, all defaults filled, all paths absolute.
+    pub job: Job,
+    /// What the user should know before the run.
+    pub warnings: Vec<String>,
+    root: Node,
+    texts: Texts,
+}
+
+impl Job {
+    /// The job in the file `path` with `overrides` (`a.b.c=value`) written over it.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded> {
+        Self::load_coloured(path, overrides, false)
+    }
+
+    /// As [`Job::load`]; faults are rendered for a terminal with colours if `colour`.
+    pub fn load_coloured(path: &Path, overrides: &[String], colour: bool) -> Result<Loaded> {
+        let name = path.display().to_string();
+        let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
+        let folder = absolute.parent().unwrap_or(Path::new("/"));
+        Loaded::new(&read(path)?, &name, folder, overrides, colour)
+    }
+
+    /// The job in `text`, called `name` in faults; paths are relative to `base_dir`.
+    pub fn from_text(text: &str, name: &str, base_dir: &Path, overrides: &[String]) -> Result<Loaded> {
+        let folder = std::path::absolute(base_dir).map_err(|error| Error::unreadable(base_dir, error))?;
+        Loaded::new(text, name, &folder, overrides, false)
+    }
+}
+
+impl Loaded {
+    fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
+        if text.len() > LARGEST {
+            return Err(Error::Refused(format!("{name}: a job file has at most {LARGEST} bytes")));
+        }
+        let texts = Texts::new(name, text, overrides, colour);
+        let mut root = parse(text).map_err(|fault| texts.refuse(vec![fault]))?;
+        let mut faults = Vec::new();
+        for (index, text) in overrides.iter().enumerate() {
+            faults.extend(set::apply(&mut root, text, index + 1).err());
+        }
+        faults.extend(validate::faults(&root, text));
+        let findings = semantic::check(&root);
+        faults.extend(findings.faults);
+        faults.extend(available::faults(&root));
+        if !faults.is_empty() {
+            return Err(texts.refuse(faults));
+        }
+        let warnings = findings.warnings;
+        let mut job = Job::deserialize(root.plain())
+            .map_err(|error| texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")]))?;
+        job.resolve_paths(folder, Path::new(name));
+        Ok(Self { job, warnings, root, texts })
+    }
+
+    /// A refusal that points at `key_path` (`contact.0.on`), or at the deepest table on the way there that the job has.
+    pub fn fault(&self, key_path: &str, message: impl Into<String>, help: impl AsRef<str>) -> Error {
+        let place = self.root.deepest(key_path).at.clone();
+        self.texts.refuse(vec![Fault::new(place, message, "").help(help)])
+    }
+
+    /// Holds the job against a mesh that was read from a file; more warnings are added to [`Loaded::warnings`].
+    pub fn check_mesh(&mut self, mesh: MeshNames<'_>) -> Result<()> {
+        let findings = semantic::check_names(&self.root, mesh);
+        if !findings.faults.is_empty() {
+            return Err(self.texts.refuse(findings.faults));
+        }
+        let warnings = findings.warnings;
+        self.warnings.extend(warnings);
+        Ok(())
+    }
+}
+
+impl Job {
+    fn resolve_paths(&mut self, folder: &Path, file: &Path) {
+        let stem = file.file_stem().unwrap_or(file.as_os_str());
+        let output = self.output.folder.take().unwrap_or_else(|| Path::new("out").join(stem));
+        self.output.folder = Some(normal(&folder.join(output)));
+        if let Mesh::File(path) = &mut self.mesh {
+            *path = normal(&folder.join(&*path));
+        }
+    }
+}
+
+/// The path without `.` and, as far as they follow a name, without `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
+                out.pop();
+            }
+            part => out.push(part),
+        }
+    }
+    out
+}
+
+fn read(path: &Path) -> Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes))
+        .map_err(|error| Error::unreadable(path, error))?;
+    if bytes.len() > LARGEST {
+        return Err(Error::Refused(format!("{}: a job file has at most {LARGEST} bytes", path.display())));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
+        Error::Refused(format!("{}:{line}: not a text file (UTF-8 expected)", path.display()))
+    })
+}

@@ -1,0 +1,139 @@
+//! Faults with their places, rendered for the user.
+
+use codespan_reporting::diagnostic::{Diagnostic, Label};
+use codespan_reporting::files::SimpleFiles;
+use codespan_reporting::term::termcolor::Buffer;
+use codespan_reporting::term::{Chars, Config, emit_to_write_style};
+
+use super::source::Place;
+use crate::error::Error;
+
+/// Faults shown of one job; the rest is only counted.
+const SHOWN: usize = 60;
+
+/// One thing that is wrong with a job.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Fault {
+    at: Place,
+    message: String,
+    label: String,
+    notes: Vec<String>,
+}
+
+impl Fault {
+    /// A fault that says `message`, with `label` under the place where it is.
+    pub fn new(at: Place, message: impl Into<String>, label: impl Into<String>) -> Self {
+        Self { at, message: message.into(), label: label.into(), notes: Vec::new() }
+    }
+
+    /// What to do about it.
+    pub fn help(mut self, help: impl AsRef<str>) -> Self {
+        self.notes.push(format!("help: {}", help.as_ref()));
+        self
+    }
+}
+
+/// The texts that faults point into.
+#[derive(Debug, Clone)]
+pub struct Texts {
+    files: SimpleFiles<String, String>,
+    colour: bool,
+}
+
+impl Texts {
+    /// The job file and, after it, the overrides.
+    pub fn new(name: &str, text: &str, overrides: &[String], colour: bool) -> Self {
+        let mut files = SimpleFiles::new();
+        files.add(printable(name), printable(text));
+        for text in overrides {
+            files.add("--set".to_owned(), printable(text));
+        }
+        Self { files, colour }
+    }
+
+    /// All `faults` as one refusal, in the order of their places.
+    pub fn refuse(&self, mut faults: Vec<Fault>) -> Error {
+        faults.sort();
+        faults.dedup();
+        let mut text = String::new();
+        for fault in faults.iter().take(SHOWN) {
+            text.push_str(&self.render(fault));
+            text.push('\n');
+        }
+        if faults.len() > SHOWN {
+            text.push_str(&format!("... and {} more\n\n", faults.len() - SHOWN));
+        }
+        let count = faults.len();
+        text.push_str(&format!("{count} fault{} in the job", if count == 1 { "" } else { "s" }));
+        Error::Refused(text)
+    }
+
+    fn render(&self, fault: &Fault) -> String {
+        let label =
+            Label::primary(fault.at.file, fault.at.start..fault.at.end).with_message(printable(&fault.label));
+        let notes = fault.notes.iter().map(|note| printable(note)).collect();
+        let diagnostic =
+            Diagnostic::error().with_message(printable(&fault.message)).with_label(label).with_notes(notes);
+        let config = Config { chars: Chars::ascii(), ..Config::default() };
+        let mut buffer = if self.colour { Buffer::ansi() } else { Buffer::no_color() };
+        match emit_to_write_style(&mut buffer, &config, &self.files, &diagnostic) {
+            Ok(()) => String::from_utf8_lossy(buffer.as_slice()).into_owned(),
+            Err(_) => format!("error: {}\n", printable(&fault.message)),
+        }
+    }
+}
+
+/// The text with control characters replaced by question marks of the same length in bytes, so that a job can't
+/// drive the user's terminal.
+fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && !matches!(c, '\n' | '\r' | '\t') {
+            out.extend(std::iter::repeat_n('?', c.len_utf8()));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Fault, Texts};
+    use crate::job::source::Place;
+
+    fn rendered(texts: &Texts, faults: Vec<Fault>) -> String {
+        texts.refuse(faults).to_string()
+    }
+
+    #[test]
+    fn faults_come_in_the_order_of_the_file_with_line_and_column() {
+        let texts = Texts::new("a.toml", "first = 1\nsecond = 2\n", &["x=3".to_owned()], false);
+        let text = rendered(
+            &texts,
+            vec![
+                Fault::new(Place::new(1, 2..3), "in the override", "three"),
+                Fault::new(Place::new(0, 10..16), "in line two", "here").help("do this"),
+                Fault::new(Place::new(0, 0..5), "in line one", ""),
+            ],
+        );
+        let order = ["in line one", "a.toml:1:1", "in line two", "a.toml:2:1", "help: do this", "--set:1:3"];
+        let places: Vec<_> = order.iter().map(|part| text.find(part).expect(part)).collect();
+        assert!(places.is_sorted(), "{text}");
+        assert!(text.ends_with("3 faults in the job"), "{text}");
+    }
+
+    #[test]
+    fn control_characters_of_a_job_never_reach_the_terminal() {
+        let texts = Texts::new("a.toml", "key = \"\u{1b}[31m\"\n", &[], false);
+        let text = rendered(&texts, vec![Fault::new(Place::new(0, 0..3), "bad \u{1b}]0;", "\u{9b}")]);
+        assert!(!text.contains(|c: char| c.is_control() && c != '\n'), "{text:?}");
+    }
+
+    #[test]
+    fn colour_is_there_only_when_asked_for() {
+        let fault = || vec![Fault::new(Place::new(0, 0..1), "wrong", "here")];
+        assert!(!rendered(&Texts::new("a", "x", &[], false), fault()).contains('\u{1b}'));
+        assert!(rendered(&Texts::new("a", "x", &[], true), fault()).contains('\u{1b}'));
+    }
+}

@@ -1,0 +1,142 @@
+//! The JSON Schema of the job, from the structs, without what TOML does not have.
+
+use std::sync::LazyLock;
+
+use serde_json::{Map, Value, json};
+
+use super::Job;
+
+static SCHEMA: LazyLock<Value> = LazyLock::new(|| {
+    let mut schema = schemars::schema_for!(Job).to_value();
+    remove_null(&mut schema);
+    schema
+});
+
+/// The schema of a whole job (draft 2020-12); no key may be null, as in TOML.
+pub fn schema() -> &'static Value {
+    &SCHEMA
+}
+
+/// A schema with its reference followed; the part that refers has the last word on description and default.
+pub fn resolve(schema: &'static Value) -> Schema {
+    let target = schema["$ref"].as_str().and_then(|name| SCHEMA.pointer(name.trim_start_matches('#')));
+    Schema { own: schema, target: target.unwrap_or(schema) }
+}
+
+/// A schema and the place where it is used.
+#[derive(Clone, Copy)]
+pub struct Schema {
+    own: &'static Value,
+    target: &'static Value,
+}
+
+impl Schema {
+    /// The keyword's value.
+    pub fn get(&self, keyword: &str) -> &'static Value {
+        match &self.own[keyword] {
+            Value::Null => &self.target[keyword],
+            value => value,
+        }
+    }
+
+    /// The keyword's text.
+    pub fn text(&self, keyword: &str) -> Option<&'static str> {
+        self.get(keyword).as_str()
+    }
+
+    /// The keyword's number.
+    pub fn number(&self, keyword: &str) -> Option<f64> {
+        self.get(keyword).as_f64()
+    }
+
+    /// Whether a value of this JSON type may stand here.
+    pub fn accepts(&self, kind: &str) -> bool {
+        match self.get("type") {
+            Value::String(only) => only == kind,
+            Value::Array(several) => several.iter().any(|one| one == kind),
+            _ => self.alternatives().iter().any(|alternative| alternative.accepts(kind)),
+        }
+    }
+
+    /// The schemas of which one must hold, nested ones flattened; empty if there is no choice.
+    pub fn alternatives(&self) -> Vec<Schema> {
+        let branches = self.get("oneOf").as_array().or_else(|| self.get("anyOf").as_array());
+        let mut all = Vec::new();
+        for branch in branches.into_iter().flatten() {
+            let branch = resolve(branch);
+            match branch.alternatives() {
+                nested if nested.is_empty() => all.push(branch),
+                nested => all.extend(nested),
+            }
+        }
+        all
+    }
+
+    /// The words of which one may stand here.
+    pub fn words(&self) -> Vec<&'static str> {
+        self.alternatives().iter().filter_map(|branch| branch.text("const")).collect()
+    }
+
+    /// The tables of which exactly one may stand here: name and the branch's schema.
+    pub fn tagged(&self) -> Vec<(&'static str, Schema)> {
+        let branches = self.alternatives().into_iter();
+        branches.filter_map(|branch| Some((branch.get("required")[0].as_str()?, branch))).collect()
+    }
+
+    /// The keys of a table.
+    pub fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
+        self.get("properties").as_object().into_iter().flatten().map(|(key, value)| (key, resolve(value)))
+    }
+
+    /// The schema of one key of a table.
+    pub fn property(&self, key: &str) -> Option<Schema> {
+        self.get("properties").get(key).map(resolve)
+    }
+
+    /// Keys that a table must have.
+    pub fn required(&self) -> impl Iterator<Item = &'static str> {
+        self.get("required").as_array().into_iter().flatten().filter_map(Value::as_str)
+    }
+
+    /// The schema of a list's items, or of the values of a table with free keys.
+    pub fn items(&self) -> Option<Schema> {
+        [self.get("items"), self.get("additionalProperties")]
+            .into_iter()
+            .find(|inner| inner.is_object())
+            .map(resolve)
+    }
+}
+
+/// Removes null from types and choices.
+fn remove_null(schema: &mut Value) {
+    match schema {
+        Value::Object(object) => {
+            object.values_mut().for_each(remove_null);
+            remove_null_type(object);
+            remove_null_branch(object);
+        }
+        Value::Array(items) => items.iter_mut().for_each(remove_null),
+        _ => {}
+    }
+}
+
+fn remove_null_type(object: &mut Map<String, Value>) {
+    if let Some(Value::Array(kinds)) = object.get_mut("type") {
+        kinds.retain(|kind| kind != "null");
+        if let [only] = kinds.as_slice() {
+            let only = only.clone();
+            object.insert("type".into(), only);
+        }
+    }
+}
+
+fn remove_null_branch(object: &mut Map<String, Value>) {
+    if let Some(Value::Array(branches)) = object.get_mut("anyOf") {
+        branches.retain(|branch| *branch != json!({ "type": "null" }));
+        if let [Value::Object(only)] = branches.as_slice() {
+            let only = only.clone();
+            object.remove("anyOf");
+            object.extend(only);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Boundaries: their names, and what several tables may say about the same one. Vectors: their components.
+
+use super::{Findings, MeshNames, items};
+use crate::job::document::{Axis, Fix, Named};
+use crate::job::expression::{Scalar, Variable};
+use crate::job::nearest::nearest;
+use crate::job::source::{Node, Value};
+
+/// Tables with a list `on`.
+const TABLES: [&str; 3] = ["support", "traction", "contact"];
+
+/// Each name in the lists `on` of all tables called `table`: path of the name, and the name.
+fn names_in(root: &Node, table: &str) -> Vec<(String, String)> {
+    let lists = items(root, table).into_iter().flat_map(|entry| items(root, &format!("{entry}.on")));
+    lists.filter_map(|path| Some((path.clone(), root.read::<String>(&path)?))).collect()
+}
+
+/// Whatever the mesh.
+pub fn check(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    for table in TABLES {
+        for entry in items(root, table) {
+            check_repeats(findings, &format!("{entry}.on"), "boundary");
+        }
+    }
+    for support in items(root, "support") {
+        check_repeats(findings, &format!("{support}.fix"), "axis");
+    }
+    check_claims(findings);
+    for key in ["initial.displacement", "initial.velocity"] {
+        for path in items(root, key) {
+            if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
+                findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");
+            }
+        }
+    }
+}
+
+/// No string twice in the list under `path`.
+fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
+    let mut seen = Vec::new();
+    for key in items(findings.root, path) {
+        let Some(name) = findings.root.read::<String>(&key) else { continue };
+        if seen.contains(&name) {
+            findings.fault(&key, format!("the {what} \"{name}\" is in this list twice"), "delete one");
+        }
+        seen.push(name);
+    }
+}
+
+/// A boundary that is held can't touch anything, and only one table may say how it touches.
+fn check_claims(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    let held: Vec<(String, String)> = names_in(root, "support")
+        .into_iter()
+        .filter(|(path, _)| {
+            let support = path.split('.').take(2).collect::<Vec<_>>().join(".");
+            holds_all(root.read(&format!("{support}.fix")), root)
+        })
+        .collect();
+    let mut contacts: Vec<(String, String)> = Vec::new();
+    for (path, name) in names_in(root, "contact") {
+        if held.iter().any(|(_, other)| *other == name) {
+            let message = format!("the boundary \"{name}\" is in contact, and a support holds all of it");
+            findings.fault(&path, message, "take it out of one of the two tables");
+        }
+        let entry = |path: &str| path.split('.').nth(1).map(str::to_owned);
+        if contacts.iter().any(|(other, taken)| *taken == name && entry(other) != entry(&path)) {
+            let message = format!("the boundary \"{name}\" is in two [[contact]] tables");
+            findings.fault(&path, message, "a boundary has one contact law: take it out of one of them");
+        }
+        contacts.push((path, name));
+    }
+    for (path, name) in names_in(root, "traction") {
+        if held.iter().any(|(_, other)| *other == name) {
+            findings
+                .warnings
+                .push(format!("{path}: a support holds all of \"{name}\"; the traction does nothing"));
+        }
+    }
+}
+
+fn holds_all(fix: Option<Fix>, root: &Node) -> bool {
+    match fix {
+        Some(Fix::Named(Named::All)) => true,
+        Some(Fix::Axes(axes)) => {
+            let plane = root.find("mesh.rectangle").is_some();
+            let needed: &[Axis] = if plane { &[Axis::X, Axis::Y] } else { &[Axis::X, Axis::Y, Axis::Z] };
+            needed.iter().all(|axis| axes.contains(axis))
+        }
+        _ => false,
+    }
+}
+
+/// What depends on dimension and names of the mesh.
+pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    let root = findings.root;
+    for table in TABLES {
+        for (path, name) in names_in(root, table) {
+            check_name(findings, &path, &name, mesh.boundaries, "boundary");
+        }
+    }
+    if root.find("mesh.file").is_some() {
+        for region in items(root, "region") {
+            let path = format!("{region}.name");
+            if let Some(name) = root.read::<String>(&path) {
+                check_name(findings, &path, &name, mesh.regions, "region");
+            }
+        }
+    }
+    for table in ["traction", "body_force"] {
+        for entry in items(root, table) {
+            check_vector(findings, &format!("{entry}.value"), mesh.dimension);
+        }
+    }
+    check_vector(findings, "initial.displacement", mesh.dimension);
+    check_vector(findings, "initial.velocity", mesh.dimension);
+}
+
+/// `name` must be one of `known`.
+pub fn check_name(findings: &mut Findings<'_>, path: &str, name: &str, known: &[&str], what: &str) {
+    if known.contains(&name) || name.is_empty() {
+        return;
+    }
+    let mut help = match known {
+        [] => format!("the mesh has no {what} with a name"),
+        known => format!("the mesh has {}", known.join(", ")),
+    };
+    if let Some(near) = nearest(name, known.iter().copied()) {
+        help = format!("did you mean \"{near}\"? {help}");
+    }
+    findings.fault(path, format!("the mesh has no {what} \"{name}\""), help);
+}
+
+/// One component an axis, and no z in 2D.
+pub fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: usize) {
+    let root = findings.root;
+    let Some(Value::Array(components)) = root.find(path).map(|node| &node.value) else { return };
+    if components.len() != dimension {
+        let message = format!("`{path}` has {} component(s)", components.len());
+        findings.fault(path, message, format!("a {dimension}D body needs {dimension}"));
+    }
+    for component in items(root, path) {
+        check_flat(findings, &component, dimension);
+    }
+}
+
+/// An expression of a 2D body has no z.
+pub fn check_flat(findings: &mut Findings<'_>, path: &str, dimension: usize) {
+    let scalar: Option<Scalar> = findings.root.read(path);
+    if dimension == 2 && scalar.is_some_and(|scalar| scalar.uses(Variable::Z)) {
+        findings.fault(path, "a 2D body has no z", "use t, x and y only");
+    }
+}

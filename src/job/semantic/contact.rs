@@ -1,0 +1,78 @@
+//! Contact laws: graphs that have a relaxed monotonicity, friction that falls the right way.
+
+use super::boundary::check_flat;
+use super::{Findings, MeshNames, items};
+use crate::job::document::{DampedResponse, SlipWeakening};
+
+/// Whatever the mesh.
+pub fn check(findings: &mut Findings<'_>) {
+    for contact in items(findings.root, "contact") {
+        check_damped_response(findings, &format!("{contact}.normal.damped_response"));
+        check_graph(findings, &format!("{contact}.normal.graph.points"));
+        let path = format!("{contact}.friction.slip_weakening");
+        if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
+            && at_rest < dynamic
+        {
+            let message = "the static coefficient is below the dynamic one";
+            findings.fault(&format!("{path}.static"), message, format!("it must be at least {dynamic}"));
+        }
+    }
+}
+
+fn check_damped_response(findings: &mut Findings<'_>, path: &str) {
+    let root = findings.root;
+    let key = format!("{path}.breakpoints");
+    let breakpoints: Option<Vec<f64>> = root.read(&key);
+    let mut last = 0.0;
+    for (index, &breakpoint) in breakpoints.iter().flatten().enumerate() {
+        if breakpoint <= last {
+            let help = "they are velocities above zero, each larger than the one before";
+            findings.fault(&format!("{key}.{index}"), "breakpoints must ascend from zero", help);
+        }
+        last = breakpoint;
+    }
+    if let Some(DampedResponse { breakpoints, slopes, .. }) = root.read(path)
+        && slopes.len() != breakpoints.len() + 1
+    {
+        let message = format!("{} slope(s) for {} breakpoint(s)", slopes.len(), breakpoints.len());
+        let help = "one slope before, between and after the breakpoints: one more than breakpoints";
+        findings.fault(&format!("{path}.slopes"), message, help);
+    }
+}
+
+fn check_graph(findings: &mut Findings<'_>, path: &str) {
+    let points: Vec<[f64; 2]> = findings.root.read(path).unwrap_or_default();
+    for (index, pair) in points.windows(2).enumerate() {
+        let ([before, low], [after, high]) = (pair[0], pair[1]);
+        let key = format!("{path}.{}", index + 1);
+        if after < before {
+            findings.fault(
+                &key,
+                "the velocities of a graph must ascend",
+                format!("it must be at least {before}"),
+            );
+        } else if after == before && high < low {
+            let message =
+                "a downward jump has no relaxed monotonicity: no step is small enough to be solvable";
+            let help = "order the two points upwards, or let the pressure fall along a steep slope";
+            findings.fault(&key, message, help);
+        } else if after == before && high == low {
+            findings.fault(&key, "this point is there twice", "delete one");
+        }
+    }
+    for (index, three) in points.windows(3).enumerate() {
+        if three[0][0] == three[2][0] {
+            let help = "two points with the same velocity are a jump; the ones between say nothing";
+            findings.fault(&format!("{path}.{}", index + 2), "three points with the same velocity", help);
+        }
+    }
+}
+
+/// What depends on the dimension.
+pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    for contact in items(findings.root, "contact") {
+        for law in ["compliance", "unilateral"] {
+            check_flat(findings, &format!("{contact}.normal.{law}.gap"), mesh.dimension);
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Materials: effects that need each other, and what depends on the dimension.
+
+use super::{Findings, items};
+use crate::job::document::{Elasticity, Hypothesis, Viscosity};
+
+/// Poisson's ratio above which P1 elements lock.
+const LOCKING: f64 = 0.45;
+
+fn materials(findings: &Findings<'_>) -> Vec<String> {
+    let regions = items(findings.root, "region").into_iter().map(|region| format!("{region}.material"));
+    std::iter::once("material".to_owned()).chain(regions).collect()
+}
+
+/// Whatever the dimension.
+pub fn check(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    for path in materials(findings) {
+        let Some(material) = root.find(&path) else { continue };
+        let present = |key: &str| material.child(key).is_some();
+        if !["density", "elasticity", "viscosity"].into_iter().any(present) {
+            let message =
+                format!("[{path}] resists nothing: it has neither density, elasticity nor viscosity");
+            findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
+        }
+        if present("viscoplasticity") && !present("elasticity") {
+            let message = "viscoplasticity without elasticity has no stress to relax";
+            findings.fault(&format!("{path}.viscoplasticity"), message, format!("add [{path}.elasticity]"));
+        }
+        if path != "material" && present("hypothesis") {
+            let message = "the hypothesis holds for the whole body";
+            findings.fault(&format!("{path}.hypothesis"), message, "give it in [material] only");
+        }
+    }
+    let mut seen = Vec::new();
+    for region in items(root, "region") {
+        let key = format!("{region}.name");
+        let Some(name) = root.read::<String>(&key) else { continue };
+        if seen.contains(&name) {
+            findings.fault(&key, format!("two regions are called \"{name}\""), "give each its own name");
+        }
+        seen.push(name);
+    }
+}
+
+/// What depends on the dimension.
+pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
+    let root = findings.root;
+    let hypothesis: Option<Hypothesis> = root.read("material.hypothesis");
+    let given = root.find("material.hypothesis").is_some();
+    if dimension == 2 && !given && root.find("material").is_some() {
+        let message = "a 2D body needs a hypothesis";
+        findings.fault(
+            "material",
+            message,
+            "add hypothesis = \"plane_stress\" or \"plane_strain\" to [material]",
+        );
+    }
+    if dimension == 3 && given {
+        findings.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
+    }
+    for path in materials(findings) {
+        if let Some(Viscosity { volumetric, shear }) = root.read(&format!("{path}.viscosity")) {
+            let modulus = dimension as f64 * volumetric + shear;
+            if modulus <= 0.0 && shear > 0.0 {
+                let message =
+                    format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}");
+                let least = -shear / dimension as f64;
+                let help = format!("volumetric must be above {least}");
+                findings.fault(&format!("{path}.viscosity.volumetric"), message, help);
+            }
+        }
+        if let Some(Elasticity { poisson_ratio, .. }) = root.read(&format!("{path}.elasticity"))
+            && poisson_ratio > LOCKING
+            && hypothesis != Some(Hypothesis::PlaneStress)
+        {
+            findings.warnings.push(format!(
+                "{path}.elasticity.poisson_ratio = {poisson_ratio}: linear elements lock above {LOCKING}; \
+                 expect displacements that are too small, and compare with a finer mesh"
+            ));
+        }
+    }
+    let known: &[&str] = if dimension == 2 { &["x", "y"] } else { &["x", "y", "z"] };
+    for support in items(root, "support") {
+        for key in items(root, &format!("{support}.fix")) {
+            if dimension == 2 && root.read::<String>(&key).as_deref() == Some("z") {
+                let help = format!("allowed: {}", known.join(", "));
+                findings.fault(&key, "a 2D body has no z component", help);
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Probes, profiles and expected numbers.
+
+use super::boundary::check_name;
+use super::{Fault, Findings, MeshNames, items};
+use crate::job::nearest::nearest;
+use crate::job::source::Value;
+
+/// Whatever the mesh.
+pub fn check(findings: &mut Findings<'_>) {
+    check_unique(findings, "output.probe", "name", "probes are called");
+    check_unique(findings, "output.profile", "on", "profiles are along");
+    check_expected(findings);
+}
+
+fn check_unique(findings: &mut Findings<'_>, list: &str, key: &str, words: &str) {
+    let mut seen = Vec::new();
+    for entry in items(findings.root, list) {
+        let path = format!("{entry}.{key}");
+        let Some(name) = findings.root.read::<String>(&path) else { continue };
+        if seen.contains(&name) {
+            findings.fault(&path, format!("two {words} \"{name}\""), "delete one, or change it");
+        }
+        seen.push(name);
+    }
+}
+
+fn check_expected(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    let Some(Value::Table(expected)) = root.find("check").map(|node| &node.value) else { return };
+    let probes: Vec<String> = items(root, "output.probe")
+        .iter()
+        .filter_map(|probe| root.read::<String>(&format!("{probe}.name")))
+        .collect();
+    for (quantity, node) in expected {
+        let mut fault = |message: String, help: String| {
+            findings.faults.push(Fault::new(node.key.clone(), message, "").help(help));
+        };
+        if node.child("value").is_some()
+            && node.child("relative").is_none()
+            && node.child("absolute").is_none()
+        {
+            let help = "add relative = 1e-6, or absolute in the quantity's own unit";
+            fault(format!("\"{quantity}\" has no tolerance"), help.to_owned());
+        }
+        let Some(name) = quantity.strip_prefix("probe.").map(|rest| rest.split('.').next().unwrap_or(rest))
+        else {
+            continue;
+        };
+        if !probes.iter().any(|probe| probe == name) {
+            let help = match nearest(name, probes.iter().map(String::as_str)) {
+                Some(near) => format!("did you mean \"{near}\"?"),
+                None => format!("add [[output.probe]] name = \"{name}\""),
+            };
+            fault(format!("the job has no probe \"{name}\""), help);
+        }
+    }
+}
+
+/// What depends on dimension and names of the mesh.
+pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    let root = findings.root;
+    let size: Option<Vec<f64>> = root.read("mesh.rectangle.size").or_else(|| root.read("mesh.box.size"));
+    for probe in items(root, "output.probe") {
+        let path = format!("{probe}.point");
+        let Some(point) = root.read::<Vec<f64>>(&path) else { continue };
+        if point.len() != mesh.dimension {
+            let message = format!("`{path}` has {} coordinate(s)", point.len());
+            findings.fault(&path, message, format!("a {0}D body needs {0}", mesh.dimension));
+        } else if let Some(size) = &size
+            && point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length)
+        {
+            let help = format!("the body reaches from the origin to {size:?}");
+            findings.fault(&path, "this probe lies outside of the body", help);
+        }
+    }
+    for profile in items(root, "output.profile") {
+        let path = format!("{profile}.on");
+        if let Some(name) = root.read::<String>(&path) {
+            check_name(findings, &path, &name, mesh.boundaries, "boundary");
+        }
+    }
+}

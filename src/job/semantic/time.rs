@@ -1,0 +1,70 @@
+//! Time, solver and checkpoints.
+
+use super::Findings;
+use crate::job::source::Value;
+
+/// More fixed steps than any machine will do.
+const MOST_STEPS: f64 = 1e12;
+
+/// Steps that fit into the time, checkpoints that have an occasion, PETSc options as PETSc spells them.
+pub fn check(findings: &mut Findings<'_>) {
+    check_steps(findings);
+    check_checkpoint(findings);
+    if let Some(Value::Table(options)) = findings.root.find("solver.petsc").map(|node| &node.value) {
+        for (key, node) in options {
+            if key.is_empty() || key.starts_with('-') || key.contains(char::is_whitespace) {
+                let help = "write it as PETSc does, without the leading dash: snes_monitor = \"\"";
+                let message = format!("`{key}` is no PETSc option");
+                findings.faults.push(super::Fault::new(node.key.clone(), message, "").help(help));
+            }
+        }
+    }
+}
+
+fn check_steps(findings: &mut Findings<'_>) {
+    let read = |key: &str| findings.root.read::<f64>(key).filter(|number| *number > 0.0);
+    let (end, step) = (read("time.end"), read("time.step"));
+    let (smallest, largest) = (read("time.adaptive.smallest_step"), read("time.adaptive.largest_step"));
+    if let (Some(end), Some(step)) = (end, step) {
+        if step > end {
+            findings.fault("time.step", "the step is longer than the whole run", format!("at most {end}"));
+        } else if end / step > MOST_STEPS {
+            let message = format!("this run would take {:.0e} steps", end / step);
+            findings.fault("time.step", message, "a longer step, or an earlier end");
+        }
+    }
+    if let (Some(smallest), Some(largest)) = (smallest, largest)
+        && smallest > largest
+    {
+        let message = "the smallest step is longer than the largest";
+        findings.fault("time.adaptive.smallest_step", message, format!("at most {largest}"));
+    } else if let (Some(smallest), Some(step)) = (smallest, step)
+        && step < smallest
+    {
+        findings.fault(
+            "time.step",
+            "the first step is shorter than the smallest",
+            format!("at least {smallest}"),
+        );
+    } else if let (Some(largest), Some(step)) = (largest, step)
+        && step > largest
+    {
+        findings.fault(
+            "time.step",
+            "the first step is longer than the largest",
+            format!("at most {largest}"),
+        );
+    }
+}
+
+fn check_checkpoint(findings: &mut Findings<'_>) {
+    let Some(checkpoint) = findings.root.find("checkpoint") else { return };
+    let present = |key: &str| checkpoint.child(key).is_some();
+    if present("every") && present("interval") {
+        findings.fault("checkpoint.interval", "`interval` beside `every`", "only one of them can hold");
+    }
+    if !["every", "interval", "wall_limit"].into_iter().any(present) {
+        let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
+        findings.fault("checkpoint", "[checkpoint] does not say when", help);
+    }
+}

@@ -1,0 +1,188 @@
+//! The TOML document with the place of every key and value.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::report::Fault;
+
+/// A stretch of the job file or of an override.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// 0 for the job file, then one for each override.
+    pub file: usize,
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+impl Place {
+    /// The bytes `range` of `file`.
+    pub fn new(file: usize, range: Range<usize>) -> Self {
+        Self { file, start: range.start, end: range.end }
+    }
+}
+
+/// A value and where it stands.
+#[derive(Debug, Clone)]
+pub struct Node {
+    /// What stands there.
+    pub value: Value,
+    /// Where it stands; of a table its header.
+    pub at: Place,
+    /// Where its key stands; of the root and of array items where the value stands.
+    pub key: Place,
+}
+
+/// A TOML value.
+#[derive(Debug, Clone)]
+pub enum Value {
+    /// A string.
+    Text(String),
+    /// A whole number.
+    Integer(i64),
+    /// Any other number.
+    Float(f64),
+    /// true or false.
+    Boolean(bool),
+    /// A date, a time or both: no key of a job takes one.
+    Date,
+    /// A list.
+    Array(Vec<Node>),
+    /// A table.
+    Table(BTreeMap<String, Node>),
+}
+
+impl Value {
+    /// What a user calls this kind of value.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Text(_) => "a string",
+            Self::Integer(_) => "a whole number",
+            Self::Float(_) => "a number",
+            Self::Boolean(_) => "true or false",
+            Self::Date => "a date",
+            Self::Array(_) => "a list",
+            Self::Table(_) => "a table",
+        }
+    }
+}
+
+impl Node {
+    /// The node under `path`, whose parts are keys and list positions, joined by dots.
+    pub fn find(&self, path: &str) -> Option<&Node> {
+        if path.is_empty() {
+            return Some(self);
+        }
+        path.split('.').try_fold(self, |node, part| node.child(part))
+    }
+
+    /// The child called `part`, a key or a list position.
+    pub fn child(&self, part: &str) -> Option<&Node> {
+        match &self.value {
+            Value::Table(table) => table.get(part),
+            Value::Array(items) => items.get(part.parse::<usize>().ok()?),
+            _ => None,
+        }
+    }
+
+    /// The deepest node on the way to `path` that exists.
+    pub fn deepest(&self, path: &str) -> &Node {
+        let mut node = self;
+        for part in path.split('.') {
+            match node.child(part) {
+                Some(child) => node = child,
+                None => break,
+            }
+        }
+        node
+    }
+
+    /// Number of items of the list under `path`; 0 if there is none.
+    pub fn count(&self, path: &str) -> usize {
+        match self.find(path).map(|node| &node.value) {
+            Some(Value::Array(items)) => items.len(),
+            _ => 0,
+        }
+    }
+
+    /// What stands under `path` as a `T`; `None` if nothing does, or something else.
+    pub fn read<T: DeserializeOwned>(&self, path: &str) -> Option<T> {
+        T::deserialize(self.find(path)?.plain()).ok()
+    }
+
+    /// The value without its places.
+    pub fn plain(&self) -> toml::Value {
+        match &self.value {
+            Value::Text(text) => toml::Value::String(text.clone()),
+            Value::Integer(number) => toml::Value::Integer(*number),
+            Value::Float(number) => toml::Value::Float(*number),
+            Value::Boolean(flag) => toml::Value::Boolean(*flag),
+            Value::Date => toml::Value::String(String::new()),
+            Value::Array(items) => toml::Value::Array(items.iter().map(Node::plain).collect()),
+            Value::Table(table) => {
+                toml::Value::Table(table.iter().map(|(key, node)| (key.clone(), node.plain())).collect())
+            }
+        }
+    }
+}
+
+/// Reads the text of file 0.
+pub fn parse(text: &str) -> Result<Node, Fault> {
+    match DeTable::parse(text) {
+        Ok(table) => Ok(table_node(table.into_inner(), 0, 0, Place::new(0, 0..0))),
+        Err(error) => Err(syntax_fault(&error, 0, 0..text.len())),
+    }
+}
+
+/// Reads one value that stands at the bytes `range` of an override.
+pub fn parse_value(text: &str, file: usize, range: Range<usize>) -> Result<Node, Fault> {
+    match DeValue::parse(&text[range.clone()]) {
+        Ok(value) => Ok(node(value, file, range.start)),
+        Err(error) => Err(syntax_fault(&error, file, range)),
+    }
+}
+
+fn syntax_fault(error: &toml::de::Error, file: usize, range: Range<usize>) -> Fault {
+    let at = error.span().map_or(range.end..range.end, |span| {
+        (range.start + span.start).min(range.end)..(range.start + span.end).min(range.end)
+    });
+    Fault::new(Place::new(file, at), format!("not TOML: {}", error.message()), "")
+}
+
+fn node(spanned: Spanned<DeValue<'_>>, file: usize, offset: usize) -> Node {
+    let span = spanned.span();
+    let at = Place::new(file, span.start + offset..span.end + offset);
+    let value = match spanned.into_inner() {
+        DeValue::String(text) => Value::Text(text.into_owned()),
+        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+            Ok(integer) => Value::Integer(integer),
+            Err(_) => Value::Float(number.as_str().parse().unwrap_or(f64::INFINITY)),
+        },
+        DeValue::Float(number) => Value::Float(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(flag) => Value::Boolean(flag),
+        DeValue::Datetime(_) => Value::Date,
+        DeValue::Array(items) => {
+            Value::Array(items.into_iter().map(|item| node(item, file, offset)).collect())
+        }
+        DeValue::Table(table) => return table_node(table, file, offset, at),
+    };
+    Node { value, key: at.clone(), at }
+}
+
+fn table_node(table: DeTable<'_>, file: usize, offset: usize, at: Place) -> Node {
+    let children = table
+        .into_iter()
+        .map(|(key, value)| {
+            let span = key.span();
+            let mut child = node(value, file, offset);
+            child.key = Place::new(file, span.start + offset..span.end + offset);
+            (key.into_inner().into_owned(), child)
+        })
+        .collect();
+    Node { value: Value::Table(children), key: at.clone(), at }
+}

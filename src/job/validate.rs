@@ -1,0 +1,287 @@
+//! Every key against the schema: names, types, ranges, choices. All faults are collected, none ends the walk.
+
+use std::collections::BTreeMap;
+
+use super::describe;
+use super::expression::Expression;
+use super::nearest::nearest;
+use super::report::Fault;
+use super::schema::{Schema, resolve, schema};
+use super::source::{Node, Place, Value};
+
+/// What is wrong with the document by itself, before keys are held against each other.
+pub fn faults(root: &Node, text: &str) -> Vec<Fault> {
+    let mut walk = Walk { text, faults: Vec::new() };
+    walk.value(root, resolve(schema()), "");
+    walk.faults
+}
+
+struct Walk<'a> {
+    text: &'a str,
+    faults: Vec<Fault>,
+}
+
+impl Walk<'_> {
+    fn value(&mut self, node: &Node, schema: Schema, path: &str) {
+        let alternatives = schema.alternatives();
+        if alternatives.is_empty() {
+            self.plain(node, schema, path);
+            return;
+        }
+        let (words, tagged) = (schema.words(), schema.tagged());
+        let kind = json_kind(&node.value);
+        let other = alternatives
+            .iter()
+            .find(|one| one.get("const").is_null() && one.tagged_name().is_none() && one.accepts(kind));
+        match (&node.value, other) {
+            (Value::Text(word), _) if words.contains(&word.as_str()) => {}
+            (_, Some(other)) => self.value(node, *other, path),
+            (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
+            (Value::Table(table), None) if !tagged.is_empty() => self.one_of(node, table, &tagged, path),
+            _ => self.wrong_type(node, schema, path),
+        }
+    }
+
+    fn plain(&mut self, node: &Node, schema: Schema, path: &str) {
+        match &node.value {
+            Value::Table(table) if schema.accepts("object") => self.table(node, table, schema, path),
+            Value::Array(items) if schema.accepts("array") => self.list(node, items, schema, path),
+            Value::Text(text) if schema.accepts("string") => self.string(node, text, schema, path),
+            Value::Integer(number) if schema.accepts("integer") || schema.accepts("number") => {
+                self.number(node, *number as f64, schema, path);
+            }
+            Value::Float(number) if schema.accepts("number") => self.number(node, *number, schema, path),
+            Value::Boolean(_) if schema.accepts("boolean") => {}
+            _ => self.wrong_type(node, schema, path),
+        }
+    }
+
+    fn table(&mut self, node: &Node, table: &BTreeMap<String, Node>, schema: Schema, path: &str) {
+        let known: Vec<&str> = schema.properties().map(|(key, _)| key.as_str()).collect();
+        let mut meant = Vec::new();
+        for (key, child) in table {
+            let inner = join(path, key);
+            match (schema.property(key), schema.items()) {
+                (Some(property), _) => self.value(child, property, &inner),
+                (None, Some(free)) => self.value(child, free, &inner),
+                (None, None) => meant.extend(self.unknown_key(child, key, &known, path)),
+            }
+        }
+        for key in schema.required() {
+            if !table.contains_key(key) && !meant.contains(&key) {
+                self.missing(node, key, schema.property(key), path);
+            }
+        }
+    }
+
+    fn one_of(
+        &mut self,
+        node: &Node,
+        table: &BTreeMap<String, Node>,
+        tagged: &[(&'static str, Schema)],
+        path: &str,
+    ) {
+        let known: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
+        let mut present: Vec<(&str, &Node)> = Vec::new();
+        let mut meant = None;
+        for (key, child) in table {
+            match tagged.iter().find(|(name, _)| name == key) {
+                Some((name, branch)) => {
+                    present.push((name, child));
+                    if let Some(property) = branch.property(name) {
+                        self.value(child, property, &join(path, key));
+                    }
+                }
+                None => meant = meant.or(self.unknown_key(child, key, &known, path)),
+            }
+        }
+        present.sort_by_key(|(_, child)| &child.key);
+        for (name, child) in present.iter().skip(1) {
+            let message = format!("`{name}` beside `{}`", present[0].0);
+            let help = format!("give exactly one of {} in [{path}]", list(&known));
+            self.faults.push(Fault::new(child.key.clone(), message, "only one of them can hold").help(help));
+        }
+        if present.is_empty() && meant.is_none() {
+            let message = format!("[{path}] is empty");
+            let help = format!("give exactly one of {}", list(&known));
+            self.faults.push(Fault::new(node.key.clone(), message, "").help(help));
+        }
+    }
+
+    fn unknown_key(
+        &mut self,
+        child: &Node,
+        key: &str,
+        known: &[&'static str],
+        path: &str,
+    ) -> Option<&'static str> {
+        let near = nearest(key, known.iter().copied());
+        let place = if path.is_empty() { "at the top of a job".to_owned() } else { format!("in [{path}]") };
+        let mut fault =
+            Fault::new(child.key.clone(), format!("unknown key `{key}` {place}"), "not a key here");
+        if let Some(near) = near {
+            fault = fault.help(format!("did you mean `{near}`?"));
+        } else if let Some(elsewhere) = describe::tables_with(key) {
+            fault = fault.help(format!("`{key}` is a key of {elsewhere}"));
+        }
+        self.faults.push(fault.help(format!("allowed: {}", list(known))));
+        near
+    }
+
+    fn missing(&mut self, node: &Node, key: &str, schema: Option<Schema>, path: &str) {
+        let place = if path.is_empty() { "the job".to_owned() } else { format!("[{path}]") };
+        let message = format!("missing key `{key}` in {place}");
+        let label = if path.is_empty() { "" } else { "this table lacks it" };
+        let mut fault = Fault::new(node.key.clone(), message, label);
+        if let Some(schema) = schema {
+            let meaning = schema.text("description").unwrap_or_default().replace('\n', " ");
+            fault = fault.help(format!("`{key}`: {meaning}"));
+            match schema.get("examples").get(0) {
+                Some(example) => {
+                    fault = fault.help(format!("for example: {key} = {}", describe::toml(example)))
+                }
+                None if schema.accepts("object") => {
+                    fault = fault.help(format!("add a table [{}]", join(path, key)))
+                }
+                None => {}
+            }
+        }
+        self.faults.push(fault);
+    }
+
+    fn list(&mut self, node: &Node, items: &[Node], schema: Schema, path: &str) {
+        let (least, most) = (schema.number("minItems").unwrap_or(0.0), schema.number("maxItems"));
+        let count = items.len() as f64;
+        if count < least || most.is_some_and(|most| count > most) {
+            let wanted = if most == Some(least) { format!("{least}") } else { format!("at least {least}") };
+            let message = format!("`{}` has {count} item{}", path, if count == 1.0 { "" } else { "s" });
+            self.faults.push(Fault::new(node.at.clone(), message, format!("{wanted} expected")));
+        }
+        if let Some(inner) = schema.items() {
+            for (index, item) in items.iter().enumerate() {
+                self.value(item, inner, &join(path, &index.to_string()));
+            }
+        }
+    }
+
+    fn number(&mut self, node: &Node, number: f64, schema: Schema, path: &str) {
+        if !number.is_finite() {
+            let message = format!("`{path}` is not a finite number");
+            self.faults.push(Fault::new(node.at.clone(), message, "not finite").help("give a number"));
+            return;
+        }
+        let most = schema
+            .number("maximum")
+            .or((schema.text("format") == Some("uint32")).then_some(f64::from(u32::MAX)));
+        let inside = schema.number("minimum").is_none_or(|least| number >= least)
+            && most.is_none_or(|most| number <= most)
+            && schema.number("exclusiveMinimum").is_none_or(|least| number > least)
+            && schema.number("exclusiveMaximum").is_none_or(|most| number < most);
+        if !inside {
+            let message = format!("`{path}` is out of range");
+            let label = format!("found {number}");
+            let help = format!("allowed: {}", describe::range(schema));
+            self.faults.push(Fault::new(node.at.clone(), message, label).help(help));
+        }
+    }
+
+    fn string(&mut self, node: &Node, text: &str, schema: Schema, path: &str) {
+        if text.is_empty() && (schema.number("minLength").is_some() || schema.text("format") == Some("path"))
+        {
+            self.faults.push(Fault::new(node.at.clone(), format!("`{path}` is empty"), "a name is expected"));
+        }
+        match schema.text("format") {
+            Some("expression") => self.expression(node, text, path),
+            Some("name") => {
+                let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+                if text.is_empty() || !text.chars().all(fits) {
+                    let message = format!("`{path}` is not a plain name");
+                    let help = "names are made of the letters a-z and A-Z, digits, _ and -";
+                    self.faults.push(Fault::new(node.at.clone(), message, "").help(help));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn expression(&mut self, node: &Node, text: &str, path: &str) {
+        if let Err(fault) = Expression::parse(text) {
+            // Inside of a string without escapes the fault can be pointed at.
+            let (start, end) = (node.at.start + 1, node.at.end.saturating_sub(1));
+            let at = if node.at.file == 0 && self.text.get(start..end) == Some(text) {
+                Place::new(node.at.file, start + fault.at.start..start + fault.at.end)
+            } else {
+                node.at.clone()
+            };
+            self.faults.push(Fault::new(at, format!("in `{path}`: {}", fault.message), "").help(fault.help));
+        }
+    }
+
+    fn unknown_word(&mut self, node: &Node, word: &str, words: &[&'static str], path: &str) {
+        let mut fault =
+            Fault::new(node.at.clone(), format!("`{path}` can't be \"{word}\""), "unknown choice");
+        if let Some(near) = nearest(word, words.iter().copied()) {
+            fault = fault.help(format!("did you mean \"{near}\"?"));
+        }
+        let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
+        self.faults.push(fault.help(format!("allowed: {}", quoted.join(", "))));
+    }
+
+    fn wrong_type(&mut self, node: &Node, schema: Schema, path: &str) {
+        let expected = describe::kind(schema);
+        let message = format!("`{path}` must be {expected}");
+        let mut fault = Fault::new(node.at.clone(), message, format!("found {}", node.value.kind()));
+        let item_accepts = |kind| schema.items().is_some_and(|items| items.accepts(kind));
+        let key = path.rsplit('.').next().unwrap_or(path);
+        match &node.value {
+            Value::Table(_) if schema.accepts("array") && item_accepts("object") => {
+                fault = fault.help(format!("there may be several: write [[{path}]] with two brackets"));
+            }
+            Value::Array(_) if schema.accepts("object") => {
+                fault = fault.help(format!("there is only one: write [{path}] with one bracket"));
+            }
+            Value::Text(text)
+                if schema.accepts("array") && (item_accepts("string") || schema.words().is_empty()) =>
+            {
+                fault = fault.help(format!("write a list: {key} = [\"{text}\"]"));
+            }
+            Value::Text(_) if schema.accepts("number") || schema.accepts("integer") => {
+                fault = fault.help("numbers stand without quotes; expressions are not possible here");
+            }
+            Value::Float(number) if schema.accepts("integer") && number.fract() == 0.0 => {
+                fault = fault.help(format!("write {number:.0}, without a point"));
+            }
+            _ => {}
+        }
+        if let Some(help) = schema.text("key_help") {
+            fault = fault.help(help);
+        }
+        self.faults.push(fault);
+    }
+}
+
+impl Schema {
+    /// The table's name if this is a branch of a choice between tables.
+    fn tagged_name(&self) -> Option<&'static str> {
+        self.get("required").get(0).and_then(|name| name.as_str()).filter(|_| self.alternatives().is_empty())
+    }
+}
+
+fn json_kind(value: &Value) -> &'static str {
+    match value {
+        Value::Text(_) => "string",
+        Value::Integer(_) | Value::Float(_) => "number",
+        Value::Boolean(_) => "boolean",
+        Value::Date => "date",
+        Value::Array(_) => "array",
+        Value::Table(_) => "object",
+    }
+}
+
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+fn list(names: &[&str]) -> String {
+    names.join(", ")
+}
