@@ -1,6 +1,10 @@
 //! Simplicial meshes with named boundaries and regions.
 
+pub mod check;
 pub mod generate;
+mod hanging;
+mod lookup;
+pub mod rigid;
 pub mod shape;
 pub mod surface;
 mod tags;
