@@ -68,8 +68,8 @@ fn touches<const D: usize>(point: &Vector<D>, corners: &[Vector<D>; D]) -> bool 
     }
     share[0] = 1.0 - share[1..].iter().sum::<f64>();
     let mut distance = offset;
-    for i in 1..D {
-        distance = add_scaled(&distance, -share[i], &edge(i));
+    for (i, share) in share.iter().enumerate().skip(1) {
+        distance = add_scaled(&distance, -share, &edge(i));
     }
     norm(&distance) <= TOUCHING * length && share.iter().all(|s| (-TOUCHING..1.0 - TOUCHING).contains(s))
 }

@@ -117,8 +117,11 @@ impl<const D: usize> Body<D> {
         let mut turns = free.to_vec();
         turns.iter_mut().for_each(|turn| slides.iter().for_each(|&axis| turn[axis] = 0.0));
         for turn in reduced(turns) {
-            let (slide, spin) = ([turn[0], turn[1], turn[2]], [turn[3], turn[4], turn[5]]);
-            let turning: Vec<usize> = (0..3).filter(|&axis| spin[axis].abs() > 1e-6).collect();
+            let (slide, spin) = (
+                [turn[0], turn[1], turn[2]],
+                [turn[3], turn[4], turn[5]].map(|x| if x.abs() < 1e-6 { 0.0 } else { x }),
+            );
+            let turning: Vec<usize> = (0..3).filter(|&axis| spin[axis] != 0.0).collect();
             let axis = match turning[..] {
                 [axis] => AXES[axis].to_string(),
                 _ => format!("the direction {}", place(&spin)),
@@ -154,12 +157,12 @@ fn extend<I: Iterator<Item = Motion>>(basis: &mut Vec<Motion>, rows: impl Fn() -
     while basis.len() < 6 {
         let rest = |row: Motion| basis.iter().fold(row, |row, b| add_scaled(&row, -dot(&row, b), b));
         let Some(best) = rows().map(rest).max_by(|a, b| norm(a).total_cmp(&norm(b))) else { return };
-        // Once more, so that rounding in a small rest does not spoil orthogonality.
         let length = norm(&best);
-        let again = rest(best.map(|x| x / length));
-        if !(length > INDEPENDENT) {
+        if length <= INDEPENDENT {
             return;
         }
+        // Once more, so that rounding in a small rest does not spoil orthogonality.
+        let again = rest(best.map(|x| x / length));
         let length = norm(&again);
         basis.push(again.map(|x| x / length));
     }
