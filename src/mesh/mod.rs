@@ -3,6 +3,11 @@
 mod distributed;
 pub mod generate;
 pub mod partition;
+pub mod check;
+pub mod generate;
+mod hanging;
+mod lookup;
+pub mod rigid;
 pub mod shape;
 pub mod surface;
 mod tags;

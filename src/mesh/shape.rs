@@ -41,9 +41,9 @@ pub fn facet_normal<const D: usize>(corners: &[Vector<D>; D]) -> Vector<D> {
         (normal[0], normal[1]) = (a[1], -a[0]);
     } else {
         let b = add_scaled(&corners[2], -1.0, &corners[0]);
-        for i in 0..D {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            normal[i] = 0.5 * (a[j] * b[k] - a[k] * b[j]);
+        for (i, component) in normal.iter_mut().enumerate() {
+            let (j, k) = ((i + 1) % D, (i + 2) % D);
+            *component = 0.5 * (a[j] * b[k] - a[k] * b[j]);
         }
     }
     normal
