@@ -1,3 +1,10 @@
 //! What a run leaves on disk.
 
+pub mod agreement;
+pub mod checkpoint_file;
+pub mod checkpoint_folder;
+pub mod checksum;
 pub mod hyperslab;
+pub mod parallel_file;
+pub mod redistribution;
+pub mod seal;
