@@ -146,6 +146,7 @@ impl Checkpoint {
         let file = ParallelFile::open_readonly(path, &communicator)?;
         let rows = file.rows::<u8>("header")?;
         let header = rows.read(0, rows.count() as usize)?;
+        drop(rows);
         let expected: u64 = file.number("header", "checksum")?;
         let intact = if xxh3_64(&header) == expected { Ok(()) } else { Err(damaged(&file, "header")) };
         agree(&communicator, intact)?;

@@ -155,6 +155,11 @@ impl<'file, T: Element> Rows<'file, T> {
     }
 }
 
+impl<T> Drop for Rows<'_, T> {
+    /// Ends the borrow of the file, which HDF5 refuses to close while datasets are open.
+    fn drop(&mut self) {}
+}
+
 fn collective_transfer() -> hdf5::Result<Open> {
     hdf5::sync::sync(|| {
         // SAFETY: makes a property list of a predefined class; the identifier is closed on drop.
@@ -166,7 +171,7 @@ fn collective_transfer() -> hdf5::Result<Open> {
 }
 
 /// An HDF5 identifier and the call that closes it.
-struct Open(hid_t, unsafe extern "C" fn(hid_t) -> herr_t);
+pub(super) struct Open(pub(super) hid_t, pub(super) unsafe extern "C" fn(hid_t) -> herr_t);
 
 impl Drop for Open {
     fn drop(&mut self) {
@@ -177,6 +182,7 @@ impl Drop for Open {
     }
 }
 
-fn check(status: herr_t) -> hdf5::Result<()> {
+/// Turns HDF5's status into a result with its words.
+pub(super) fn check(status: herr_t) -> hdf5::Result<()> {
     if status < 0 { Err(hdf5::Error::query()?) } else { Ok(()) }
 }

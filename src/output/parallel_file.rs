@@ -9,10 +9,11 @@
 
 use super::agreement::agree;
 use super::hyperslab::{Element, Rows};
+use super::stacked_view;
 use crate::error::{Error, Result};
 use hdf5::plist::dataset_create::AllocTime;
 use hdf5::types::{FixedAscii, TypeDescriptor};
-use hdf5::{Extent, Hyperslab, Location, Selection, SliceOrIndex};
+use hdf5::{Extent, Location, Selection};
 use mpi::collective::SystemOperation;
 use mpi::raw::AsRaw;
 use mpi::topology::SimpleCommunicator;
@@ -186,31 +187,8 @@ impl ParallelFile {
         rows: usize,
         columns: &[usize],
     ) -> Result<()> {
-        let source = format!("{folder}/%b");
-        let stacked = SliceOrIndex::Unlimited { start: 0, step: rows, block: rows };
-        let block = |start, count| SliceOrIndex::SliceCount { start, step: 1, count: 1, block: count };
-        let slab = |slices: Vec<SliceOrIndex>| Selection::Hyperslab(Hyperslab::from(slices));
-        let growing = Extent { dim: rows, max: None };
-        let width = columns.len();
-        let mut empty = self.file.new_dataset::<T>();
-        let made = if width == 1 {
-            empty = empty.virtual_map(".", source, rows, Selection::All, growing, slab(vec![stacked]));
-            empty.shape(growing).create(name)
-        } else {
-            let shape = (growing, Extent { dim: width, max: Some(width) });
-            if columns.iter().copied().eq(0..width) {
-                let view = slab(vec![stacked, block(0, width)]);
-                empty = empty.virtual_map(".", &source, (rows, width), Selection::All, shape, view);
-            } else {
-                for (column, from) in columns.iter().enumerate() {
-                    let view = slab(vec![stacked, block(column, 1)]);
-                    let table = slab(vec![block(0, rows), block(*from, 1)]);
-                    empty = empty.virtual_map(".", &source, (rows, width), table, shape, view);
-                }
-            }
-            empty.shape(shape).create(name)
-        };
-        self.agreed(&format!("make view {name}"), made).map(drop)
+        let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
+        self.agreed(&format!("make view {name}"), made)
     }
 
     /// Opens a dataset of one or two dimensions.
