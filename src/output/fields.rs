@@ -1,0 +1,483 @@
+//! Fields over time: `fields.vtkhdf` with the numbers, and a light XDMF file beside it that refers to them.
+//!
+//! The mesh and each field of each step are stored once. Readers of VTKHDF want the steps of a field below each other
+//! in one table, readers of XDMF want a table a step, some want connectivity flat and some in rows: HDF5's virtual
+//! datasets show the same numbers both ways.
+//!
+//! ```text
+//! /Mesh/cells              nodes of each cell, stored
+//! /Fields/NAME/STEP        the field at a step, stored; attributes place and shape
+//! /VTKHDF/Points, Types, Offsets, NumberOf...
+//! /VTKHDF/Connectivity     view of /Mesh/cells
+//! /VTKHDF/PointData/NAME   view of /Fields/NAME/0, 1, ...; stored once: node
+//! /VTKHDF/CellData/NAME    the same for cells; stored once: cell, rank
+//! /VTKHDF/Steps            times and offsets; attribute NSteps
+//! ```
+//!
+//! A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file of a run that dies holds
+//! all steps before.
+
+use super::agreement::agree;
+use super::hyperslab::Element;
+use super::parallel_file::ParallelFile;
+use super::redistribution::{Redistribution, first_of_part};
+use super::xdmf;
+use crate::error::{Error, Result};
+use crate::tensor::{Vector, component};
+use mpi::collective::SystemOperation;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+use std::path::{Path, PathBuf};
+
+/// Rows a chunk of the small tables of steps holds.
+const STEPS_PER_CHUNK: usize = 256;
+/// The tables of offsets that stay zero because the mesh does not change.
+const STATIC_OFFSETS: [&str; 4] = ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
+
+/// This rank's part of the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldMesh<'a, const D: usize> {
+    /// Coordinates in m of the nodes this rank owns; over the ranks they are numbered in this order.
+    pub points: &'a [Vector<D>],
+    /// Ids of these nodes in the mesh as it was read; over all ranks each of `0..total` once.
+    pub point_ids: &'a [u64],
+    /// Nodes of the cells this rank owns, `D + 1` a cell, by their number over the ranks.
+    pub cells: &'a [u64],
+    /// Ids of these cells in the mesh as it was read; over all ranks each of `0..total` once.
+    pub cell_ids: &'a [u64],
+}
+
+/// What a field has a value for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Each node.
+    Node,
+    /// Each cell.
+    Cell,
+}
+
+/// What a value of a field is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// One number.
+    Scalar,
+    /// `D` numbers; files hold three.
+    Vector,
+    /// A symmetric tensor in Mandel form with 3, 4 or 6 components (see [`crate::tensor`]); files hold the six plain
+    /// components.
+    Tensor,
+}
+
+/// This rank's values of a field.
+#[derive(Debug, Clone, Copy)]
+pub struct Field<'a> {
+    /// Letters, digits and underscores.
+    pub name: &'a str,
+    /// What it has a value for.
+    pub place: Place,
+    /// What a value is.
+    pub shape: Shape,
+    /// The values of the nodes or cells this rank owns, in the order of the mesh.
+    pub values: &'a [f64],
+}
+
+/// Name, place and shape of a field, which stay the same for all steps.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FieldKind {
+    pub(super) name: String,
+    pub(super) place: Place,
+    pub(super) shape: Shape,
+}
+
+/// The field files of a run, open for writing.
+pub struct FieldFile<const D: usize> {
+    file: ParallelFile,
+    communicator: SimpleCommunicator,
+    xdmf: PathBuf,
+    points: Slab,
+    cells: Slab,
+    kinds: Vec<FieldKind>,
+    times: Vec<f64>,
+}
+
+/// Where this rank's rows of a field go.
+struct Slab {
+    /// Rows this rank owns in the run.
+    owned: usize,
+    /// Rows over all ranks.
+    total: u64,
+    /// First row this rank writes.
+    first: u64,
+    /// The way from the run's order of rows to the file's, where they differ.
+    reorder: Option<Redistribution>,
+}
+
+impl Slab {
+    fn new(file: &ParallelFile, communicator: &impl Communicator, owned: usize) -> Self {
+        let (own, mut total) = (owned as u64, 0_u64);
+        communicator.all_reduce_into(&own, &mut total, SystemOperation::sum());
+        Self { owned, total, first: file.slab_start(owned), reorder: None }
+    }
+
+    /// The slab of a file whose rows have the ids of the dataset `stored`, for a run whose rows have the ids `owned`.
+    fn resume(
+        file: &ParallelFile,
+        communicator: &impl Communicator,
+        stored: &str,
+        owned: &[u64],
+    ) -> Result<Self> {
+        let mut slab = Self::new(file, communicator, owned.len());
+        let rows = file.rows::<i64>(stored)?;
+        if rows.count() != slab.total {
+            return Err(Error::Refused(format!(
+                "{}: {stored} has {} rows, the job's mesh {}: it belongs to another mesh. Restart with the job that wrote it \
+                 or move the file away",
+                file.path().display(),
+                rows.count(),
+                slab.total
+            )));
+        }
+        let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
+        slab.first = first_of_part(slab.total, rank, size);
+        let count = first_of_part(slab.total, rank + 1, size) - slab.first;
+        let wanted: Vec<u64> =
+            rows.read(slab.first, count as usize)?.into_iter().map(|id| id as u64).collect();
+        slab.reorder = Some(Redistribution::new(communicator, slab.total, owned, &wanted)?);
+        Ok(slab)
+    }
+}
+
+impl<const D: usize> FieldFile<D> {
+    /// Creates `fields.vtkhdf` in the folder, with the mesh and no steps, replacing older ones. Collective, as all
+    /// functions of this type, with the same outcome on all ranks.
+    pub fn create(folder: &Path, communicator: &impl Communicator, mesh: FieldMesh<D>) -> Result<Self> {
+        let communicator = communicator.duplicate();
+        let sound =
+            mesh.points.len() == mesh.point_ids.len() && mesh.cells.len() == (D + 1) * mesh.cell_ids.len();
+        let fault = || Error::Internal("the mesh for fields.vtkhdf has lists of unequal length".into());
+        agree(&communicator, sound.then_some(()).ok_or_else(fault))?;
+        let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
+        let points = Slab::new(&file, &communicator, mesh.points.len());
+        let cells = Slab::new(&file, &communicator, mesh.cell_ids.len());
+        write_mesh(&file, &communicator, &mesh, &points, &cells)?;
+        file.flush()?;
+        let xdmf = folder.join("fields.xdmf");
+        Ok(Self { file, communicator, xdmf, points, cells, kinds: Vec::new(), times: Vec::new() })
+    }
+
+    /// Opens the files of an earlier run to go on, keeping the steps up to `time` (s). The mesh must be the same, its
+    /// distribution over ranks may differ.
+    pub fn resume(
+        folder: &Path,
+        communicator: &impl Communicator,
+        mesh: FieldMesh<D>,
+        time: f64,
+    ) -> Result<Self> {
+        let communicator = communicator.duplicate();
+        let file = ParallelFile::open_append(&folder.join("fields.vtkhdf"), &communicator)?;
+        let points = Slab::resume(&file, &communicator, "VTKHDF/PointData/node", mesh.point_ids)?;
+        let cells = Slab::resume(&file, &communicator, "VTKHDF/CellData/cell", mesh.cell_ids)?;
+        let kinds = read_kinds(&file)?;
+        let mut times = Vec::new();
+        if !kinds.is_empty() {
+            let counted: i64 = file.number("VTKHDF/Steps", "NSteps")?;
+            times = file.rows::<f64>("VTKHDF/Steps/Values")?.read(0, counted.max(0) as usize)?;
+            times.retain(|kept| *kept <= time);
+            cut(&file, &kinds, times.len())?;
+        }
+        let xdmf = folder.join("fields.xdmf");
+        let resumed = Self { file, communicator, xdmf, points, cells, kinds, times };
+        resumed.write_xdmf()?;
+        Ok(resumed)
+    }
+
+    /// Times of the steps in the file, in s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Appends a step at `time` (s), later than those before. All steps have the same fields.
+    pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<()> {
+        agree(&self.communicator, self.check(time, fields))?;
+        let step = self.times.len();
+        if self.kinds.is_empty() {
+            self.add_fields(fields)?;
+        }
+        for field in fields {
+            let slab = self.slab(field.place);
+            let mut values = spread::<D>(field, slab.owned);
+            let width = file_width(field.shape);
+            if let Some(reorder) = &slab.reorder {
+                values = reorder.apply(width, &values)?;
+            }
+            let name = format!("Fields/{}/{step}", field.name);
+            self.file.create_rows::<f64>(&name, slab.total, width)?.write(slab.first, &values)?;
+            self.append(&offsets_name(field.place, field.name), step, step as i64 * slab.total as i64)?;
+        }
+        for name in STATIC_OFFSETS {
+            self.append(&format!("VTKHDF/Steps/{name}"), step, 0_i64)?;
+        }
+        self.append("VTKHDF/Steps/NumberOfParts", step, 1_i64)?;
+        self.append("VTKHDF/Steps/Values", step, time)?;
+        self.file.flush()?;
+        self.file.set_number("VTKHDF/Steps", "NSteps", step as i64 + 1)?;
+        self.file.flush()?;
+        self.times.push(time);
+        self.write_xdmf()
+    }
+
+    /// Closes the files.
+    pub fn close(self) -> Result<()> {
+        self.file.close()
+    }
+
+    fn slab(&self, place: Place) -> &Slab {
+        match place {
+            Place::Node => &self.points,
+            Place::Cell => &self.cells,
+        }
+    }
+
+    fn check(&self, time: f64, fields: &[Field]) -> Result<()> {
+        let fault = |what: String| Err(Error::Internal(format!("{}: {what}", self.file.path().display())));
+        if !time.is_finite() || self.times.last().is_some_and(|last| time <= *last) {
+            return fault(format!("a step at t = {time} s does not follow the steps before"));
+        }
+        for field in fields {
+            let named = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+            if field.name.is_empty() || !field.name.chars().all(named) {
+                return fault(format!("a field cannot be named {:?}", field.name));
+            }
+            let rows = self.slab(field.place).owned;
+            let widths: &[usize] = match field.shape {
+                Shape::Scalar => &[1],
+                Shape::Vector => &[D],
+                Shape::Tensor => &[3, 4, 6],
+            };
+            if !widths.iter().any(|width| width * rows == field.values.len()) {
+                return fault(format!(
+                    "field {} has {} numbers for {rows} rows",
+                    field.name,
+                    field.values.len()
+                ));
+            }
+        }
+        let same = fields.iter().map(kind_of).eq(self.kinds.iter().cloned());
+        if fields.is_empty() || (!self.kinds.is_empty() && !same) {
+            return fault(format!(
+                "its fields are {}; a step with {} does not fit",
+                list(&self.kinds),
+                list(&fields.iter().map(kind_of).collect::<Vec<_>>())
+            ));
+        }
+        Ok(())
+    }
+
+    fn add_fields(&mut self, fields: &[Field]) -> Result<()> {
+        self.file.create_group("VTKHDF/Steps")?;
+        self.file.create_group("VTKHDF/Steps/PointDataOffsets")?;
+        self.file.create_group("VTKHDF/Steps/CellDataOffsets")?;
+        self.file.set_number("VTKHDF/Steps", "NSteps", 0_i64)?;
+        for name in STATIC_OFFSETS.iter().chain(&["NumberOfParts"]) {
+            self.file.create_series::<i64>(&format!("VTKHDF/Steps/{name}"), 1, STEPS_PER_CHUNK)?;
+        }
+        self.file.create_series::<f64>("VTKHDF/Steps/Values", 1, STEPS_PER_CHUNK)?;
+        for (position, field) in fields.iter().enumerate() {
+            let folder = format!("Fields/{}", field.name);
+            self.file.create_group(&folder)?;
+            self.file.set_text(&folder, "place", place_word(field.place))?;
+            self.file.set_text(&folder, "shape", shape_word(field.shape))?;
+            self.file.set_number(&folder, "position", position as i64)?;
+            let (group, rows) = (data_group(field.place), self.slab(field.place).total as usize);
+            let view = format!("VTKHDF/{group}/{}", field.name);
+            self.file.create_stacked_view::<f64>(
+                &view,
+                &format!("/{folder}"),
+                rows,
+                view_columns(field.shape),
+            )?;
+            self.file.create_series::<i64>(&offsets_name(field.place, field.name), 1, STEPS_PER_CHUNK)?;
+        }
+        self.kinds = fields.iter().map(kind_of).collect();
+        Ok(())
+    }
+
+    fn append<T: Element>(&self, name: &str, step: usize, value: T) -> Result<()> {
+        let series = self.file.rows::<T>(name)?;
+        series.resize(step as u64 + 1)?;
+        let own = [value];
+        series.write(step as u64, if self.communicator.rank() == 0 { &own } else { &[] })
+    }
+
+    fn write_xdmf(&self) -> Result<()> {
+        let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
+        let written = if self.communicator.rank() == 0 {
+            xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times)
+        } else {
+            Ok(())
+        };
+        agree(&self.communicator, written)
+    }
+}
+
+fn write_mesh<const D: usize>(
+    file: &ParallelFile,
+    communicator: &impl Communicator,
+    mesh: &FieldMesh<D>,
+    points: &Slab,
+    cells: &Slab,
+) -> Result<()> {
+    for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
+        file.create_group(group)?;
+    }
+    file.set_numbers("VTKHDF", "Version", &[2_i64, 3])?;
+    file.set_text("VTKHDF", "Type", "UnstructuredGrid")?;
+    let first = communicator.rank() == 0;
+    let corners = D + 1;
+    let only_first = |value: u64| if first { vec![value as i64] } else { Vec::new() };
+    for (name, count) in [
+        ("NumberOfPoints", points.total),
+        ("NumberOfCells", cells.total),
+        ("NumberOfConnectivityIds", cells.total * corners as u64),
+    ] {
+        file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
+    }
+    let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
+    let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
+    file.create_rows::<f64>("VTKHDF/Points", points.total, 3)?.write(points.first, &coordinates)?;
+    file.create_rows::<i64>("Mesh/cells", cells.total, corners)?.write(cells.first, &whole(mesh.cells))?;
+    file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
+
+    let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
+    let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
+    let start = if first { 0 } else { cells.first + 1 };
+    file.create_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1)?.write(start, &offsets)?;
+    let kind: u8 = if D == 2 { 5 } else { 10 };
+    file.create_rows::<u8>("VTKHDF/Types", cells.total, 1)?.write(cells.first, &vec![kind; cells.owned])?;
+
+    let node_ids = file.create_rows::<i64>("VTKHDF/PointData/node", points.total, 1)?;
+    node_ids.write(points.first, &whole(mesh.point_ids))?;
+    let cell_ids = file.create_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1)?;
+    cell_ids.write(cells.first, &whole(mesh.cell_ids))?;
+    let ranks = file.create_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1)?;
+    ranks.write(cells.first, &vec![communicator.rank(); cells.owned])
+}
+
+fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>> {
+    let mut kinds = Vec::new();
+    for name in file.names("Fields")? {
+        let folder = format!("Fields/{name}");
+        let (place, shape) = (file.text(&folder, "place")?, file.text(&folder, "shape")?);
+        let position: i64 = file.number(&folder, "position")?;
+        let place = if place == place_word(Place::Node) { Place::Node } else { Place::Cell };
+        let shape = match shape.as_str() {
+            "scalar" => Shape::Scalar,
+            "vector" => Shape::Vector,
+            _ => Shape::Tensor,
+        };
+        kinds.push((position, FieldKind { name, place, shape }));
+    }
+    kinds.sort_by_key(|(position, _)| *position);
+    Ok(kinds.into_iter().map(|(_, kind)| kind).collect())
+}
+
+/// Removes all steps from `steps` on.
+fn cut(file: &ParallelFile, kinds: &[FieldKind], steps: usize) -> Result<()> {
+    file.set_number("VTKHDF/Steps", "NSteps", steps as i64)?;
+    for kind in kinds {
+        let folder = format!("Fields/{}", kind.name);
+        for step in file.names(&folder)? {
+            if step.parse().is_ok_and(|step: usize| step >= steps) {
+                file.remove(&format!("{folder}/{step}"))?;
+            }
+        }
+        file.rows::<i64>(&offsets_name(kind.place, &kind.name))?.resize(steps as u64)?;
+    }
+    for name in STATIC_OFFSETS.iter().chain(&["NumberOfParts"]) {
+        file.rows::<i64>(&format!("VTKHDF/Steps/{name}"))?.resize(steps as u64)?;
+    }
+    file.rows::<f64>("VTKHDF/Steps/Values")?.resize(steps as u64)?;
+    file.flush()
+}
+
+/// Numbers a row of a field of this shape has in the file.
+pub(super) fn file_width(shape: Shape) -> usize {
+    match shape {
+        Shape::Scalar => 1,
+        Shape::Vector => 3,
+        Shape::Tensor => 6,
+    }
+}
+
+/// Which stored component each component of VTK is. Tensors are stored as XDMF wants them, xx xy xz yy yz zz; VTK wants
+/// xx yy zz xy yz xz.
+fn view_columns(shape: Shape) -> &'static [usize] {
+    match shape {
+        Shape::Scalar => &[0],
+        Shape::Vector => &[0, 1, 2],
+        Shape::Tensor => &[0, 3, 5, 1, 4, 2],
+    }
+}
+
+/// A field's values with as many components as the file has.
+fn spread<const D: usize>(field: &Field, rows: usize) -> Vec<f64> {
+    match field.shape {
+        Shape::Scalar => field.values.to_vec(),
+        Shape::Vector => field.values.chunks_exact(D).flat_map(pad).collect(),
+        Shape::Tensor => match field.values.len().checked_div(rows) {
+            Some(3) => field.values.chunks_exact(3).flat_map(plain_components::<3>).collect(),
+            Some(4) => field.values.chunks_exact(4).flat_map(plain_components::<4>).collect(),
+            _ => field.values.chunks_exact(6).flat_map(plain_components::<6>).collect(),
+        },
+    }
+}
+
+fn pad(vector: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|axis| vector.get(axis).copied().unwrap_or(0.0))
+}
+
+fn plain_components<const S: usize>(mandel: &[f64]) -> [f64; 6] {
+    const POSITION: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+    let mut plain = [0.0; 6];
+    for (c, value) in mandel.iter().enumerate() {
+        let (i, j, factor) = component::<S>(c);
+        plain[POSITION[i][j]] = value / factor;
+    }
+    plain
+}
+
+fn kind_of(field: &Field) -> FieldKind {
+    FieldKind { name: field.name.into(), place: field.place, shape: field.shape }
+}
+
+fn list(kinds: &[FieldKind]) -> String {
+    let words = kinds.iter().map(|kind| format!("{} ({})", kind.name, shape_word(kind.shape)));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// The group of VTKHDF that holds the fields of a place.
+pub(super) fn data_group(place: Place) -> &'static str {
+    match place {
+        Place::Node => "PointData",
+        Place::Cell => "CellData",
+    }
+}
+
+fn offsets_name(place: Place, name: &str) -> String {
+    format!("VTKHDF/Steps/{}Offsets/{name}", data_group(place))
+}
+
+fn place_word(place: Place) -> &'static str {
+    match place {
+        Place::Node => "node",
+        Place::Cell => "cell",
+    }
+}
+
+fn shape_word(shape: Shape) -> &'static str {
+    match shape {
+        Shape::Scalar => "scalar",
+        Shape::Vector => "vector",
+        Shape::Tensor => "tensor",
+    }
+}

@@ -1,0 +1,264 @@
+//! HDF5 files that all ranks of a communicator write and read together.
+//!
+//! A dataset is a table of `rows x width` numbers, one-dimensional where the width is 1; each rank transfers its
+//! own rows (see [`Rows`]). Every function is collective: all ranks call it in the same order with the same names and
+//! shapes, and a failure on one rank is an error on all, so that no rank goes on alone.
+//!
+//! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
+//! open for writing, so that nobody could open the results of a process that died.
+
+use super::agreement::agree;
+use super::hyperslab::{Element, Rows};
+use super::stacked_view;
+use crate::error::{Error, Result};
+use hdf5::plist::dataset_create::AllocTime;
+use hdf5::types::{FixedAscii, TypeDescriptor};
+use hdf5::{Extent, Location, Selection};
+use mpi::collective::SystemOperation;
+use mpi::raw::AsRaw;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+use std::path::{Path, PathBuf};
+
+/// The longest text an attribute holds, in bytes.
+const LONGEST_TEXT: usize = 256;
+
+/// An HDF5 file opened by all ranks of a communicator.
+pub struct ParallelFile {
+    file: hdf5::File,
+    pub(super) communicator: SimpleCommunicator,
+    path: PathBuf,
+    pub(super) transfer_bytes: usize,
+}
+
+impl ParallelFile {
+    /// Creates the file, replacing one of the same name.
+    pub fn create(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+        Self::create_behind(path, 0, communicator)
+    }
+
+    /// Creates the file with `reserved` bytes before the HDF5 content, for the owner of the format
+    /// (HDF5's user block: 0 or a power of two from 512 on).
+    pub fn create_behind(path: &Path, reserved: u64, communicator: &impl Communicator) -> Result<Self> {
+        let communicator = communicator.duplicate();
+        let made = hdf5::FileBuilder::new()
+            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .with_fcpl(|layout| layout.userblock(reserved))
+            .create(path);
+        let file = agree(&communicator, made.map_err(|error| Error::unwritable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    /// Opens an existing file for reading.
+    pub fn open_readonly(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+        let communicator = communicator.duplicate();
+        let opened =
+            hdf5::FileBuilder::new().with_fapl(|access| access.mpio(communicator.as_raw(), None)).open(path);
+        let file = agree(&communicator, opened.map_err(|error| Error::unreadable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    /// Opens an existing file for reading and writing.
+    pub fn open_append(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+        let communicator = communicator.duplicate();
+        let opened = hdf5::FileBuilder::new()
+            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .open_rw(path);
+        let file = agree(&communicator, opened.map_err(|error| Error::unwritable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    fn new(file: hdf5::File, communicator: SimpleCommunicator, path: &Path) -> Self {
+        Self { file, communicator, path: path.into(), transfer_bytes: 1 << 30 }
+    }
+
+    /// Sets how many bytes a rank moves in one collective transfer at most (1 GiB unless told; a row is never
+    /// split). The same on all ranks.
+    pub fn limit_transfer(&mut self, bytes: usize) {
+        self.transfer_bytes = bytes.max(1);
+    }
+
+    /// The file's path as it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Hands everything written so far to the operating system.
+    pub fn flush(&self) -> Result<()> {
+        self.agreed("flush", self.file.flush())
+    }
+
+    /// Flushes and closes the file on all ranks.
+    pub fn close(self) -> Result<()> {
+        self.flush()?;
+        let Self { file, communicator, path, .. } = self;
+        agree(&communicator, file.close().map_err(|error| Error::unwritable(&path, error)))
+    }
+
+    /// The first row of this rank's slab where the ranks' slabs of `rows` rows follow each other.
+    pub fn slab_start(&self, rows: usize) -> u64 {
+        let (own, mut end) = (rows as u64, 0_u64);
+        self.communicator.scan_into(&own, &mut end, SystemOperation::sum());
+        end - own
+    }
+
+    /// Makes a group; groups above it that are missing are made too.
+    pub fn create_group(&self, name: &str) -> Result<()> {
+        self.agreed(&format!("make group {name}"), self.file.create_group(name).map(drop))
+    }
+
+    /// Whether there is a group or dataset of this name (`/` apart).
+    pub fn contains(&self, name: &str) -> bool {
+        let mut reached = String::new();
+        name.split('/').filter(|part| !part.is_empty()).all(|part| {
+            reached = format!("{reached}/{part}");
+            self.file.link_exists(&reached)
+        })
+    }
+
+    /// The names in a group, in alphabetical order.
+    pub fn names(&self, group: &str) -> Result<Vec<String>> {
+        let found = self.file.group(group).and_then(|group| group.member_names());
+        let mut names = self.agreed(&format!("list group {group}"), found)?;
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    /// Removes a dataset or group from the file; its space is not given back.
+    pub fn remove(&self, name: &str) -> Result<()> {
+        self.agreed(&format!("remove {name}"), self.file.unlink(name))
+    }
+
+    /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
+    pub fn create_rows<T: Element>(&self, name: &str, rows: u64, width: usize) -> Result<Rows<'_, T>> {
+        let rows = rows as usize;
+        let empty = self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).no_chunk();
+        let made =
+            if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
+        let dataset = self.agreed(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Makes an empty dataset of the given width to which rows can be added later, stored in chunks of
+    /// `chunk_rows` rows.
+    pub fn create_series<T: Element>(
+        &self,
+        name: &str,
+        width: usize,
+        chunk_rows: usize,
+    ) -> Result<Rows<'_, T>> {
+        let empty = self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early));
+        let growing = Extent { dim: 0, max: None };
+        let made = if width == 1 {
+            empty.chunk(chunk_rows).shape(growing).create(name)
+        } else {
+            let fixed = Extent { dim: width, max: Some(width) };
+            empty.chunk((chunk_rows, width)).shape((growing, fixed)).create(name)
+        };
+        let dataset = self.agreed(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Makes a dataset of `rows` numbers that shows the numbers of the table `source` of the given shape, one row
+    /// after the other, without storing them again.
+    pub fn create_flat_view<T: Element>(
+        &self,
+        name: &str,
+        source: &str,
+        shape: (usize, usize),
+    ) -> Result<()> {
+        let whole = Selection::All;
+        let made = self
+            .file
+            .new_dataset::<T>()
+            .virtual_map(".", source, shape, whole.clone(), shape.0 * shape.1, whole)
+            .shape(shape.0 * shape.1)
+            .create(name);
+        self.agreed(&format!("make view {name}"), made).map(drop)
+    }
+
+    /// Makes a dataset that shows the tables `{folder}/0`, `{folder}/1`, ... below each other without storing them
+    /// again; it grows as tables are added. All have `rows` rows and `columns.len()` columns; column `c` of the view is
+    /// column `columns[c]` of the tables.
+    pub fn create_stacked_view<T: Element>(
+        &self,
+        name: &str,
+        folder: &str,
+        rows: usize,
+        columns: &[usize],
+    ) -> Result<()> {
+        let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
+        self.agreed(&format!("make view {name}"), made)
+    }
+
+    /// Opens a dataset of one or two dimensions.
+    pub fn rows<T: Element>(&self, name: &str) -> Result<Rows<'_, T>> {
+        let opened = self.file.dataset(name).and_then(|dataset| {
+            let stored = dataset.dtype()?.to_descriptor()?;
+            if stored != T::type_descriptor() {
+                return Err(format!("it holds {stored}, {} expected", T::type_descriptor()).into());
+            }
+            match dataset.get_shape()?.as_slice() {
+                [_] => Ok((dataset, 1)),
+                [_, width] => Ok((dataset.clone(), *width)),
+                shape => Err(format!("it has shape {shape:?}, one or two dimensions expected").into()),
+            }
+        });
+        let (dataset, width) = self.agreed(&format!("open dataset {name}"), opened)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Sets an attribute of a group or dataset to one number.
+    pub fn set_number<T: Element>(&self, object: &str, name: &str, value: T) -> Result<()> {
+        let done = self.object(object).and_then(|object| match object.attr(name) {
+            Ok(attribute) => attribute.write_scalar(&value),
+            Err(_) => object.new_attr::<T>().create(name)?.write_scalar(&value),
+        });
+        self.agreed(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// Adds an attribute that is a list of numbers.
+    pub fn set_numbers<T: Element>(&self, object: &str, name: &str, values: &[T]) -> Result<()> {
+        let done = self
+            .object(object)
+            .and_then(|object| object.new_attr::<T>().shape(values.len()).create(name)?.write_raw(values));
+        self.agreed(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// Adds an attribute that is a fixed-length ASCII text of at most 256 bytes.
+    pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<()> {
+        let done = self.object(object).and_then(|object| {
+            let value = FixedAscii::<LONGEST_TEXT>::from_ascii(text).map_err(|error| error.to_string())?;
+            let kind = TypeDescriptor::FixedAscii(text.len().max(1));
+            object.new_attr_builder().empty_as(&kind).create(name)?.write_scalar(&value)
+        });
+        self.agreed(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// An attribute that is one number.
+    pub fn number<T: Element>(&self, object: &str, name: &str) -> Result<T> {
+        let found = self.object(object).and_then(|object| object.attr(name)?.read_scalar());
+        self.agreed(&format!("read attribute {name} of {object}"), found)
+    }
+
+    /// An attribute that is a fixed-length text.
+    pub fn text(&self, object: &str, name: &str) -> Result<String> {
+        let found = self
+            .object(object)
+            .and_then(|object| object.attr(name)?.read_scalar::<FixedAscii<LONGEST_TEXT>>());
+        self.agreed(&format!("read attribute {name} of {object}"), found).map(|text| text.to_string())
+    }
+
+    fn object(&self, name: &str) -> hdf5::Result<Location> {
+        match self.file.group(name) {
+            Ok(group) => Ok((*group).clone()),
+            Err(_) => self.file.dataset(name).map(|dataset| (**dataset).clone()),
+        }
+    }
+
+    /// The same outcome on all ranks, with words about what was being done.
+    pub(super) fn agreed<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T> {
+        let explain = |error| Error::Failed(format!("{}: cannot {doing}: {error}", self.path.display()));
+        agree(&self.communicator, result.map_err(explain))
+    }
+}

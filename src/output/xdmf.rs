@@ -1,0 +1,108 @@
+//! The light XDMF file that tells other readers where the numbers of the field file are.
+
+use super::fields::{FieldKind, Place, Shape, data_group, file_width};
+use crate::error::{Error, Result};
+use std::fmt::Write;
+use std::path::Path;
+
+/// The size of the mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mesh {
+    pub(super) dimension: usize,
+    pub(super) points: u64,
+    pub(super) cells: u64,
+}
+
+/// Replaces the file at once, so that a reader never sees half of it. On one rank.
+pub(super) fn write(path: &Path, mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> Result<()> {
+    let part = path.with_extension("xdmf.part");
+    std::fs::write(&part, document(mesh, kinds, times))
+        .and_then(|()| std::fs::rename(&part, path))
+        .map_err(|error| Error::unwritable(path, error))
+}
+
+fn document(mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> String {
+    let mut text = String::from(
+        "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n\
+         <Grid Name=\"fields\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+    );
+    for (step, time) in times.iter().enumerate() {
+        text.push_str(&grid(mesh, kinds, step, *time));
+    }
+    text.push_str("</Grid>\n</Domain>\n</Xdmf>\n");
+    text
+}
+
+fn grid(mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> String {
+    let Mesh { dimension, points, cells } = mesh;
+    let corners = dimension + 1;
+    let topology = if dimension == 2 { "Triangle" } else { "Tetrahedron" };
+    let mut text = format!(
+        "<Grid Name=\"step {step}\" GridType=\"Uniform\">\n<Time Value=\"{time:?}\"/>\n\
+         <Topology TopologyType=\"{topology}\" NumberOfElements=\"{cells}\">{}</Topology>\n\
+         <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
+        item("Int", 8, &format!("{cells} {corners}"), "Mesh/cells"),
+        item("Float", 8, &format!("{points} 3"), "VTKHDF/Points"),
+    );
+    let mut attribute = |name: &str, kind: &str, place: Place, item: String| {
+        let center = match place {
+            Place::Node => "Node",
+            Place::Cell => "Cell",
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "<Attribute Name=\"{name}\" AttributeType=\"{kind}\" Center=\"{center}\">{item}</Attribute>"
+        );
+    };
+    for (name, place, rows, bytes) in
+        [("node", Place::Node, points, 8), ("cell", Place::Cell, cells, 8), ("rank", Place::Cell, cells, 4)]
+    {
+        let dataset = format!("VTKHDF/{}/{name}", data_group(place));
+        attribute(name, "Scalar", place, item("Int", bytes, &rows.to_string(), &dataset));
+    }
+    for FieldKind { name, place, shape } in kinds {
+        let rows = if *place == Place::Node { points } else { cells };
+        let (kind, dimensions) = match shape {
+            Shape::Scalar => ("Scalar", rows.to_string()),
+            Shape::Vector => ("Vector", format!("{rows} {}", file_width(*shape))),
+            Shape::Tensor => ("Tensor6", format!("{rows} {}", file_width(*shape))),
+        };
+        attribute(name, kind, *place, item("Float", 8, &dimensions, &format!("Fields/{name}/{step}")));
+    }
+    text.push_str("</Grid>\n");
+    text
+}
+
+fn item(number: &str, bytes: usize, dimensions: &str, dataset: &str) -> String {
+    format!(
+        "<DataItem Dimensions=\"{dimensions}\" NumberType=\"{number}\" Precision=\"{bytes}\" \
+         Format=\"HDF\">fields.vtkhdf:/{dataset}</DataItem>"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_written_so_that_they_read_back_the_same() {
+        let time = 0.1 + 0.2;
+        let text = document(Mesh { dimension: 2, points: 3, cells: 1 }, &[], &[time, 1e-9]);
+        let read: Vec<f64> = text
+            .split("<Time Value=\"")
+            .skip(1)
+            .map(|rest| rest.split('"').next().unwrap_or_default().parse().expect("number"))
+            .collect();
+        assert_eq!(read, [time, 1e-9]);
+    }
+
+    #[test]
+    fn each_step_refers_to_its_own_numbers() {
+        let kinds = [FieldKind { name: "stress".into(), place: Place::Cell, shape: Shape::Tensor }];
+        let text = document(Mesh { dimension: 3, points: 4, cells: 7 }, &kinds, &[0.5, 1.0]);
+        assert!(text.contains("AttributeType=\"Tensor6\" Center=\"Cell\"><DataItem Dimensions=\"7 6\""));
+        assert_eq!(text.matches("fields.vtkhdf:/Fields/stress/0<").count(), 1);
+        assert_eq!(text.matches("fields.vtkhdf:/Fields/stress/1<").count(), 1);
+    }
+}

@@ -1,0 +1,185 @@
+//! Field files, read back serially the way other programs do.
+
+use crate::mpirun::{self, owner};
+use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use mpi::traits::{Communicator, CommunicatorCollectives};
+use std::f64::consts::SQRT_2;
+use std::path::Path;
+
+/// Cells of the strip of squares, two triangles each.
+const SQUARES: u64 = 20;
+const NODES: u64 = 2 * (SQUARES + 1);
+
+fn point(node: u64) -> [f64; 2] {
+    [(node / 2) as f64, (node % 2) as f64]
+}
+
+fn corners(cell: u64) -> [u64; 3] {
+    let low = 2 * (cell / 2);
+    if cell % 2 == 0 { [low, low + 2, low + 1] } else { [low + 1, low + 2, low + 3] }
+}
+
+fn displacement(node: u64, time: f64) -> [f64; 2] {
+    [node as f64 + time, node as f64 * time]
+}
+
+/// Components 11, 22, 12.
+fn stress(cell: u64, time: f64) -> [f64; 3] {
+    [cell as f64, time, -(cell as f64) - time]
+}
+
+struct Part {
+    points: Vec<[f64; 2]>,
+    point_ids: Vec<u64>,
+    cells: Vec<u64>,
+    cell_ids: Vec<u64>,
+}
+
+impl Part {
+    fn new(world: &impl Communicator) -> Self {
+        let (rank, size) = (world.rank() as usize, world.size() as usize);
+        let of = |rank: usize, total: u64| (0..total).filter(move |id| owner(*id, size) == rank);
+        let order: Vec<u64> = (0..size).flat_map(|rank| of(rank, NODES)).collect();
+        let number = |node: u64| order.iter().position(|id| *id == node).expect("owned") as u64;
+        let point_ids: Vec<u64> = of(rank, NODES).collect();
+        let cell_ids: Vec<u64> = of(rank, 2 * SQUARES).collect();
+        Self {
+            points: point_ids.iter().map(|id| point(*id)).collect(),
+            cells: cell_ids.iter().flat_map(|id| corners(*id)).map(number).collect(),
+            point_ids,
+            cell_ids,
+        }
+    }
+
+    fn mesh(&self) -> FieldMesh<'_, 2> {
+        let Self { points, point_ids, cells, cell_ids } = self;
+        FieldMesh { points, point_ids, cells, cell_ids }
+    }
+
+    fn write_step(&self, file: &mut FieldFile<2>, time: f64) {
+        let displacements: Vec<f64> = self.point_ids.iter().flat_map(|id| displacement(*id, time)).collect();
+        let mandel = |id: &u64| {
+            let [xx, yy, xy] = stress(*id, time);
+            [xx, yy, SQRT_2 * xy]
+        };
+        let stresses: Vec<f64> = self.cell_ids.iter().flat_map(mandel).collect();
+        let indicators: Vec<f64> = self.cell_ids.iter().map(|id| *id as f64 * 10.0 + time).collect();
+        let fields = [
+            Field { name: "displacement", place: Place::Node, shape: Shape::Vector, values: &displacements },
+            Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: &stresses },
+            Field { name: "indicator", place: Place::Cell, shape: Shape::Scalar, values: &indicators },
+        ];
+        file.write_step(time, &fields).expect("step");
+    }
+}
+
+pub fn write(world: &impl Communicator, folder: &Path) {
+    let part = Part::new(world);
+    let mut file = FieldFile::create(folder, world, part.mesh()).expect("create");
+    for time in [0.0, 0.25, 0.5, 0.75] {
+        part.write_step(&mut file, time);
+    }
+    let error = file.write_step(0.75, &[]).expect_err("refused").to_string();
+    assert!(error.contains("t = 0.75"), "{error}");
+    file.close().expect("close");
+}
+
+pub fn die(world: &impl Communicator, folder: &Path) {
+    let part = Part::new(world);
+    let mut file = FieldFile::create(folder, world, part.mesh()).expect("create");
+    part.write_step(&mut file, 0.0);
+    part.write_step(&mut file, 0.25);
+    world.barrier();
+    std::process::abort();
+}
+
+pub fn resume(world: &impl Communicator, folder: &Path) {
+    let part = Part::new(world);
+    let mut file = FieldFile::resume(folder, world, part.mesh(), 0.25).expect("resume");
+    assert_eq!(file.times(), [0.0, 0.25]);
+    part.write_step(&mut file, 0.375);
+    part.write_step(&mut file, 0.5);
+    file.close().expect("close");
+
+    let mut shorter = part.mesh();
+    if world.rank() == 0 {
+        shorter.cell_ids = &[];
+    }
+    let error = FieldFile::resume(folder, world, shorter, 1.0).err().expect("refused").to_string();
+    assert!(error.contains("another mesh"), "{error}");
+}
+
+fn close_to(found: f64, expected: f64) -> bool {
+    (found - expected).abs() <= 1e-12 * (1.0 + expected.abs())
+}
+
+/// Checks all numbers of the file against the functions above.
+fn check(folder: &Path, times: &[f64]) {
+    let file = hdf5::File::open(folder.join("fields.vtkhdf")).expect("open");
+    let floats = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<f64>()).expect("numbers");
+    let whole = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<i64>()).expect("numbers");
+    let (nodes, cells) = (whole("VTKHDF/PointData/node"), whole("VTKHDF/CellData/cell"));
+    let steps: i64 = file.group("VTKHDF/Steps").and_then(|g| g.attr("NSteps")?.read_scalar()).expect("steps");
+    assert_eq!(steps, times.len() as i64);
+    assert_eq!(floats("VTKHDF/Steps/Values"), times);
+    for (row, node) in nodes.iter().enumerate() {
+        assert_eq!(floats("VTKHDF/Points")[3 * row..3 * row + 2], point(*node as u64));
+    }
+    for (row, nodes_of_cell) in whole("VTKHDF/Connectivity").chunks_exact(3).enumerate() {
+        let found: Vec<u64> = nodes_of_cell.iter().map(|number| nodes[*number as usize] as u64).collect();
+        assert_eq!(found, corners(cells[row] as u64));
+    }
+    assert_eq!(whole("VTKHDF/Offsets"), (0..=2 * SQUARES as i64).map(|cell| 3 * cell).collect::<Vec<_>>());
+    let all = (floats("VTKHDF/PointData/displacement"), floats("VTKHDF/CellData/stress"));
+    assert_eq!(all.0.len(), 3 * NODES as usize * times.len());
+    let indicators = floats("VTKHDF/CellData/indicator");
+    for (step, time) in times.iter().enumerate() {
+        let start = whole("VTKHDF/Steps/PointDataOffsets/displacement")[step] as usize;
+        for (row, node) in nodes.iter().enumerate() {
+            let found = &all.0[3 * (start + row)..][..3];
+            let [x, y] = displacement(*node as u64, *time);
+            assert_eq!(found, [x, y, 0.0]);
+        }
+        let start = whole("VTKHDF/Steps/CellDataOffsets/stress")[step] as usize;
+        let stored = floats(&format!("Fields/stress/{step}"));
+        for (row, cell) in cells.iter().enumerate() {
+            let [xx, yy, xy] = stress(*cell as u64, *time);
+            let seen = &all.1[6 * (start + row)..][..6];
+            assert!(seen.iter().zip([xx, yy, 0.0, xy, 0.0, 0.0]).all(|(a, b)| close_to(*a, b)), "{seen:?}");
+            let seen = &stored[6 * row..][..6];
+            assert!(seen.iter().zip([xx, xy, 0.0, yy, 0.0, 0.0]).all(|(a, b)| close_to(*a, b)), "{seen:?}");
+            assert_eq!(indicators[start + row], *cell as f64 * 10.0 + time);
+        }
+    }
+    let xdmf = std::fs::read_to_string(folder.join("fields.xdmf")).expect("xdmf");
+    assert_eq!(xdmf.matches("<Time ").count(), times.len());
+    assert!(!xdmf.contains(&format!("stress/{}<", times.len())));
+}
+
+#[test]
+fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
+    for ranks in 1..=4 {
+        let folder = tempfile::tempdir().expect("folder");
+        mpirun::run(ranks, "fields_write", folder.path());
+        check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
+    }
+}
+
+#[test]
+fn the_steps_of_a_run_that_died_can_be_read() {
+    let folder = tempfile::tempdir().expect("folder");
+    assert!(!mpirun::start(2, "fields_die", folder.path()).status.success());
+    check(folder.path(), &[0.0, 0.25]);
+    mpirun::run(3, "fields_resume", folder.path());
+    check(folder.path(), &[0.0, 0.25, 0.375, 0.5]);
+}
+
+#[test]
+fn a_restarted_run_drops_later_steps_and_goes_on_with_any_number_of_ranks() {
+    for (before, after) in [(1, 4), (4, 1), (3, 2)] {
+        let folder = tempfile::tempdir().expect("folder");
+        mpirun::run(before, "fields_write", folder.path());
+        mpirun::run(after, "fields_resume", folder.path());
+        check(folder.path(), &[0.0, 0.25, 0.375, 0.5]);
+    }
+}

@@ -1,0 +1,39 @@
+//! Files that several ranks write and read together. A test starts this program again under `mpirun`, once for each
+//! scenario and number of ranks, and checks what the scenario did or left.
+
+mod checkpoints;
+mod fields;
+mod mpirun;
+mod rows;
+
+use mpi::Threading;
+use mpi::traits::Communicator;
+
+/// The side of the tests that runs under `mpirun`.
+#[test]
+#[ignore = "started by the other tests, under mpirun"]
+fn scenario() {
+    let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
+    let folder = std::path::PathBuf::from(std::env::var(mpirun::FOLDER).expect("a folder"));
+    let (universe, _) = mpi::initialize_with_threading(Threading::Funneled).expect("MPI");
+    let world = universe.world();
+    std::panic::set_hook(Box::new({
+        let rank = world.rank();
+        move |panic| {
+            eprintln!("rank {rank}: {panic}");
+            mpi::topology::SimpleCommunicator::world().abort(1)
+        }
+    }));
+    match name.as_str() {
+        "rows" => rows::write_and_read(&world, &folder),
+        "rows_fault" => rows::fail_on_one_rank(&world, &folder),
+        "checkpoint_write" => checkpoints::write(&world, &folder),
+        "checkpoint_read" => checkpoints::read(&world, &folder),
+        "checkpoint_refusals" => checkpoints::refuse_misfits(&world, &folder),
+        "checkpoint_damage" => checkpoints::damage(&world, &folder),
+        "fields_write" => fields::write(&world, &folder),
+        "fields_die" => fields::die(&world, &folder),
+        "fields_resume" => fields::resume(&world, &folder),
+        other => panic!("no scenario {other}"),
+    }
+}

@@ -1,0 +1,41 @@
+//! Starts scenarios.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+pub const SCENARIO: &str = "CLARKE_TEST_SCENARIO";
+pub const FOLDER: &str = "CLARKE_TEST_FOLDER";
+
+pub fn run(ranks: usize, scenario: &str, folder: &Path) {
+    let output = start(ranks, scenario, folder);
+    let words =
+        format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{scenario} on {ranks} ranks:\n{words}");
+    assert!(!words.contains("HDF5-DIAG"), "HDF5 printed its error stack:\n{words}");
+}
+
+pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
+    Command::new("mpirun")
+        .args(["--oversubscribe", "--bind-to", "none", "--timeout", "120", "-n", &ranks.to_string()])
+        .arg(std::env::current_exe().expect("this program"))
+        .args(["--ignored", "--exact", "scenario", "--nocapture", "--test-threads", "1"])
+        .env(SCENARIO, scenario)
+        .env(FOLDER, folder)
+        .env("OMP_NUM_THREADS", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .output()
+        .expect("mpirun")
+}
+
+/// A number that looks random.
+pub fn scramble(seed: u64) -> u64 {
+    let mixed = (seed.wrapping_add(0x9e37_79b9_7f4a_7c15) ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb) ^ (mixed >> 31)
+}
+
+/// The rank that owns a row, as if by a partitioner; of more than two ranks one owns nothing.
+pub fn owner(id: u64, size: usize) -> usize {
+    let working = if size > 2 { size - 1 } else { size };
+    (scramble(id) % working as u64) as usize
+}
