@@ -88,6 +88,7 @@ install_development() {
         say "every package is there"
         return
     fi
+    say "missing: $missing"
     refresh_lists
     require_petsc
     # shellcheck disable=SC2086 # a list of package names
@@ -99,6 +100,7 @@ install_runtime() {
         say "every package is there"
         return
     fi
+    say "missing: some of $runtime_packages and the libraries of PETSc, HDF5 and METIS"
     refresh_lists
     require_petsc
     libraries=$(runtime_library_names) || fail "the runtime libraries could not be worked out from libpetsc-real-dev"

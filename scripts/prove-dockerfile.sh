@@ -91,6 +91,7 @@ start_stage() { # image [AS name]
     [[ -z ${APT_CONFIG:-} ]] || cp "$APT_CONFIG"/* "$root/etc/apt/apt.conf.d/"
     cp /etc/resolv.conf /etc/hosts "$root/etc/"
     mount -t proc proc "$root/proc"
+    mount --rbind /sys "$root/sys"
     mount --rbind /dev "$root/dev"
     if [[ $1 == rust:* ]]; then
         mkdir -p "$root/usr/local/rust" "$root/usr/local/cargo/registry"
@@ -134,7 +135,7 @@ copy() { # [--from=stage] [--chown=owner] source... destination
     if [[ $destination == */ || $destination == */. || -d $from/${sources[0]} ]]; then
         mkdir -p "$root$destination"
         [[ $owner == root:root ]] || chroot "$root" chown "$owner" "$destination"
-        cp -a "$staging/." "$root$destination/"
+        (shopt -s dotglob && cp -a "$staging"/* "$root$destination/")
     else
         mkdir -p "$(dirname "$root$destination")"
         cp -a "$staging/$(basename "${sources[0]}")" "$root$destination"
