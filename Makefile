@@ -1,0 +1,66 @@
+# `make` alone lists the targets.
+
+PREFIX ?= /usr/local
+JOB ?= jobs/papers/wang_cheng_2022.toml
+RANKS ?= 2
+ARGS ?=
+DEPS ?= yes
+
+binary := $(or $(CARGO_TARGET_DIR),target)/release/solver
+share := $(DESTDIR)$(PREFIX)/share/clarke
+
+# One thread a rank: threaded BLAS and OpenMP slow the solvers down when every core has a rank.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+# More ranks than cores is slow, but no reason to refuse.
+export OMPI_MCA_rmaps_base_oversubscribe ?= 1
+
+# Open MPI refuses to start as root unless it is told twice, as in a container or a CI job.
+ifeq ($(shell id -u),0)
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+endif
+
+.PHONY: help deps build run test lint install clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make deps      install the system packages (Debian, Ubuntu); nothing to do when they are there'
+	@echo 'make build     compile the solver: $(binary)'
+	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
+	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
+	@echo 'make test      deps, then every test'
+	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
+	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
+	@echo 'make clean     remove everything that was compiled'
+	@echo 'DEPS=no skips the packages, for systems where PETSc, MPI, HDF5 and METIS come from elsewhere.'
+
+deps:
+ifneq ($(DEPS),no)
+	@scripts/install-deps.sh --test
+endif
+
+build:
+	cargo build --release --locked
+
+run: deps
+	cargo build --release --locked
+	mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)
+
+test: deps
+	cargo test --release --locked
+
+lint: deps
+	cargo fmt --all --check
+	cargo clippy --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked
+
+# Does not compile, so that `sudo make install` needs no Rust for root.
+install:
+	@test -x $(binary) || { echo '$(binary) is not there: run "make build" first' >&2; exit 1; }
+	install -D -m 755 $(binary) $(DESTDIR)$(PREFIX)/bin/solver
+	find $(wildcard jobs meshes) -type f -not -path '*/out/*' -exec install -D -m 644 {} $(share)/{} \;
+	@echo 'Jobs and meshes: $(share). A job writes beside itself: copy it to a folder of your own before a run.'
+
+clean:
+	cargo clean

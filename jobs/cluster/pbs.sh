@@ -1,0 +1,68 @@
+#!/bin/bash
+# Runs a job under PBS (OpenPBS, PBS Professional) and, when the time limit comes first, submits itself again to go on
+# from the checkpoint.
+#
+#   qsub -v JOB=job.toml jobs/cluster/pbs.sh
+#   qsub -v JOB=job.toml -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 jobs/cluster/pbs.sh
+#
+# Paths are relative to the folder of the submission. More variables for -v:
+#   SOLVER     the binary (default: solver)
+#   LAUNCHER   what starts the ranks (default: mpirun; where Open MPI was built without PBS support,
+#              "mpirun --hostfile $PBS_NODEFILE", already expanded)
+#   OUTPUT     the job's output folder (default: what the job file's [output] table says)
+#   RESTART    yes: go on from a checkpoint (set by the resubmission)
+#   SCRIPT     this file, for the resubmission (default: jobs/cluster/pbs.sh)
+#   MARGIN     seconds before the limit at which the ranks are asked to stop (default: 120)
+#
+#PBS -N clarke
+#PBS -l select=1:ncpus=2:mpiprocs=2
+#PBS -l walltime=01:00:00
+#PBS -j oe
+
+set -u
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+cd "${PBS_O_WORKDIR:?submit this script with qsub}" || exit 2
+job=${JOB:?name the job file: qsub -v JOB=job.toml}
+solver=${SOLVER:-solver}
+read -ra launcher <<<"${LAUNCHER:-mpirun}"
+
+if [[ -z ${OUTPUT:-} ]]; then
+    folder=$(sed -n '/^\[output\]/,/^\[/s/^ *folder *= *"\([^"]*\)".*/\1/p' "$job")
+    folder=${folder:-out/$(basename "$job" .toml)}
+    [[ $folder == /* ]] || folder=$(dirname "$job")/$folder
+    OUTPUT=$folder
+fi
+# The checkpoints in the output folder; with arguments, those that `find` selects by them.
+checkpoints() { find "$OUTPUT" -maxdepth 1 -name 'checkpoint-*.h5' "$@" 2>/dev/null; }
+
+options=()
+if [[ ${RESTART:-no} == yes && -n $(checkpoints) ]]; then
+    options+=(--restart)
+fi
+start=$(mktemp)
+trap 'rm -f "$start"' EXIT
+
+# PBS warns by SIGTERM only seconds before it kills, so `timeout` asks earlier, by SIGUSR1, which mpirun passes on.
+requested() { qstat -f -w "$PBS_JOBID" | sed -n "s/^ *Resource_List\\.$1 = //p"; }
+limit=$(requested walltime)
+IFS=: read -r hours minutes seconds <<<"${limit:?qstat does not show the time limit}"
+run_seconds=$((10#$hours * 3600 + 10#$minutes * 60 + 10#$seconds - ${MARGIN:-120}))
+if [[ $run_seconds -le 0 ]]; then
+    echo "the time limit $limit leaves nothing before the last ${MARGIN:-120} seconds: ask for more" >&2
+    exit 2
+fi
+
+timeout --foreground --preserve-status --signal=USR1 "$run_seconds" \
+    "${launcher[@]}" "$solver" run "$job" "${options[@]}"
+code=$?
+
+# 3: stopped on request. Without a checkpoint of this run the next one would get no further.
+if [[ $code -eq 3 && -n $(checkpoints -newer "$start") ]]; then
+    echo "$(date '+%F %T'): stopped with a checkpoint; submitting again"
+    variables=JOB=$job,RESTART=yes,SOLVER=$solver,LAUNCHER=${launcher[*]},OUTPUT=$OUTPUT
+    variables+=,SCRIPT=${SCRIPT:-jobs/cluster/pbs.sh},MARGIN=${MARGIN:-120}
+    qsub -l select="$(requested select)" -l walltime="$limit" -v "$variables" "${SCRIPT:-jobs/cluster/pbs.sh}" ||
+        echo "not submitted: submit again with -v RESTART=yes" >&2
+fi
+exit "$code"
