@@ -1,12 +1,11 @@
 //! Simplicial meshes with named boundaries and regions.
 
-mod distributed;
-pub mod generate;
-pub mod partition;
 pub mod check;
+mod distributed;
 pub mod generate;
 mod hanging;
 mod lookup;
+pub mod partition;
 pub mod rigid;
 pub mod shape;
 pub mod surface;

@@ -1,12 +1,19 @@
 //! What a run leaves on disk.
 
 pub mod agreement;
+pub mod checkpoint;
 pub mod checkpoint_file;
 pub mod checkpoint_folder;
 pub mod checksum;
+pub mod csv;
+pub mod field_output;
 pub mod fields;
+pub mod history;
 pub mod hyperslab;
+pub mod log;
 pub mod parallel_file;
+pub mod probes;
+pub mod profiles;
 pub mod redistribution;
 pub mod seal;
 mod stacked_view;

@@ -1,0 +1,176 @@
+//! What a checkpoint of a run holds, and how a run goes on from one.
+
+use super::{
+    checkpoint_file::{self, Checkpoint, RowSet, Table},
+    history::Totals,
+};
+use crate::{
+    body::Body,
+    error::{Error, Result},
+    job::differing_keys,
+    petsc::DistributedVector,
+    session::Session,
+    state::State,
+};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, path::Path};
+
+/// Raised whenever a file written before can't be read any more.
+const FORMAT: u32 = 1;
+
+/// Everything of a checkpoint that is not a field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of the layout.
+    pub format: u32,
+    /// Version of the solver that wrote it.
+    pub version: String,
+    /// Ranks that wrote it.
+    pub ranks: usize,
+    /// 2 or 3.
+    pub dimension: usize,
+    /// Steps taken.
+    pub step: u64,
+    /// Time in s.
+    pub time: f64,
+    /// Length of the last step in s.
+    pub step_length: f64,
+    /// Sums over the steps so far.
+    pub totals: Totals,
+    /// Digest of the mesh.
+    pub mesh: String,
+    /// The part of the job that changes the answer, key by key.
+    pub physics: BTreeMap<String, String>,
+}
+
+/// What identifies the problem a checkpoint belongs to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// Version of this solver.
+    pub version: String,
+    /// The part of the job that changes the answer, key by key.
+    pub physics: BTreeMap<String, String>,
+}
+
+/// Saves the state. Collective, with the same outcome on all ranks.
+pub fn save<const D: usize, const S: usize>(
+    session: &Session,
+    path: &Path,
+    identity: &Identity,
+    body: &Body<D, S>,
+    state: &State,
+    totals: &Totals,
+) -> Result<()> {
+    let header = Header {
+        format: FORMAT,
+        version: identity.version.clone(),
+        ranks: session.ranks(),
+        dimension: D,
+        step: state.step,
+        time: state.time,
+        step_length: state.step_length,
+        totals: *totals,
+        mesh: digest(body),
+        physics: identity.physics.clone(),
+    };
+    let header = serde_json::to_vec_pretty(&header)
+        .map_err(|e| Error::Internal(format!("the checkpoint's header can't be written: {e}")))?;
+    let (nodes, cells) = (owned_node_ids(body), cell_ids(body));
+    let sets = [
+        RowSet { name: "nodes", total: body.mesh.total_nodes as u64, ids: &nodes },
+        RowSet { name: "cells", total: body.mesh.total_cells as u64, ids: &cells },
+    ];
+    let [displacement, velocity, previous] =
+        [state.displacement.owned()?, state.velocity.owned()?, state.previous_velocity.owned()?];
+    let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
+    let mut tables: Vec<Table> = nodal
+        .into_iter()
+        .map(|(name, values)| Table { name, set: "nodes", width: D, values })
+        .collect();
+    let histories = body.effects.iter().filter_map(|e| e.history());
+    tables.extend(histories.map(|h| Table { name: h.name, set: "cells", width: h.width, values: h.values }));
+    checkpoint_file::write(path, session.world(), &header, &sets, &tables)
+}
+
+/// Puts a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
+/// damaged or of another problem.
+pub fn restore<const D: usize, const S: usize>(
+    session: &Session,
+    path: &Path,
+    identity: &Identity,
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<Header> {
+    let checkpoint = Checkpoint::open(path, session.world())?;
+    let header = check(path, checkpoint.header(), identity, body)?;
+    let nodes = owned_node_ids(body);
+    let names = ["displacement", "velocity", "previous_velocity"].map(|name| (name, D));
+    let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &names, &nodes)?;
+    let fields = [&mut state.displacement, &mut state.velocity, &mut state.previous_velocity];
+    for (field, values) in fields.into_iter().zip(&values) {
+        fill(field, values)?;
+    }
+    let cells = cell_ids(body);
+    for effect in &mut body.effects {
+        let Some((name, width)) = effect.history().map(|h| (h.name, h.width)) else { continue };
+        let values = checkpoint.read("cells", body.mesh.total_cells as u64, &[(name, width)], &cells)?;
+        effect.restore(&values[0]);
+    }
+    (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
+    Ok(header)
+}
+
+fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
+    field.owned_mut()?.copy_from_slice(values);
+    field.update_ghosts()
+}
+
+fn check<const D: usize, const S: usize>(
+    path: &Path,
+    bytes: &[u8],
+    identity: &Identity,
+    body: &Body<D, S>,
+) -> Result<Header> {
+    let refuse = |words: String| Err(Error::Refused(format!("{}: {words}", path.display())));
+    let header: Header = match serde_json::from_slice(bytes) {
+        Ok(header) => header,
+        Err(e) => return refuse(format!("the header of the checkpoint can't be understood ({e}); start the run anew")),
+    };
+    if header.format != FORMAT {
+        return refuse(format!(
+            "checkpoint format {} was written by Clarke {}, this one reads format {FORMAT}; go on with that version",
+            header.format, header.version
+        ));
+    }
+    let differing = differing_keys(&header.physics, &identity.physics);
+    if !differing.is_empty() {
+        let lines: Vec<String> = differing
+            .iter()
+            .map(|key| {
+                let value = |side: &BTreeMap<String, String>| side.get(key).cloned().unwrap_or_else(|| "absent".into());
+                format!("  {key}: checkpoint {}, job {}", value(&header.physics), value(&identity.physics))
+            })
+            .collect();
+        return refuse(format!(
+            "the checkpoint belongs to another problem; these keys differ:\n{}\nrestore them, or start the run anew \
+             without --restart",
+            lines.join("\n")
+        ));
+    }
+    if header.mesh != digest(body) || header.dimension != D {
+        return refuse("the mesh has changed since the checkpoint was written; start the run anew".into());
+    }
+    Ok(header)
+}
+
+fn digest<const D: usize, const S: usize>(body: &Body<D, S>) -> String {
+    format!("{:016x}", body.mesh.digest)
+}
+
+fn owned_node_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
+    body.mesh.node_ids[..body.mesh.owned].iter().map(|&id| u64::from(id)).collect()
+}
+
+fn cell_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
+    body.mesh.cell_ids.iter().map(|&id| u64::from(id)).collect()
+}

@@ -1,0 +1,68 @@
+//! Which fields go into `fields.vtkhdf`.
+
+use super::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use crate::{
+    body::Body,
+    error::Result,
+    session::Session,
+    state::State,
+    tensor::{Mandel, von_mises},
+};
+use std::path::Path;
+
+/// The field file of a run.
+pub struct FieldOutput<const D: usize>(FieldFile<D>);
+
+impl<const D: usize> FieldOutput<D> {
+    /// Creates the files with the mesh, or goes on with them behind this time. Collective.
+    pub fn open<const S: usize>(
+        session: &Session,
+        folder: &Path,
+        body: &Body<D, S>,
+        goes_on_after: Option<f64>,
+    ) -> Result<Self> {
+        let mesh = &body.mesh;
+        let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
+        let (point_ids, cell_ids) = (wide(&mesh.node_ids[..mesh.owned]), wide(&mesh.cell_ids));
+        let cells: Vec<u64> = mesh.cells.iter().map(|&node| u64::from(mesh.global_node(node))).collect();
+        let parts = FieldMesh {
+            points: &mesh.nodes[..mesh.owned],
+            point_ids: &point_ids,
+            cells: &cells,
+            cell_ids: &cell_ids,
+        };
+        let exists = session.is_first() && folder.join("fields.vtkhdf").exists();
+        let exists = session.largest([f64::from(u8::from(exists))])[0] > 0.0;
+        Ok(Self(match goes_on_after {
+            Some(time) if exists => FieldFile::resume(folder, session.world(), parts, time)?,
+            _ => FieldFile::create(folder, session.world(), parts)?,
+        }))
+    }
+
+    /// The last time written, if any.
+    pub fn last_time(&self) -> Option<f64> {
+        self.0.times().last().copied()
+    }
+
+    /// Appends the state, whose total stress is given one a cell. Collective.
+    pub fn write<const S: usize>(&mut self, body: &Body<D, S>, state: &State, stress: &[Mandel<S>]) -> Result<()> {
+        let (displacement, velocity) = (state.displacement.owned()?, state.velocity.owned()?);
+        let norms: Vec<f64> = stress.iter().map(von_mises).collect();
+        let mut fields = vec![
+            Field { name: "displacement", place: Place::Node, shape: Shape::Vector, values: &displacement },
+            Field { name: "velocity", place: Place::Node, shape: Shape::Vector, values: &velocity },
+            Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
+            Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
+        ];
+        for history in body.effects.iter().filter_map(|e| e.history()) {
+            let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
+            fields.push(Field { name: history.name, place: Place::Cell, shape, values: history.values });
+        }
+        self.0.write_step(state.time, &fields)
+    }
+
+    /// Closes the files. Collective.
+    pub fn close(self) -> Result<()> {
+        self.0.close()
+    }
+}

@@ -1,0 +1,144 @@
+//! `history.csv`: a row a step.
+
+use super::csv::{CsvFile, number, numbers};
+use crate::{
+    effect::Energy,
+    error::Result,
+    stepping::StepOutcome,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const HEADER: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
+kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
+energy_imbalance,numerical_dissipation";
+
+/// What adds up over the steps of a run; saved in checkpoints.
+///
+/// Dissipations and work are totals since time 0 in J (J/m in the plane).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Totals {
+    /// Kinetic energy now.
+    pub kinetic_energy: f64,
+    /// Elastic energy now.
+    pub elastic_energy: f64,
+    /// Dissipated by viscosity.
+    pub viscous_dissipation: f64,
+    /// Dissipated by viscoplastic flow.
+    pub viscoplastic_dissipation: f64,
+    /// Dissipated by contact.
+    pub contact_dissipation: f64,
+    /// Work of the loads.
+    pub external_work: f64,
+    /// Dissipated by the scheme: what the exact terms of its time discretisation took out.
+    pub numerical_dissipation: f64,
+    /// Largest amount of energy seen in any of these, the scale of the imbalance.
+    pub turnover: f64,
+    /// Imbalance of the last step over the turnover.
+    pub energy_imbalance: f64,
+    /// Largest imbalance of any step.
+    pub max_energy_imbalance: f64,
+    /// Largest inclusion residual of any step.
+    pub max_inclusion_residual: f64,
+    /// Newton iterations.
+    pub newton_iterations: u64,
+    /// Linear iterations.
+    pub linear_iterations: u64,
+}
+
+impl Totals {
+    /// At time 0, with the energy of the initial state.
+    pub fn at_start(energy: Energy) -> Self {
+        let (kinetic_energy, elastic_energy) = (energy.kinetic, energy.elastic);
+        Self { kinetic_energy, elastic_energy, turnover: kinetic_energy + elastic_energy, ..Self::default() }
+    }
+
+    /// Takes a step in.
+    pub fn add(&mut self, outcome: &StepOutcome) {
+        let energy = &outcome.energy;
+        let stored = energy.kinetic - self.kinetic_energy + energy.elastic - self.elastic_energy;
+        let released = energy.viscous + energy.viscoplastic + energy.contact;
+        let open = stored + released - energy.work - energy.numerical;
+        self.kinetic_energy = energy.kinetic;
+        self.elastic_energy = energy.elastic;
+        self.viscous_dissipation += energy.viscous;
+        self.viscoplastic_dissipation += energy.viscoplastic;
+        self.contact_dissipation += energy.contact;
+        self.external_work += energy.work;
+        self.numerical_dissipation -= energy.numerical;
+        let sizes = [
+            self.kinetic_energy,
+            self.elastic_energy,
+            self.viscous_dissipation,
+            self.viscoplastic_dissipation,
+            self.contact_dissipation,
+            self.external_work,
+        ];
+        self.turnover = sizes.iter().fold(self.turnover, |m, s| m.max(s.abs()));
+        self.energy_imbalance = if self.turnover > 0.0 { open.abs() / self.turnover } else { 0.0 };
+        self.max_energy_imbalance = self.max_energy_imbalance.max(self.energy_imbalance);
+        self.max_inclusion_residual = self.max_inclusion_residual.max(outcome.inclusion_residual);
+        self.newton_iterations += outcome.newton_iterations as u64;
+        self.linear_iterations += outcome.linear_iterations as u64;
+    }
+}
+
+/// The file, on rank 0.
+#[derive(Debug)]
+pub struct History(CsvFile);
+
+impl History {
+    /// Starts the file, or goes on with it behind this step.
+    pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
+        let path = folder.join("history.csv");
+        Ok(Self(match goes_on_after {
+            Some(step) => CsvFile::resume(&path, HEADER, step as f64)?,
+            None => CsvFile::create(&path, HEADER)?,
+        }))
+    }
+
+    /// Writes the row of a step.
+    pub fn row(&mut self, step: u64, time: f64, length: f64, outcome: &StepOutcome, totals: &Totals) -> Result<()> {
+        self.0.row(format_args!(
+            "{step},{},{},{},{},{},{},{}",
+            number(time),
+            number(length),
+            outcome.newton_iterations,
+            outcome.linear_iterations,
+            outcome.active_changes,
+            number(outcome.inclusion_residual),
+            numbers(&[
+                totals.kinetic_energy,
+                totals.elastic_energy,
+                totals.viscous_dissipation,
+                totals.viscoplastic_dissipation,
+                totals.contact_dissipation,
+                totals.external_work,
+                totals.energy_imbalance,
+                totals.numerical_dissipation,
+            ])
+        ))
+    }
+
+    /// Brings all rows to the file.
+    pub fn flush(&mut self) -> Result<()> {
+        self.0.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {
+        let energy = Energy { kinetic: 1.0, elastic: 2.0, viscous: 3.0, work: 6.5, numerical: -0.5, ..Energy::default() };
+        let mut totals = Totals::default();
+        totals.add(&StepOutcome { energy, ..StepOutcome::default() });
+        assert_eq!(totals.energy_imbalance, 0.0);
+        let mut wrong = Totals::default();
+        wrong.add(&StepOutcome { energy: Energy { work: -6.5, ..energy }, ..StepOutcome::default() });
+        assert_eq!(wrong.energy_imbalance, 2.0);
+    }
+}

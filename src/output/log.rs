@@ -1,0 +1,101 @@
+//! The log: what the terminal shows, and the same without control characters in `run.log`.
+
+use crate::error::{Error, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{
+    fs::{File, OpenOptions},
+    io::{IsTerminal, Write},
+    path::Path,
+};
+
+/// Writes lines on rank 0 and nothing elsewhere.
+#[derive(Debug)]
+pub struct Log {
+    speaks: bool,
+    file: Option<File>,
+    bar: Option<ProgressBar>,
+}
+
+impl Log {
+    /// A log that speaks on rank 0 only and has no file yet.
+    pub fn new(speaks: bool) -> Self {
+        Self { speaks, file: None, bar: None }
+    }
+
+    /// Also writes to this file, behind what it holds if the run goes on.
+    pub fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
+        if self.speaks {
+            let mut options = OpenOptions::new();
+            options.create(true);
+            if goes_on { options.append(true) } else { options.write(true).truncate(true) };
+            self.file = Some(options.open(path).map_err(|e| Error::unwritable(path, e))?);
+        }
+        Ok(())
+    }
+
+    /// Writes lines.
+    pub fn line(&mut self, words: impl AsRef<str>) {
+        if !self.speaks {
+            return;
+        }
+        match &self.bar {
+            Some(bar) => bar.suspend(|| print_line(words.as_ref())),
+            None => print_line(words.as_ref()),
+        }
+        self.file_line(words.as_ref());
+    }
+
+    /// Writes lines to the file and, where no progress bar moves, to the terminal.
+    pub fn quiet_line(&mut self, words: impl AsRef<str>) {
+        if self.speaks {
+            if self.bar.is_none() {
+                print_line(words.as_ref());
+            }
+            self.file_line(words.as_ref());
+        }
+    }
+
+    fn file_line(&mut self, words: &str) {
+        if let Some(file) = &mut self.file {
+            // A log that can't be written must not end a run whose results can.
+            let _ = writeln!(file, "{words}");
+        }
+    }
+
+    /// Shows a progress bar if the output is a terminal.
+    pub fn start_progress(&mut self, steps: u64, taken: u64) {
+        if self.speaks && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
+            let bar = ProgressBar::new(steps);
+            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_position(taken);
+            bar.reset_eta();
+            self.bar = Some(bar);
+        }
+    }
+
+    /// Whether a progress bar is shown.
+    pub fn has_bar(&self) -> bool {
+        self.bar.is_some()
+    }
+
+    /// Moves the progress bar.
+    pub fn progress(&self, taken: u64, words: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_position(taken);
+            bar.set_message(words.to_owned());
+        }
+    }
+
+    /// Removes the progress bar.
+    pub fn end_progress(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Prints a line; a closed pipe is no reason to stop.
+fn print_line(words: &str) {
+    let _ = writeln!(std::io::stdout(), "{words}");
+}
