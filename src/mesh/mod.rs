@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod generate;
+pub mod gmsh;
 mod hanging;
 mod lookup;
 pub mod rigid;
