@@ -3,6 +3,7 @@
 pub mod check;
 mod distributed;
 pub mod generate;
+pub mod gmsh;
 mod hanging;
 mod lookup;
 pub mod partition;

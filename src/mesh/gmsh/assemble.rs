@@ -1,0 +1,297 @@
+//! From the sections of a file to a mesh.
+
+use super::document::{Block, Document};
+use crate::error::{Error, Result};
+use crate::mesh::surface::{Topology, sorted};
+use crate::mesh::tags::{Tags, place};
+use crate::mesh::{Boundary, GlobalMesh, check, shape};
+use crate::tensor::Vector;
+use std::collections::BTreeMap;
+
+/// In place of an id: a node without a cell.
+const UNUSED: u32 = u32::MAX;
+
+/// More boundaries on one entity than anybody needs; each repeats the entity's facets in memory.
+const MOST_GROUPS: usize = 64;
+
+/// The mesh of the document's cells of dimension `D`, validated.
+pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh<D>> {
+    let positions = Positions::new(&document.node_tags)?;
+    let mut mesh = GlobalMesh::<D>::default();
+    let mut tags = Tags::default();
+    let mut ids = vec![UNUSED; document.points.len()];
+    for block in blocks(document, D + 1) {
+        for (element, nodes) in block.elements() {
+            for &tag in nodes {
+                let position = positions.find(tag, element)?;
+                mesh.cells.push(position);
+                ids[position as usize] = 0;
+            }
+        }
+        tags.cells.extend(&block.tags);
+    }
+    for (position, id) in ids.iter_mut().enumerate().filter(|(_, id)| **id != UNUSED) {
+        *id = mesh.nodes.len() as u32;
+        mesh.nodes.push(std::array::from_fn(|i| document.points[position][i]));
+        tags.nodes.push(document.node_tags[position]);
+    }
+    if D == 2 {
+        let used = |(position, _): &(usize, &[f64; 3])| ids[*position] != UNUSED;
+        let points = document.points.iter().enumerate().filter(used);
+        flat(points.map(|(position, point)| (document.node_tags[position], point)))?;
+    }
+    mesh.cells.iter_mut().for_each(|node| *node = ids[*node as usize]);
+    name_regions(&mut mesh, document)?;
+    reorient(&mut mesh, document);
+    check::cells(&mesh, &tags)?;
+    let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &tags)?;
+    (mesh.facets, mesh.facet_cells) = topology.outer_facets(&mesh.cells);
+    drop(topology);
+    name_boundaries(&mut mesh, document, |tag, element| Ok(ids[positions.find(tag, element)? as usize]))?;
+    check::nodes(&mesh, &tags)?;
+    Ok(mesh)
+}
+
+fn blocks(document: &Document, nodes_per_element: usize) -> impl Iterator<Item = &Block> {
+    document.blocks.iter().filter(move |block| block.nodes_per_element == nodes_per_element)
+}
+
+impl Block {
+    /// The tag and the node tags of each element.
+    fn elements(&self) -> impl Iterator<Item = (u64, &[u64])> {
+        self.tags.iter().copied().zip(self.nodes.chunks_exact(self.nodes_per_element))
+    }
+}
+
+/// Where the node with a tag stands in the file.
+enum Positions {
+    /// By tag, from the smallest on; for tags without large holes.
+    Dense { smallest: u64, positions: Vec<u32> },
+    /// In ascending order of tags.
+    Sparse(Vec<(u64, u32)>),
+}
+
+impl Positions {
+    fn new(tags: &[u64]) -> Result<Self> {
+        if tags.len() > i32::MAX as usize {
+            return Err(Error::Refused(format!(
+                "{} nodes: ids are 32-bit, at most {} fit",
+                tags.len(),
+                i32::MAX
+            )));
+        }
+        let twice = |tag| Err(Error::Refused(format!("section $Nodes: two nodes have the tag {tag}")));
+        let smallest = tags.iter().copied().min().unwrap_or(0);
+        let span = tags.iter().copied().max().unwrap_or(0) - smallest;
+        if span < 4 * tags.len() as u64 + 1024 {
+            let mut positions = vec![UNUSED; span as usize + 1];
+            for (position, &tag) in tags.iter().enumerate() {
+                if std::mem::replace(&mut positions[(tag - smallest) as usize], position as u32) != UNUSED {
+                    return twice(tag);
+                }
+            }
+            return Ok(Self::Dense { smallest, positions });
+        }
+        let mut sparse: Vec<(u64, u32)> = tags.iter().copied().zip(0..).collect();
+        sparse.sort_unstable();
+        match sparse.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some(pair) => twice(pair[0].0),
+            None => Ok(Self::Sparse(sparse)),
+        }
+    }
+
+    #[inline]
+    fn find(&self, tag: u64, element: u64) -> Result<u32> {
+        let found = match self {
+            Self::Dense { smallest, positions } => tag
+                .checked_sub(*smallest)
+                .and_then(|offset| positions.get(usize::try_from(offset).ok()?).copied())
+                .filter(|&position| position != UNUSED),
+            Self::Sparse(sparse) => {
+                sparse.binary_search_by_key(&tag, |entry| entry.0).ok().map(|at| sparse[at].1)
+            }
+        };
+        found.ok_or_else(|| {
+            Error::Refused(format!(
+                "section $Elements: element {element} has the node {tag}, which $Nodes does not hold"
+            ))
+        })
+    }
+}
+
+/// Refuses nodes that do not lie in one plane of constant z.
+fn flat<'a>(points: impl Iterator<Item = (u64, &'a [f64; 3])>) -> Result<()> {
+    let mut extent = 0f64;
+    let mut lowest: Option<(f64, u64)> = None;
+    let mut highest: Option<(f64, u64)> = None;
+    for (tag, point) in points {
+        extent = extent.max(point[0].abs()).max(point[1].abs());
+        if lowest.is_none_or(|(z, _)| point[2] < z) {
+            lowest = Some((point[2], tag));
+        }
+        if highest.is_none_or(|(z, _)| point[2] > z) {
+            highest = Some((point[2], tag));
+        }
+    }
+    match (lowest, highest) {
+        (Some((low, a)), Some((high, b))) if high - low > 1e-12 * extent || !(high - low).is_finite() => {
+            Err(Error::Refused(format!(
+                "a mesh of triangles must lie in a plane of constant z, but node {a} has z = {low} and node {b} has \
+                 z = {high}. Mesh the volume, or flatten the surface"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The name of a physical group: its number where it has none.
+fn name(document: &Document, dimension: usize, group: u32) -> String {
+    document.names.get(&(dimension, group)).cloned().unwrap_or_else(|| group.to_string())
+}
+
+/// The distinct names of an entity's groups.
+fn group_names(document: &Document, dimension: usize, entity: i32) -> Vec<String> {
+    let groups = document.groups.get(&(dimension, entity)).map_or(&[][..], Vec::as_slice);
+    let mut names: Vec<String> = groups.iter().map(|&group| name(document, dimension, group)).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+fn name_regions<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -> Result<()> {
+    let entity_kind = if D == 2 { "surface" } else { "volume" };
+    let blocks: Vec<&Block> = blocks(document, D + 1).filter(|block| !block.tags.is_empty()).collect();
+    let mut used: Vec<(u32, i32)> = Vec::new();
+    for block in &blocks {
+        let groups = document.groups.get(&(D, block.entity)).into_iter().flatten();
+        used.extend(groups.map(|&group| (group, block.entity)));
+    }
+    if used.is_empty() {
+        mesh.regions = vec!["body".into()];
+        mesh.cell_regions = vec![0; mesh.cell_count()];
+        return Ok(());
+    }
+    used.sort_unstable();
+    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+    for (group, _) in used {
+        let name = name(document, D, group);
+        if !numbers.contains_key(&name) {
+            numbers.insert(name.clone(), mesh.regions.len());
+            mesh.regions.push(name);
+        }
+    }
+    if mesh.regions.len() > u16::MAX as usize {
+        return Err(Error::Refused(format!(
+            "{} regions: at most {} are possible",
+            mesh.regions.len(),
+            u16::MAX
+        )));
+    }
+    for block in blocks {
+        let names = group_names(document, D, block.entity);
+        let [name] = &names[..] else {
+            return Err(Error::Refused(match names.len() {
+                0 => format!(
+                    "{entity_kind} {} has cells but no physical group, while others have one: put it into a physical \
+                     group, so that it gets a material",
+                    block.entity
+                ),
+                _ => format!(
+                    "{entity_kind} {} belongs to the regions {}: a cell has one material, keep one of these physical \
+                     groups",
+                    block.entity,
+                    names.join(" and ")
+                ),
+            }));
+        };
+        let region = numbers[name] as u16;
+        mesh.cell_regions.extend(std::iter::repeat_n(region, block.tags.len()));
+    }
+    Ok(())
+}
+
+/// Turns the cells of an entity round if all of them are negatively oriented: its normal points the other way.
+fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) {
+    let mut first = 0;
+    for block in blocks(document, D + 1) {
+        let cells = first..first + block.tags.len();
+        first = cells.end;
+        if cells.clone().all(|cell| mesh.measure(cell) < 0.0) {
+            mesh.cells[cells.start * (D + 1)..cells.end * (D + 1)]
+                .chunks_exact_mut(D + 1)
+                .for_each(|cell| cell.swap(D - 1, D));
+        }
+    }
+}
+
+/// Finds the facets of each physical group of dimension `D - 1` on the surface. `id` is a node's id by its tag.
+fn name_boundaries<const D: usize>(
+    mesh: &mut GlobalMesh<D>,
+    document: &Document,
+    id: impl Fn(u64, u64) -> Result<u32>,
+) -> Result<()> {
+    let mut surface: Vec<([u32; D], u32)> =
+        mesh.facets.iter().zip(0..).map(|(&facet, position)| (sorted(facet).0, position)).collect();
+    surface.sort_unstable();
+    // Boundaries stand in the order of their groups' numbers.
+    let mut boundaries: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for block in blocks(document, D) {
+        let groups = document.groups.get(&(D - 1, block.entity)).map_or(&[][..], Vec::as_slice);
+        if groups.is_empty() {
+            continue;
+        }
+        if groups.len() > MOST_GROUPS {
+            return Err(Error::Refused(format!(
+                "entity {} belongs to {} physical groups: at most {MOST_GROUPS} boundaries can share a facet",
+                block.entity,
+                groups.len()
+            )));
+        }
+        let mut facets = Vec::with_capacity(block.tags.len());
+        for (element, nodes) in block.elements() {
+            let mut facet = [0; D];
+            for (node, &tag) in facet.iter_mut().zip(nodes) {
+                *node = id(tag, element)?;
+            }
+            let facet = sorted(facet).0;
+            match surface.binary_search_by_key(&facet, |entry| entry.0) {
+                Ok(at) => facets.push(surface[at].1),
+                Err(_) => return Err(not_outer(mesh, element, &facet, &name(document, D - 1, groups[0]))),
+            }
+        }
+        for &group in groups {
+            boundaries.entry(group).or_default().extend(&facets);
+        }
+    }
+    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+    for (group, facets) in boundaries {
+        let name = name(document, D - 1, group);
+        let number = *numbers.entry(name.clone()).or_insert(mesh.boundaries.len());
+        match mesh.boundaries.get_mut(number) {
+            Some(boundary) => boundary.facets.extend(facets),
+            None => mesh.boundaries.push(Boundary { name, facets }),
+        }
+    }
+    for boundary in &mut mesh.boundaries {
+        boundary.facets.sort_unstable();
+        boundary.facets.dedup();
+    }
+    Ok(())
+}
+
+fn not_outer<const D: usize>(mesh: &GlobalMesh<D>, element: u64, facet: &[u32; D], name: &str) -> Error {
+    let kind = if D == 2 { "line" } else { "triangle" };
+    let inside = mesh.cells.chunks_exact(D + 1).any(|cell| facet.iter().all(|node| cell.contains(node)));
+    if !inside {
+        return Error::Refused(format!(
+            "element {element}, a {kind} of the boundary `{name}`, is not a facet of any cell: mesh the body and its \
+             boundary together"
+        ));
+    }
+    let corners: Vec<Vector<D>> = facet.iter().map(|&node| mesh.nodes[node as usize]).collect();
+    Error::Refused(format!(
+        "element {element}, a {kind} of the boundary `{name}`, lies inside the body around {}: a boundary is made of \
+         facets with a cell on one side only. Take it out of the physical group",
+        place(&shape::centroid(&corners))
+    ))
+}

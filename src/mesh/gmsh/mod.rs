@@ -1,0 +1,54 @@
+//! Gmsh MSH 4.1 files, ASCII and binary: linear triangles in the plane or tetrahedra in space.
+//!
+//! Physical groups of the cells' dimension name regions, those one dimension below name boundaries. The reader is our
+//! own because the one crate for this format, mshio, leaves out the names of physical groups and can panic on damaged
+//! files; here no count in a file is believed before the bytes behind it are there.
+
+mod assemble;
+mod cursor;
+mod document;
+
+use super::GlobalMesh;
+use crate::error::{Error, Result};
+use document::Document;
+use std::path::Path;
+
+/// A mesh of whichever dimension its file has.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyMesh {
+    /// Triangles in a plane of constant z.
+    Two(GlobalMesh<2>),
+    /// Tetrahedra.
+    Three(GlobalMesh<3>),
+}
+
+/// Reads and validates a mesh; messages begin with the file's path.
+///
+/// Tetrahedra make a mesh of space, otherwise triangles one of the plane. Entities whose cells all run the other way
+/// round are reoriented; nodes without a cell are dropped.
+pub fn read(path: &Path) -> Result<AnyMesh> {
+    let bytes = std::fs::read(path).map_err(|error| Error::unreadable(path, error))?;
+    parse(&bytes).map_err(|error| Error::Refused(format!("{}: {error}", path.display())))
+}
+
+/// Reads and validates a mesh from the bytes of an MSH 4.1 file, as [`read`] does.
+pub fn parse(bytes: &[u8]) -> Result<AnyMesh> {
+    let document = Document::parse(bytes)?;
+    let has = |nodes| {
+        document.blocks.iter().any(|block| block.nodes_per_element == nodes && !block.tags.is_empty())
+    };
+    if has(4) {
+        assemble::assemble(&document).map(AnyMesh::Three)
+    } else if has(3) {
+        assemble::assemble(&document).map(AnyMesh::Two)
+    } else {
+        Err(Error::Refused(
+            "no triangles and no tetrahedra in the file: mesh the surface or volume, and put it into a physical group \
+             or set Mesh.SaveAll = 1 so that its elements are saved"
+                .into(),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,5 @@
+use super::*;
+
+mod files;
+mod refusals;
+mod samples;

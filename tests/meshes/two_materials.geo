@@ -1,0 +1,22 @@
+// A unit square of two halves, the right one with its normal turned round. Saved as ASCII and as binary.
+Point(1) = {0, 0, 2.5, 0.4};
+Point(2) = {0.5, 0, 2.5, 0.4};
+Point(3) = {1, 0, 2.5, 0.4};
+Point(4) = {1, 1, 2.5, 0.4};
+Point(5) = {0.5, 1, 2.5, 0.4};
+Point(6) = {0, 1, 2.5, 0.4};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 4};
+Line(4) = {4, 5};
+Line(5) = {5, 6};
+Line(6) = {6, 1};
+Line(7) = {2, 5};
+Curve Loop(1) = {1, 7, 5, 6};
+Curve Loop(2) = {-4, -3, -2, 7};
+Plane Surface(1) = {1};
+Plane Surface(2) = {2};
+Physical Curve("bottom edge", 10) = {1, 2};
+Physical Curve(20) = {6};
+Physical Surface("soft", 1) = {1};
+Physical Surface("hard", 2) = {2};
