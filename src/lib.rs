@@ -18,4 +18,5 @@ pub mod effect;
 pub mod body;
 pub mod stepping;
 pub mod output;
+pub mod run;
 pub mod cli;

@@ -108,6 +108,14 @@ impl Session<'_> {
         }
     }
 
+    /// Like [`Session::agree`] for a step that fails alike on all ranks: only rank 0 keeps the words.
+    pub fn agree_quietly<T>(&self, result: Result<T>) -> Result<T> {
+        self.agree(result).map_err(|error| match error {
+            error if self.is_first() => error,
+            error => Error::Elsewhere { rank: 0, exit: error.exit(), message: error.to_string() },
+        })
+    }
+
     /// Sum over all ranks of each entry. Collective.
     pub fn sum<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
         self.reduce(mine, SystemOperation::sum())

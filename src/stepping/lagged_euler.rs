@@ -52,6 +52,8 @@ pub struct StepClock {
     pub balance: Duration,
     /// Matrix assembly and preconditioner, whenever the step length changes.
     pub assembly: Duration,
+    /// The part of `assembly` before the first step.
+    pub first_assembly: Duration,
 }
 
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
@@ -111,6 +113,16 @@ impl LaggedEuler {
         })
     }
 
+    /// Whether steps are solved by Newton's method.
+    pub fn is_nonlinear(&self) -> bool {
+        matches!(self.solver, Solver::Newton { .. })
+    }
+
+    /// Whether a vector of nodal loads exists.
+    pub fn has_load(&self) -> bool {
+        self.load.is_some()
+    }
+
     /// The preconditioner in use.
     pub fn preconditioner(&self) -> Preconditioner {
         self.settings.preconditioner
@@ -143,6 +155,9 @@ impl LaggedEuler {
         session.agree(ksp.set_up())?;
         self.matrix = Some((length, matrix));
         self.clock.assembly += start.elapsed();
+        if self.clock.first_assembly.is_zero() {
+            self.clock.first_assembly = self.clock.assembly;
+        }
         Ok(())
     }
 

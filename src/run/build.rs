@@ -1,0 +1,182 @@
+//! From the job's tables to a body: a table that is absent leaves nothing behind.
+
+use crate::{
+    body::Body,
+    contact::{DampedResponse, Graph, Symmetry},
+    effect::{
+        BodyForce, Contact, Effect, ElasticStress, Held, Inertia, Load, Quadrature, Support, Traction,
+        ViscoplasticHistory, ViscousStress, fixed_components,
+    },
+    error::{Error, Result},
+    job::{self, Fix, Job, Named, NormalLaw, Viscoplasticity},
+    material::{Elasticity, Hypothesis, Isotropic, Metric, Perzyna},
+    mesh::Mesh,
+    session::Session,
+    space::Geometry,
+    state::State,
+    stepping::{Preconditioner, SolverSettings},
+    tensor::Vector,
+};
+
+/// Builds the body of a job on this rank's mesh. Collective.
+pub(super) fn body<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: Mesh<D>,
+) -> Result<(Body<D, S>, State)> {
+    let geometry = Geometry::new(&mesh);
+    let mut state = session.agree(State::at_rest(&mesh))?;
+    let supports = supports(job, &mesh);
+    let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
+    let effects = effects(job, mesh.cell_count())?;
+    let load = load(job, &mesh);
+    let mut contacts = Vec::new();
+    for contact in &job.contact {
+        let facets = facets(&mesh, &contact.on);
+        let quadrature = match contact.quadrature {
+            job::Quadrature::Nodal => Quadrature::Nodal,
+            job::Quadrature::Gauss => Quadrature::Gauss,
+        };
+        let graph = session.agree(graph(&contact.normal))?;
+        contacts.push(Contact::new(session, &mesh, &facets, quadrature, graph, &fixed));
+    }
+    session.agree(initial(job, &mesh, &fixed, &mut state))?;
+    state.displacement.update_ghosts()?;
+    state.velocity.update_ghosts()?;
+    Ok((Body { mesh, geometry, effects, contacts, load, fixed }, state))
+}
+
+/// What the stresses of this many components stand for.
+fn hypothesis(components: usize) -> Hypothesis {
+    match components {
+        3 => Hypothesis::PlaneStress,
+        4 => Hypothesis::PlaneStrain,
+        _ => Hypothesis::Space,
+    }
+}
+
+fn effects<const D: usize, const S: usize>(job: &Job, cells: usize) -> Result<Vec<Box<dyn Effect<D, S>>>> {
+    let material = &job.material;
+    let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
+    if let Some(density) = material.density {
+        effects.push(Box::new(Inertia { density }));
+    }
+    let elasticity = material.elasticity.as_ref().map(|e| {
+        let law = Elasticity { youngs_modulus: e.youngs_modulus, poisson_ratio: e.poisson_ratio };
+        law.tensor(hypothesis(S))
+    });
+    if let Some(tensor) = elasticity {
+        effects.push(Box::new(ElasticStress { tensor, with_history: material.viscoplasticity.is_some() }));
+    }
+    if let Some(v) = &material.viscosity {
+        let tensor = Isotropic { volumetric: v.volumetric, shear: v.shear };
+        effects.push(Box::new(ViscousStress { tensor }));
+    }
+    if let Some(Viscoplasticity::Perzyna(p)) = &material.viscoplasticity {
+        let Some(elasticity) = elasticity else {
+            return Err(Error::Refused("[material.viscoplasticity] needs [material.elasticity]".into()));
+        };
+        let metric = match p.metric {
+            job::Metric::Elasticity => Metric::Elasticity,
+            job::Metric::Compliance => Metric::Compliance,
+            job::Metric::Frobenius => Metric::Frobenius,
+        };
+        let law = Perzyna { relaxation: p.relaxation, yield_stress: p.yield_stress, elasticity, metric };
+        effects.push(Box::new(ViscoplasticHistory::<S>::new(law, cells)));
+    }
+    Ok(effects)
+}
+
+/// The law of a contact as a graph.
+pub(super) fn graph(law: &NormalLaw) -> Result<Graph> {
+    match law {
+        NormalLaw::DampedResponse(d) => {
+            let symmetry = match d.symmetry {
+                job::Symmetry::Even => Symmetry::Even,
+                job::Symmetry::Odd => Symmetry::Odd,
+                job::Symmetry::OneSided => Symmetry::OneSided,
+            };
+            DampedResponse { breakpoints: d.breakpoints.clone(), slopes: d.slopes.clone(), symmetry }.graph()
+        }
+        NormalLaw::Graph(g) => Graph::new(g.points.clone(), g.slope_before, g.slope_after),
+        NormalLaw::Compliance(_) | NormalLaw::Unilateral(_) => {
+            Err(Error::Refused("this contact law is not available yet".into()))
+        }
+    }
+}
+
+fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
+    let mut all: Vec<u32> =
+        names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+fn supports<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Vec<Support> {
+    let mut out = Vec::new();
+    for support in &job.support {
+        let held = match &support.fix {
+            Fix::Named(Named::All) => Held::All,
+            Fix::Named(Named::Normal) => Held::Normal,
+            Fix::Axes(axes) => Held::Axes(axes.iter().map(|a| a.index()).collect()),
+        };
+        out.extend(support.on.iter().map(|name| Support {
+            name: name.clone(),
+            facets: facets(mesh, std::slice::from_ref(name)),
+            held: held.clone(),
+        }));
+    }
+    out
+}
+
+fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {
+    let traction = |t: &job::Traction| Traction { facets: facets(mesh, &t.on), value: t.value.clone() };
+    Load {
+        tractions: job.traction.iter().map(traction).collect(),
+        body_forces: job.body_force.iter().map(|b| BodyForce { value: b.value.clone() }).collect(),
+    }
+}
+
+/// Sets the initial values at owned nodes; held components keep the displacement and have no velocity.
+fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mut State) -> Result<()> {
+    let Some(initial) = &job.initial else { return Ok(()) };
+    let fields = [
+        (&initial.displacement, &mut state.displacement, "initial.displacement"),
+        (&initial.velocity, &mut state.velocity, "initial.velocity"),
+    ];
+    for (value, field, what) in fields {
+        let Some(value) = value else { continue };
+        let mut nodal = field.owned_mut()?;
+        for (node, target) in nodal.chunks_exact_mut(D).enumerate() {
+            let point: Vector<D> = mesh.nodes[node];
+            for (i, (target, component)) in target.iter_mut().zip(value).enumerate() {
+                let number = component.evaluate(0.0, &point);
+                if !number.is_finite() {
+                    return Err(Error::Refused(format!(
+                        "{what}: component {} is {number} at {point:?} m; correct the expression",
+                        ["x", "y", "z"][i]
+                    )));
+                }
+                *target = number;
+            }
+        }
+    }
+    let mut velocity = state.velocity.owned_mut()?;
+    velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
+    Ok(())
+}
+
+/// The job's wishes for the solver.
+pub(super) fn settings(job: &Job) -> SolverSettings {
+    SolverSettings {
+        tolerance: job.solver.tolerance,
+        preconditioner: match job.solver.preconditioner {
+            job::Preconditioner::Auto => Preconditioner::Auto,
+            job::Preconditioner::Cholesky => Preconditioner::Cholesky,
+            job::Preconditioner::Gamg => Preconditioner::Gamg,
+            job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
+        },
+        newton_iterations: job.solver.max_newton_iterations as usize,
+    }
+}

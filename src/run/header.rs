@@ -1,0 +1,75 @@
+//! What the log says before the first and after the last step.
+
+use super::Summary;
+use crate::{
+    body::Body,
+    error::Result,
+    job::Loaded,
+    output::log::Log,
+    session::Session,
+    stepping::LaggedEuler,
+};
+use std::path::Path;
+
+/// Title, versions, mesh, partition, effects, solver, warnings. Collective.
+pub(super) fn write<const D: usize, const S: usize>(
+    session: &Session,
+    log: &mut Log,
+    loaded: &Loaded,
+    body: &Body<D, S>,
+    scheme: &LaggedEuler,
+) -> Result<()> {
+    let (job, mesh) = (&loaded.job, &body.mesh);
+    log.line(format!("Clarke {}, PETSc {}, {} ranks", super::VERSION, session.petsc().version()?, session.ranks()));
+    if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
+        log.line(format!("job        {title}"));
+    }
+    let kind = if D == 2 { "triangles" } else { "tetrahedra" };
+    log.line(format!(
+        "mesh       {} {kind}, {} nodes, {} velocity components",
+        mesh.total_cells,
+        mesh.total_nodes,
+        mesh.total_nodes * D
+    ));
+    log.line(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
+    log.line(format!("effects    {}", body.effect_names().join(", ")));
+    log.line(format!(
+        "scheme     lagged_euler, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        job.time.step,
+        job.time.end,
+        if scheme.is_nonlinear() { "Newton with line search" } else { "one linear solve a step" },
+        scheme.preconditioner().name(),
+        job.solver.tolerance
+    ));
+    log.line(format!("output     {}", job.output_folder().display()));
+    for warning in &loaded.warnings {
+        log.line(format!("warning: {warning}"));
+    }
+    Ok(())
+}
+
+/// Status, sums, times.
+pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
+    if let Some(error) = &summary.error {
+        log.line(format!("error: {error}"));
+    }
+    log.line(format!(
+        "{}     {} steps to t = {} s, {} Newton and {} linear iterations",
+        summary.status, summary.steps, summary.time, summary.newton_iterations, summary.linear_iterations
+    ));
+    log.line(format!(
+        "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}",
+        summary.max_inclusion_residual, summary.max_energy_imbalance, summary.max_von_mises
+    ));
+    let seconds: Vec<String> = summary
+        .wall_seconds
+        .iter()
+        .map(|(name, value)| format!("{name} {:.2}", value.as_f64().unwrap_or_default()))
+        .collect();
+    log.line(format!(
+        "seconds    {}; peak memory {:.0} MB",
+        seconds.join(", "),
+        summary.peak_memory_bytes as f64 / 1e6
+    ));
+    log.line(format!("files      {}", folder.display()));
+}

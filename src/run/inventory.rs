@@ -1,0 +1,36 @@
+//! What a run allocated for its effects, as facts a test can hold against the job.
+
+use crate::{body::Body, session::Session, stepping::LaggedEuler};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Sums over all ranks.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Inventory {
+    /// Bytes of each history that effects keep for the cells, trial values included.
+    pub history_bytes: BTreeMap<String, u64>,
+    /// Quadrature points of all contacts.
+    pub contact_points: u64,
+    /// Whether steps are nonlinear, so that Newton's method exists.
+    pub newton: bool,
+    /// Whether a vector of nodal loads exists.
+    pub load_vector: bool,
+}
+
+impl Inventory {
+    /// Counts. Collective.
+    pub fn of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, scheme: &LaggedEuler) -> Self {
+        let mut history_bytes = BTreeMap::new();
+        for history in body.effects.iter().filter_map(|e| e.history()) {
+            let bytes = session.total(2 * size_of_val(history.values));
+            history_bytes.insert(history.name.to_owned(), bytes as u64);
+        }
+        let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();
+        Self {
+            history_bytes,
+            contact_points: session.total(points) as u64,
+            newton: scheme.is_nonlinear(),
+            load_vector: scheme.has_load(),
+        }
+    }
+}

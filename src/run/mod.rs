@@ -1,0 +1,63 @@
+//! From a job to results: builds only what the job calls for, then takes the steps.
+
+mod build;
+mod header;
+mod inventory;
+mod outputs;
+mod scene;
+mod summary;
+mod time_loop;
+
+pub use inventory::Inventory;
+pub use scene::{Scene, whole_mesh};
+pub use summary::Summary;
+
+use crate::{
+    error::{Error, Exit, Result},
+    job::{self, Loaded},
+    session::Session,
+};
+use mpi::traits::Root;
+use mpi::topology::Communicator;
+use scene::AnyScene;
+use std::{path::PathBuf, time::Instant};
+
+/// Version of the solver with the id of its source.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
+
+/// Where a run starts from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Start {
+    /// The initial state.
+    Anew,
+    /// The newest good checkpoint of the output folder.
+    Newest,
+    /// This checkpoint.
+    From(PathBuf),
+}
+
+/// Runs a job to its end or to a request to stop. Collective.
+pub fn run(session: &Session, loaded: Loaded, start: &Start) -> Result<Exit> {
+    let began = Instant::now();
+    let mut loaded = loaded;
+    let scene = session.agree(scene::AnyScene::of(session, &mut loaded))?;
+    match (dimension(session, &scene), loaded.job.material.hypothesis) {
+        (2, Some(job::Hypothesis::PlaneStrain)) => {
+            time_loop::run::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), start, began)
+        }
+        (2, _) => time_loop::run::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), start, began),
+        (3, _) => time_loop::run::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), start, began),
+        (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
+    }
+}
+
+/// The dimension of the mesh, which rank 0 knows. Collective.
+fn dimension(session: &Session, scene: &Option<AnyScene>) -> usize {
+    let mut dimension = match scene {
+        Some(AnyScene::Two(_)) => 2,
+        Some(AnyScene::Three(_)) => 3,
+        None => 0,
+    };
+    session.world().process_at_rank(0).broadcast_into(&mut dimension);
+    dimension
+}

@@ -1,0 +1,210 @@
+//! All files of a run, opened for a start or to go on.
+
+use crate::{
+    body::Body,
+    error::{Error, Result},
+    job::{Every, Job},
+    mesh::Mesh,
+    output::{
+        checkpoint::{self, Identity},
+        checkpoint_folder::{checkpoint_path, list, prune},
+        field_output::FieldOutput,
+        history::{History, Totals},
+        log::Log,
+        probes::Probes,
+        profiles::Profiles,
+    },
+    session::Session,
+    state::State,
+    stepping::StepOutcome,
+    tensor::Vector,
+};
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// What a run writes while it steps.
+pub(super) struct Outputs<const D: usize> {
+    folder: PathBuf,
+    identity: Identity,
+    history: Option<History>,
+    probes: Probes<D>,
+    profiles: Profiles<D>,
+    fields: FieldOutput<D>,
+    every: Option<Every>,
+    keep: usize,
+    /// Time spent writing.
+    pub spent: Duration,
+}
+
+impl<const D: usize> Outputs<D> {
+    /// Finds probes and profiles and opens the files; behind the state's step if the run goes on. Collective.
+    pub fn open<const S: usize>(
+        session: &Session,
+        job: &Job,
+        identity: Identity,
+        body: &Body<D, S>,
+        state: &State,
+        goes_on: bool,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let folder = job.output_folder().to_owned();
+        let mut probes = probes(session, &body.mesh, job)?;
+        let mut profiles = profiles(session, body, job);
+        let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
+        let mut history = None;
+        let opened = if session.is_first() {
+            history_and_tables(&folder, job, step, time, &mut probes, &mut profiles).map(|h| history = Some(h))
+        } else {
+            Ok(())
+        };
+        session.agree(opened)?;
+        let fields = FieldOutput::open(session, &folder, body, time)?;
+        let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
+        let every = job.output.fields;
+        Ok(Self { folder, identity, history, probes, profiles, fields, every, keep, spent: start.elapsed() })
+    }
+
+    /// Writes what is due after a step. Collective.
+    pub fn after_step<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        outcome: &StepOutcome,
+        totals: &Totals,
+    ) -> Result<()> {
+        let start = Instant::now();
+        let mut written = Ok(());
+        if let Some(history) = &mut self.history {
+            written = history.row(state.step, state.time, state.step_length, outcome, totals);
+        }
+        session.agree(written)?;
+        if !self.probes.is_empty() {
+            session.agree(self.probes.write(session, &body.mesh, state))?;
+        }
+        if self.fields_due(state) {
+            self.write_fields(session, body, state)?;
+        }
+        self.spent += start.elapsed();
+        Ok(())
+    }
+
+    fn fields_due(&self, state: &State) -> bool {
+        match self.every {
+            None => false,
+            Some(Every::Every(steps)) => state.step % steps == 0,
+            Some(Every::Interval(interval)) => {
+                let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
+                count(state.time) > count(state.time - state.step_length)
+            }
+        }
+    }
+
+    /// Writes the initial state, where fields are wanted along the way. Collective.
+    pub fn at_start<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+        if self.every.is_some() { self.write_fields(session, body, state) } else { Ok(()) }
+    }
+
+    /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
+    pub fn at_end<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+        let start = Instant::now();
+        if self.fields.last_time().is_none_or(|time| time < state.time) {
+            self.write_fields(session, body, state)?;
+        }
+        session.agree(self.flush())?;
+        self.spent += start.elapsed();
+        Ok(())
+    }
+
+    fn write_fields<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+        let stress = session.agree(body.stress(state))?;
+        self.fields.write(body, state, &stress)?;
+        if !self.profiles.is_empty() {
+            session.agree(self.profiles.write(session, body, state, &stress))?;
+        }
+        Ok(())
+    }
+
+    /// Brings all rows to the files.
+    fn flush(&mut self) -> Result<()> {
+        self.history.as_mut().map_or(Ok(()), History::flush)?;
+        self.probes.flush()?;
+        self.profiles.flush()
+    }
+
+    /// Writes a checkpoint and removes the oldest. Collective.
+    pub fn checkpoint<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        totals: &Totals,
+    ) -> Result<PathBuf> {
+        let start = Instant::now();
+        session.agree(self.flush())?;
+        let path = checkpoint_path(&self.folder, state.step);
+        checkpoint::save(session, &path, &self.identity, body, state, totals)?;
+        let pruned = if session.is_first() { prune(&self.folder, self.keep) } else { Ok(()) };
+        session.agree(pruned)?;
+        self.spent += start.elapsed();
+        Ok(path)
+    }
+
+    /// Closes the field files. Collective.
+    pub fn close(self) -> Result<()> {
+        self.fields.close()
+    }
+}
+
+fn history_and_tables<const D: usize>(
+    folder: &Path,
+    job: &Job,
+    step: Option<u64>,
+    time: Option<f64>,
+    probes: &mut Probes<D>,
+    profiles: &mut Profiles<D>,
+) -> Result<History> {
+    let effective = folder.join("job.toml");
+    std::fs::write(&effective, job.to_toml()?).map_err(|e| Error::unwritable(&effective, e))?;
+    if !probes.is_empty() {
+        probes.open(folder, step)?;
+    }
+    if !profiles.is_empty() {
+        profiles.open(folder, time)?;
+    }
+    History::open(folder, step)
+}
+
+fn probes<const D: usize>(session: &Session, mesh: &Mesh<D>, job: &Job) -> Result<Probes<D>> {
+    let points: Vec<(String, Vector<D>)> = job
+        .output
+        .probe
+        .iter()
+        .map(|p| (p.name.clone(), std::array::from_fn(|i| p.point.get(i).copied().unwrap_or(0.0))))
+        .collect();
+    Probes::locate(session, mesh, &points)
+}
+
+fn profiles<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, job: &Job) -> Profiles<D> {
+    let along: Vec<(String, Option<usize>)> = job
+        .output
+        .profile
+        .iter()
+        .map(|p| (p.on.clone(), job.contact.iter().position(|c| c.on.contains(&p.on))))
+        .collect();
+    Profiles::new(session, body, &along)
+}
+
+/// Makes the output folder; a new start removes the checkpoints of an earlier run. On one rank.
+pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
+    if !goes_on {
+        for (_, path) in list(folder)? {
+            std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
+            log.line(format!("removed {} of an earlier run", path.display()));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! The whole mesh of a job, held against the job, and its partition: on rank 0 only.
+
+use crate::{
+    error::Result,
+    job::{self, Fix, Job, Loaded, MeshNames, Named},
+    mesh::{
+        GlobalMesh, Tags,
+        generate::{Diagonal, box_mesh, rectangle},
+        gmsh::{self, AnyMesh},
+        partition::{Partition, partition},
+        rigid::free_motions,
+        surface::Topology,
+    },
+    session::Session,
+};
+
+/// A mesh with its partition.
+pub struct Scene<const D: usize> {
+    /// The mesh.
+    pub mesh: GlobalMesh<D>,
+    /// Which rank gets what.
+    pub partition: Partition,
+}
+
+/// A scene of either dimension.
+pub(super) enum AnyScene {
+    Two(Scene<2>),
+    Three(Scene<3>),
+}
+
+impl AnyScene {
+    /// The scene on rank 0, nothing elsewhere; the job's warnings grow by those of the mesh.
+    pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Option<Self>> {
+        if !session.is_first() {
+            return Ok(None);
+        }
+        Ok(Some(match whole_mesh(&loaded.job)? {
+            AnyMesh::Two(mesh) => Self::Two(scene(mesh, loaded, session.ranks())?),
+            AnyMesh::Three(mesh) => Self::Three(scene(mesh, loaded, session.ranks())?),
+        }))
+    }
+
+    pub fn two(self) -> Option<Scene<2>> {
+        if let Self::Two(scene) = self { Some(scene) } else { None }
+    }
+
+    pub fn three(self) -> Option<Scene<3>> {
+        if let Self::Three(scene) = self { Some(scene) } else { None }
+    }
+}
+
+/// Generates or reads the mesh of a job.
+pub fn whole_mesh(job: &Job) -> Result<AnyMesh> {
+    match &job.mesh {
+        job::Mesh::Rectangle(r) => {
+            let diagonal = match r.diagonal {
+                job::Diagonal::Right => Diagonal::Right,
+                job::Diagonal::Left => Diagonal::Left,
+                job::Diagonal::Alternating => Diagonal::Alternating,
+                job::Diagonal::Crossed => Diagonal::Crossed,
+            };
+            let cells = r.cells.map(|n| n as usize);
+            rectangle(r.size, cells, diagonal, [r.grading.x, r.grading.y]).map(AnyMesh::Two)
+        }
+        job::Mesh::Box(b) => {
+            box_mesh(b.size, b.cells.map(|n| n as usize), [b.grading.x, b.grading.y, b.grading.z]).map(AnyMesh::Three)
+        }
+        job::Mesh::File(path) => gmsh::read(path),
+    }
+}
+
+/// Holds the mesh against the job and splits it.
+pub(super) fn scene<const D: usize>(mesh: GlobalMesh<D>, loaded: &mut Loaded, ranks: usize) -> Result<Scene<D>> {
+    let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
+    let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
+    loaded.check_mesh(MeshNames { dimension: D, boundaries: &boundaries, regions: &regions })?;
+    let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
+    let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
+    mesh.claimed_twice(&supports, &contacts)
+        .map_err(|e| loaded.fault("contact.0.on", e.to_string(), "give each facet to one of them"))?;
+    let quality = mesh.quality_summary();
+    if quality.poor > 0 {
+        loaded.warnings.push(format!(
+            "{} cells are badly shaped (the worst, cell {}, has quality {:.1e} of 1): expect slow linear solves and \
+             poor accuracy there; improve the mesh",
+            quality.poor, quality.worst_cell, quality.smallest
+        ));
+    }
+    let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
+    if loaded.job.material.density.is_none() {
+        refuse_free_bodies(&mesh, &topology, loaded)?;
+    }
+    let dual = topology.dual_graph();
+    drop(topology);
+    let partition = partition(&mesh, &dual, ranks)?;
+    Ok(Scene { mesh, partition })
+}
+
+fn refuse_free_bodies<const D: usize>(mesh: &GlobalMesh<D>, topology: &Topology<D>, loaded: &Loaded) -> Result<()> {
+    let mut fixed = vec![[false; D]; mesh.nodes.len()];
+    for support in &loaded.job.support {
+        for name in &support.on {
+            for &facet in &mesh.boundary(name)?.facets {
+                let nodes = mesh.facets[facet as usize];
+                let normal = crate::mesh::shape::facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+                for node in nodes {
+                    let held = &mut fixed[node as usize];
+                    match &support.fix {
+                        Fix::Named(Named::All) => *held = [true; D],
+                        Fix::Named(Named::Normal) => {
+                            let along = |a: &usize, b: &usize| normal[*a].abs().total_cmp(&normal[*b].abs());
+                            held[(0..D).max_by(along).unwrap_or(0)] = true;
+                        }
+                        Fix::Axes(axes) => axes.iter().for_each(|axis| held[axis.index()] = true),
+                    }
+                }
+            }
+        }
+    }
+    let free = free_motions(mesh, &topology.bodies(), &|node| fixed[node]);
+    if free.is_empty() {
+        return Ok(());
+    }
+    let key = if loaded.job.support.is_empty() { "material" } else { "support" };
+    Err(loaded.fault(
+        key,
+        format!("without [material] density the problem is quasistatic, and these motions are free: {}", free.join("; ")),
+        "add supports that hold them, or give a density",
+    ))
+}
+
+/// A fault if the scheme can't move the body at all.
+pub(super) fn refuse_empty_matrix(loaded: &Loaded) -> Result<()> {
+    let material = &loaded.job.material;
+    if material.density.is_none() && material.viscosity.is_none() {
+        return Err(loaded.fault(
+            "time.scheme",
+            "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity nothing \
+             determines the velocity",
+            "give [material] density or [material.viscosity]",
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,113 @@
+//! `summary.json`: what a run did, in one object.
+
+use super::{Inventory, VERSION};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use std::path::Path;
+
+/// The object; names are part of the contract.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// `completed`, `stopped` or `failed`.
+    pub status: &'static str,
+    /// What went wrong, if something did.
+    pub error: Option<String>,
+    /// Version of the solver with the id of its source.
+    pub version: &'static str,
+    /// Version of PETSc.
+    pub petsc_version: String,
+    /// Processes.
+    pub ranks: usize,
+    /// 2 or 3.
+    pub dimension: usize,
+    /// Cells of the mesh.
+    pub cells: usize,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Velocity components that are solved for.
+    pub unknowns: usize,
+    /// What was simulated.
+    pub effects: Vec<&'static str>,
+    /// Time scheme.
+    pub scheme: &'static str,
+    /// Preconditioner in use.
+    pub preconditioner: &'static str,
+    /// Steps since time 0.
+    pub steps: u64,
+    /// Time reached in s.
+    pub time: f64,
+    /// Steps taken back.
+    pub rejected_steps: u64,
+    /// Newton iterations since time 0.
+    pub newton_iterations: u64,
+    /// Linear iterations since time 0.
+    pub linear_iterations: u64,
+    /// The checkpoint this run went on from.
+    pub restarted_from: Option<String>,
+    /// Largest von Mises norm of sigma at the end, in Pa.
+    pub max_von_mises: f64,
+    /// Largest scaled distance to a contact graph in any step.
+    pub max_inclusion_residual: f64,
+    /// Largest imbalance of energy in any step over the energy turned over.
+    pub max_energy_imbalance: f64,
+    /// What is known about solvability and stability.
+    pub certificates: Certificates,
+    /// Seconds by phase, of the slowest rank.
+    pub wall_seconds: serde_json::Map<String, serde_json::Value>,
+    /// Largest memory of all ranks together, in bytes.
+    pub peak_memory_bytes: u64,
+    /// How the mesh was split.
+    pub partition: PartitionQuality,
+    /// What was allocated for the effects.
+    pub inventory: Inventory,
+}
+
+/// Constants of the problem; null where they are not available.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Certificates {
+    /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
+    pub theta: Option<f64>,
+    /// The same with the matrix of a step.
+    pub theta_step: Option<f64>,
+    /// `m_A` in Pa s.
+    pub viscosity_modulus: Option<f64>,
+    /// `m_j` in Pa s/m.
+    pub monotonicity_constant: Option<f64>,
+    /// `|gamma|^2` of the normal trace.
+    pub trace_norm_squared: Option<f64>,
+    /// Largest stable step in s.
+    pub explicit_step_bound: Option<f64>,
+}
+
+/// How the mesh was split.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PartitionQuality {
+    /// Facets between ranks.
+    pub edge_cut: usize,
+    /// Cells of the fullest rank over the average.
+    pub imbalance: f64,
+}
+
+impl Summary {
+    /// Writes the object to the folder, at once. On one rank.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let path = folder.join("summary.json");
+        let part = folder.join("summary.json.part");
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|e| Error::Internal(format!("the summary can't be written: {e}")))?;
+        std::fs::write(&part, text + "\n").map_err(|e| Error::unwritable(&part, e))?;
+        std::fs::rename(&part, &path).map_err(|e| Error::unwritable(&path, e))
+    }
+
+    /// The version, for use where the struct is filled.
+    pub fn version() -> &'static str {
+        VERSION
+    }
+}
+
+/// Largest resident memory of this process so far, in bytes.
+pub(super) fn peak_memory() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"));
+    line.and_then(|l| l.split_whitespace().nth(1)).and_then(|kib| kib.parse::<u64>().ok()).unwrap_or(0) * 1024
+}

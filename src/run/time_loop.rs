@@ -1,0 +1,319 @@
+//! The run itself: set-up, steps, checkpoints, the end.
+
+use super::{
+    Inventory, Scene, Start, build,
+    outputs::{Outputs, prepare_folder},
+    scene::refuse_empty_matrix,
+    summary::{Certificates, PartitionQuality, Summary, peak_memory},
+};
+use crate::{
+    body::Body,
+    effect::Step,
+    error::{Error, Exit, Result},
+    job::{Job, Loaded},
+    mesh::distribute,
+    output::{
+        checkpoint::{self, Identity},
+        checkpoint_folder::list,
+        history::Totals,
+        log::Log,
+    },
+    petsc::set_option,
+    session::Session,
+    state::State,
+    stepping::{LaggedEuler, StepOutcome},
+};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
+
+/// A step that ends within this share of a step of the end ends there.
+const SNAP: f64 = 1e-9;
+/// Runs of more steps than this log only every so many, to keep logs readable.
+const LOGGED_STEPS: u64 = 1000;
+
+/// Sets the problem up on all ranks and runs it. Collective.
+pub(super) fn run<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    scene: Option<Scene<D>>,
+    start: &Start,
+    began: Instant,
+) -> Result<Exit> {
+    let job = &loaded.job;
+    session.agree(refuse_empty_matrix(loaded))?;
+    for (name, value) in &job.solver.petsc {
+        session.agree(set_option(name, value))?;
+    }
+    let mut log = Log::new(session.is_first());
+    let folder = job.output_folder();
+    let goes_on = *start != Start::Anew;
+    let prepared = if session.is_first() {
+        prepare_folder(folder, goes_on, &mut log).and_then(|()| log.open(&folder.join("run.log"), goes_on))
+    } else {
+        Ok(())
+    };
+    session.agree(prepared)?;
+    let mesh = distribute(session, scene.map(|s| (s.mesh, s.partition)))?;
+    let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
+    let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
+    let restored = restore(session, start, folder, &identity, &mut body, &mut state, &mut log)?;
+    let mut scheme = session.agree(LaggedEuler::new(&body, &state, build::settings(job)))?;
+    super::header::write(session, &mut log, loaded, &body, &scheme)?;
+    let energy = {
+        let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
+        let mine = session.agree(body.energy(&state, rest))?;
+        crate::effect::Energy::from_array(session.sum(mine.to_array()))
+    };
+    let totals = restored.as_ref().map_or_else(|| Totals::at_start(energy), |r| r.totals);
+    let mut outputs = Outputs::open(session, job, identity, &body, &state, goes_on)?;
+    if state.step == 0 {
+        outputs.at_start(session, &body, &state)?;
+    }
+    scheme.prepare_length(session, &body, job.time.step)?;
+    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, began, setup: began.elapsed() };
+    let ended = run.advance();
+    run.finish(ended, restored.map(|r| r.file))
+}
+
+/// Where a restarted run comes from.
+struct Restored {
+    file: String,
+    totals: Totals,
+}
+
+/// Puts the checkpoint that `start` asks for into the state. Collective.
+fn restore<const D: usize, const S: usize>(
+    session: &Session,
+    start: &Start,
+    folder: &Path,
+    identity: &Identity,
+    body: &mut Body<D, S>,
+    state: &mut State,
+    log: &mut Log,
+) -> Result<Option<Restored>> {
+    let candidates = match start {
+        Start::Anew => return Ok(None),
+        Start::From(path) => vec![path.clone()],
+        Start::Newest => session.agree(list(folder))?.into_iter().map(|(_, path)| path).collect(),
+    };
+    let mut faults = Vec::new();
+    for path in &candidates {
+        match checkpoint::restore(session, path, identity, body, state) {
+            Ok(header) => {
+                log.line(format!("going on from {} (step {}, t = {} s)", path.display(), header.step, header.time));
+                let file = path.display().to_string();
+                return Ok(Some(Restored { file, totals: header.totals }));
+            }
+            Err(error) if error.exit() == Exit::Refused => return Err(error),
+            Err(error) => {
+                log.line(format!("warning: {error}"));
+                faults.push(error.to_string());
+            }
+        }
+    }
+    Err(Error::Refused(if faults.is_empty() {
+        format!("{}: no checkpoint to go on from; run without --restart", folder.display())
+    } else {
+        format!("no good checkpoint to go on from; run without --restart\n{}", faults.join("\n"))
+    }))
+}
+
+/// Why the steps ended.
+enum Ended {
+    Completed,
+    Stopped(String),
+}
+
+struct Run<'a, 'u, const D: usize, const S: usize> {
+    session: &'a Session<'u>,
+    job: &'a Job,
+    body: Body<D, S>,
+    state: State,
+    scheme: LaggedEuler,
+    totals: Totals,
+    outputs: Outputs<D>,
+    log: Log,
+    began: Instant,
+    setup: Duration,
+}
+
+impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
+    /// Steps to the end, to a request to stop, or to a failure. Collective.
+    fn advance(&mut self) -> Result<Ended> {
+        let (end, length) = (self.job.time.end, self.job.time.step);
+        let left = ((end - self.state.time) / length - SNAP).ceil().max(0.0) as u64;
+        let last = self.state.step + left;
+        self.log.start_progress(last, self.state.step);
+        let mut saved_at = Instant::now();
+        while self.state.time < end {
+            let step = self.next_step(length, end);
+            let outcome = self.scheme.advance(self.session, &mut self.body, &mut self.state, step)?;
+            self.totals.add(&outcome);
+            self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
+            self.report(&outcome, last);
+            let wish = self.wish(saved_at);
+            if let Some(reason) = wish.stop {
+                if self.state.time < end {
+                    return Ok(Ended::Stopped(reason));
+                }
+            }
+            if wish.save && self.state.time < end {
+                self.save()?;
+                saved_at = Instant::now();
+            }
+        }
+        Ok(Ended::Completed)
+    }
+
+    fn next_step(&self, length: f64, end: f64) -> Step {
+        let previous_length = self.state.step_length;
+        let time = self.state.time + length;
+        if (end - time).abs() <= SNAP * length {
+            Step { time: end, length, previous_length }
+        } else if time > end {
+            Step { time: end, length: end - self.state.time, previous_length }
+        } else {
+            Step { time, length, previous_length }
+        }
+    }
+
+    fn report(&mut self, outcome: &StepOutcome, last: u64) {
+        let step = self.state.step;
+        let words = format!(
+            "step {step:>6}/{last}  t = {:.6} s  newton {:>2}  linear {:>4}  branch changes {:>4}  inclusion {:.1e}  energy {:.1e}",
+            self.state.time,
+            outcome.newton_iterations,
+            outcome.linear_iterations,
+            outcome.active_changes,
+            outcome.inclusion_residual,
+            self.totals.energy_imbalance
+        );
+        self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
+        if step % last.div_ceil(LOGGED_STEPS).max(1) == 0 || step == last {
+            self.log.quiet_line(words);
+        }
+    }
+
+    /// What the outside or the clock asks for, the same on all ranks. Collective.
+    fn wish(&self, saved_at: Instant) -> Wish {
+        let signal = self.session.stop_requested();
+        let mut clocks = [0.0; 2];
+        let mut by_steps = false;
+        if let Some(checkpoint) = &self.job.checkpoint {
+            by_steps = checkpoint.every.is_some_and(|every| self.state.step % every == 0);
+            let due = checkpoint.interval.is_some_and(|seconds| saved_at.elapsed().as_secs_f64() >= seconds);
+            let late = checkpoint.wall_limit.is_some_and(|seconds| self.began.elapsed().as_secs_f64() >= seconds);
+            clocks = self.session.largest([f64::from(u8::from(due)), f64::from(u8::from(late))]);
+        }
+        let limit = self.job.checkpoint.as_ref().and_then(|c| c.wall_limit).unwrap_or_default();
+        let stop = match signal {
+            Some(signal) => Some(format!("{signal}")),
+            None if clocks[1] > 0.0 => Some(format!("the wall-time limit of {limit} s")),
+            None => None,
+        };
+        Wish { save: by_steps || clocks[0] > 0.0, stop }
+    }
+
+    fn save(&mut self) -> Result<()> {
+        let path = self.outputs.checkpoint(self.session, &self.body, &self.state, &self.totals)?;
+        self.log.quiet_line(format!("saved {}", path.display()));
+        Ok(())
+    }
+
+    /// Writes the last files and the summary; gives the exit code or the error that ended the steps. Collective.
+    fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit> {
+        self.log.end_progress();
+        let (status, error, exit) = match &ended {
+            Ok(Ended::Completed) => ("completed", None, Exit::Done),
+            Ok(Ended::Stopped(reason)) => {
+                self.log.line(format!("stopping on {reason}; go on with --restart"));
+                ("stopped", None, Exit::Stopped)
+            }
+            Err(error) => ("failed", Some(error.to_string()), error.exit()),
+        };
+        if exit != Exit::Done {
+            self.save()?;
+        }
+        if exit != Exit::Stopped {
+            self.outputs.at_end(self.session, &self.body, &self.state)?;
+        }
+        let summary = self.summary(status, error, restarted_from)?;
+        if self.session.is_first() {
+            super::header::closing(&mut self.log, &summary, self.job.output_folder());
+        }
+        let written =
+            if self.session.is_first() { summary.write(self.job.output_folder()) } else { Ok(()) };
+        self.session.agree(written)?;
+        self.outputs.close()?;
+        ended.map(|_| exit)
+    }
+
+    fn summary(&self, status: &'static str, error: Option<String>, restarted_from: Option<String>) -> Result<Summary> {
+        let stress = self.body.stress(&self.state)?;
+        let von_mises = stress.iter().map(crate::tensor::von_mises).fold(0.0, f64::max);
+        let fixed = self.body.fixed[..self.body.mesh.owned * D].iter().filter(|f| **f).count();
+        let mesh = &self.body.mesh;
+        let material = &self.job.material;
+        let fall = self.body.contacts.iter().map(|c| c.graph.monotonicity_constant()).reduce(f64::max);
+        let modulus = material.viscosity.as_ref().map(|v| {
+            crate::material::Isotropic { volumetric: v.volumetric, shear: v.shear }.smallest_modulus::<S>()
+        });
+        Ok(Summary {
+            status,
+            error,
+            version: Summary::version(),
+            petsc_version: self.session.petsc().version()?,
+            ranks: self.session.ranks(),
+            dimension: D,
+            cells: mesh.total_cells,
+            nodes: mesh.total_nodes,
+            unknowns: mesh.total_nodes * D - self.session.total(fixed),
+            effects: self.body.effect_names(),
+            scheme: "lagged_euler",
+            preconditioner: self.scheme.preconditioner().name(),
+            steps: self.state.step,
+            time: self.state.time,
+            rejected_steps: 0,
+            newton_iterations: self.totals.newton_iterations,
+            linear_iterations: self.totals.linear_iterations,
+            restarted_from,
+            max_von_mises: self.session.largest([von_mises])[0],
+            max_inclusion_residual: self.totals.max_inclusion_residual,
+            max_energy_imbalance: self.totals.max_energy_imbalance,
+            certificates: Certificates {
+                viscosity_modulus: modulus,
+                monotonicity_constant: fall,
+                ..Certificates::default()
+            },
+            wall_seconds: self.seconds(),
+            peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
+            partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
+            inventory: Inventory::of(self.session, &self.body, &self.scheme),
+        })
+    }
+
+    /// Seconds by phase of the slowest rank; a phase without an effect in it is absent. Collective.
+    fn seconds(&self) -> serde_json::Map<String, serde_json::Value> {
+        let clock = &self.scheme.clock;
+        let total = self.began.elapsed();
+        let phases = [
+            ("total", total),
+            ("setup", self.setup.saturating_sub(clock.first_assembly)),
+            ("assembly", clock.assembly),
+            ("history", clock.history),
+            ("solve", clock.solve),
+            ("balance", clock.balance),
+            ("output", self.outputs.spent),
+        ];
+        let seconds = self.session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
+        phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
+    }
+}
+
+/// What is asked for after a step.
+struct Wish {
+    save: bool,
+    stop: Option<String>,
+}
