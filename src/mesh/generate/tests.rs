@@ -98,8 +98,7 @@ fn the_right_diagonal_joins_lower_left_and_upper_right() {
 #[test]
 fn alternating_diagonals_turn_at_every_step() {
     let mesh = rectangle([2.0, 2.0], [2, 2], Diagonal::Alternating, [1.0; 2]).unwrap();
-    // All four diagonals of this block meet in the middle node or avoid it together: here they form a diamond's
-    // opposite, the middle node belonging to every triangle.
+    // Right, left, left, right: all four diagonals end in the middle node.
     assert!((0..8).all(|cell| mesh.cell(cell).contains(&4)));
 }
 
