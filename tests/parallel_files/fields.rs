@@ -1,7 +1,9 @@
 //! Field files, read back serially the way other programs do.
 
 use crate::mpirun::{self, owner};
-use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use clarke::output::field::{Field, Place, Shape};
+use clarke::output::fields::{FieldFile, FieldMesh};
+use clarke::output::inspect::inspect;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
@@ -16,7 +18,7 @@ fn point(node: u64) -> [f64; 2] {
 
 fn corners(cell: u64) -> [u64; 3] {
     let low = 2 * (cell / 2);
-    if cell % 2 == 0 { [low, low + 2, low + 1] } else { [low + 1, low + 2, low + 3] }
+    if cell.is_multiple_of(2) { [low, low + 2, low + 1] } else { [low + 1, low + 2, low + 3] }
 }
 
 fn displacement(node: u64, time: f64) -> [f64; 2] {
@@ -162,6 +164,10 @@ fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
         let folder = tempfile::tempdir().expect("folder");
         mpirun::run(ranks, "fields_write", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
+        let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");
+        for part in ["42 nodes", "40 triangles", "steps: 4", "t = 0.75 s", "tensor at each cell"] {
+            assert!(words.contains(part), "{words}");
+        }
     }
 }
 
