@@ -77,6 +77,9 @@ impl<const D: usize> FieldFile<D> {
         write_mesh(&file, &communicator, &mesh, &points, &cells)?;
         file.flush()?;
         let xdmf = folder.join("fields.xdmf");
+        let stale = communicator.rank() == 0 && xdmf.exists();
+        let removed = if stale { std::fs::remove_file(&xdmf) } else { Ok(()) };
+        agree(&communicator, removed.map_err(|error| Error::unwritable(&xdmf, error)))?;
         Ok(Self { file, communicator, xdmf, points, cells, kinds: Vec::new(), times: Vec::new() })
     }
 
