@@ -19,7 +19,7 @@
 
 use super::agreement::agree;
 use super::field::{
-    FieldKind, data_group, file_width, kind_of, list, place_word, shape_word, spread, view_columns,
+    FieldKind, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread, view_columns,
 };
 use super::field_slab::Slab;
 use super::hyperslab::Element;

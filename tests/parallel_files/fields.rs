@@ -1,8 +1,7 @@
 //! Field files, read back serially the way other programs do.
 
 use crate::mpirun::{self, owner};
-use clarke::output::field::{Field, Place, Shape};
-use clarke::output::fields::{FieldFile, FieldMesh};
+use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
 use clarke::output::inspect::inspect;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::f64::consts::SQRT_2;
