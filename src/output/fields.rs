@@ -18,16 +18,20 @@
 //! all steps before.
 
 use super::agreement::agree;
+use super::field::{
+    FieldKind, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread, view_columns,
+};
+use super::field_slab::Slab;
 use super::hyperslab::Element;
 use super::parallel_file::ParallelFile;
-use super::redistribution::{Redistribution, first_of_part};
 use super::xdmf;
 use crate::error::{Error, Result};
-use crate::tensor::{Vector, component};
-use mpi::collective::SystemOperation;
+use crate::tensor::Vector;
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::{Communicator, CommunicatorCollectives};
+use mpi::traits::Communicator;
 use std::path::{Path, PathBuf};
+
+pub use super::field::{Field, Place, Shape};
 
 /// Rows a chunk of the small tables of steps holds.
 const STEPS_PER_CHUNK: usize = 256;
@@ -47,48 +51,6 @@ pub struct FieldMesh<'a, const D: usize> {
     pub cell_ids: &'a [u64],
 }
 
-/// What a field has a value for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// Each node.
-    Node,
-    /// Each cell.
-    Cell,
-}
-
-/// What a value of a field is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shape {
-    /// One number.
-    Scalar,
-    /// `D` numbers; files hold three.
-    Vector,
-    /// A symmetric tensor in Mandel form with 3, 4 or 6 components (see [`crate::tensor`]); files hold the six plain
-    /// components.
-    Tensor,
-}
-
-/// This rank's values of a field.
-#[derive(Debug, Clone, Copy)]
-pub struct Field<'a> {
-    /// Letters, digits and underscores.
-    pub name: &'a str,
-    /// What it has a value for.
-    pub place: Place,
-    /// What a value is.
-    pub shape: Shape,
-    /// The values of the nodes or cells this rank owns, in the order of the mesh.
-    pub values: &'a [f64],
-}
-
-/// Name, place and shape of a field, which stay the same for all steps.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct FieldKind {
-    pub(super) name: String,
-    pub(super) place: Place,
-    pub(super) shape: Shape,
-}
-
 /// The field files of a run, open for writing.
 pub struct FieldFile<const D: usize> {
     file: ParallelFile,
@@ -98,53 +60,6 @@ pub struct FieldFile<const D: usize> {
     cells: Slab,
     kinds: Vec<FieldKind>,
     times: Vec<f64>,
-}
-
-/// Where this rank's rows of a field go.
-struct Slab {
-    /// Rows this rank owns in the run.
-    owned: usize,
-    /// Rows over all ranks.
-    total: u64,
-    /// First row this rank writes.
-    first: u64,
-    /// The way from the run's order of rows to the file's, where they differ.
-    reorder: Option<Redistribution>,
-}
-
-impl Slab {
-    fn new(file: &ParallelFile, communicator: &impl Communicator, owned: usize) -> Self {
-        let (own, mut total) = (owned as u64, 0_u64);
-        communicator.all_reduce_into(&own, &mut total, SystemOperation::sum());
-        Self { owned, total, first: file.slab_start(owned), reorder: None }
-    }
-
-    /// The slab of a file whose rows have the ids of the dataset `stored`, for a run whose rows have the ids `owned`.
-    fn resume(
-        file: &ParallelFile,
-        communicator: &impl Communicator,
-        stored: &str,
-        owned: &[u64],
-    ) -> Result<Self> {
-        let mut slab = Self::new(file, communicator, owned.len());
-        let rows = file.rows::<i64>(stored)?;
-        if rows.count() != slab.total {
-            return Err(Error::Refused(format!(
-                "{}: {stored} has {} rows, the job's mesh {}: it belongs to another mesh. Restart with the job that wrote it \
-                 or move the file away",
-                file.path().display(),
-                rows.count(),
-                slab.total
-            )));
-        }
-        let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
-        slab.first = first_of_part(slab.total, rank, size);
-        let count = first_of_part(slab.total, rank + 1, size) - slab.first;
-        let wanted: Vec<u64> =
-            rows.read(slab.first, count as usize)?.into_iter().map(|id| id as u64).collect();
-        slab.reorder = Some(Redistribution::new(communicator, slab.total, owned, &wanted)?);
-        Ok(slab)
-    }
 }
 
 impl<const D: usize> FieldFile<D> {
@@ -162,6 +77,9 @@ impl<const D: usize> FieldFile<D> {
         write_mesh(&file, &communicator, &mesh, &points, &cells)?;
         file.flush()?;
         let xdmf = folder.join("fields.xdmf");
+        let stale = communicator.rank() == 0 && xdmf.exists();
+        let removed = if stale { std::fs::remove_file(&xdmf) } else { Ok(()) };
+        agree(&communicator, removed.map_err(|error| Error::unwritable(&xdmf, error)))?;
         Ok(Self { file, communicator, xdmf, points, cells, kinds: Vec::new(), times: Vec::new() })
     }
 
@@ -400,84 +318,6 @@ fn cut(file: &ParallelFile, kinds: &[FieldKind], steps: usize) -> Result<()> {
     file.flush()
 }
 
-/// Numbers a row of a field of this shape has in the file.
-pub(super) fn file_width(shape: Shape) -> usize {
-    match shape {
-        Shape::Scalar => 1,
-        Shape::Vector => 3,
-        Shape::Tensor => 6,
-    }
-}
-
-/// Which stored component each component of VTK is. Tensors are stored as XDMF wants them, xx xy xz yy yz zz; VTK wants
-/// xx yy zz xy yz xz.
-fn view_columns(shape: Shape) -> &'static [usize] {
-    match shape {
-        Shape::Scalar => &[0],
-        Shape::Vector => &[0, 1, 2],
-        Shape::Tensor => &[0, 3, 5, 1, 4, 2],
-    }
-}
-
-/// A field's values with as many components as the file has.
-fn spread<const D: usize>(field: &Field, rows: usize) -> Vec<f64> {
-    match field.shape {
-        Shape::Scalar => field.values.to_vec(),
-        Shape::Vector => field.values.chunks_exact(D).flat_map(pad).collect(),
-        Shape::Tensor => match field.values.len().checked_div(rows) {
-            Some(3) => field.values.chunks_exact(3).flat_map(plain_components::<3>).collect(),
-            Some(4) => field.values.chunks_exact(4).flat_map(plain_components::<4>).collect(),
-            _ => field.values.chunks_exact(6).flat_map(plain_components::<6>).collect(),
-        },
-    }
-}
-
-fn pad(vector: &[f64]) -> [f64; 3] {
-    std::array::from_fn(|axis| vector.get(axis).copied().unwrap_or(0.0))
-}
-
-fn plain_components<const S: usize>(mandel: &[f64]) -> [f64; 6] {
-    const POSITION: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-    let mut plain = [0.0; 6];
-    for (c, value) in mandel.iter().enumerate() {
-        let (i, j, factor) = component::<S>(c);
-        plain[POSITION[i][j]] = value / factor;
-    }
-    plain
-}
-
-fn kind_of(field: &Field) -> FieldKind {
-    FieldKind { name: field.name.into(), place: field.place, shape: field.shape }
-}
-
-fn list(kinds: &[FieldKind]) -> String {
-    let words = kinds.iter().map(|kind| format!("{} ({})", kind.name, shape_word(kind.shape)));
-    words.collect::<Vec<_>>().join(", ")
-}
-
-/// The group of VTKHDF that holds the fields of a place.
-pub(super) fn data_group(place: Place) -> &'static str {
-    match place {
-        Place::Node => "PointData",
-        Place::Cell => "CellData",
-    }
-}
-
 fn offsets_name(place: Place, name: &str) -> String {
     format!("VTKHDF/Steps/{}Offsets/{name}", data_group(place))
-}
-
-fn place_word(place: Place) -> &'static str {
-    match place {
-        Place::Node => "node",
-        Place::Cell => "cell",
-    }
-}
-
-fn shape_word(shape: Shape) -> &'static str {
-    match shape {
-        Shape::Scalar => "scalar",
-        Shape::Vector => "vector",
-        Shape::Tensor => "tensor",
-    }
 }

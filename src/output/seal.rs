@@ -156,7 +156,8 @@ mod tests {
 
     fn sealed(folder: &Path) -> std::path::PathBuf {
         let path = folder.join("sealed");
-        let content: Vec<u8> = (0..3_000_000_u32).map(|number| (number * number >> 7) as u8).collect();
+        let content: Vec<u8> =
+            (0..3_000_000_u32).map(|number| (number.wrapping_mul(number) >> 7) as u8).collect();
         std::fs::write(&path, &content).expect("write");
         let length = content.len() as u64;
         let digest = digest_part(&path, length, 0, 1).expect("digest");

@@ -1,6 +1,6 @@
 //! The light XDMF file that tells other readers where the numbers of the field file are.
 
-use super::fields::{FieldKind, Place, Shape, data_group, file_width};
+use super::field::{FieldKind, Place, Shape, data_group, file_width};
 use crate::error::{Error, Result};
 use std::fmt::Write;
 use std::path::Path;

@@ -3,6 +3,7 @@
 use crate::mpirun::{self, owner, scramble};
 use clarke::error::Result;
 use clarke::output::checkpoint_file::{self, Checkpoint, RowSet, Table};
+use clarke::output::inspect::inspect;
 use clarke::output::seal;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::path::Path;
@@ -160,6 +161,10 @@ fn a_checkpoint_of_any_number_of_ranks_is_read_on_any_number_of_ranks() {
         mpirun::run(writers, "checkpoint_write", folder.path());
         let names: Vec<_> = std::fs::read_dir(folder.path()).expect("folder").collect();
         assert_eq!(names.len(), 1, "nothing but the checkpoint is left: {names:?}");
+        let words = inspect(&folder.path().join("checkpoint-64.h5")).expect("inspect");
+        for part in ["every byte as written", "\"step\": 64", "nodes: 143 rows", "history", "3 x f64"] {
+            assert!(words.contains(part), "{words}");
+        }
         for readers in 1..=4 {
             mpirun::run(readers, "checkpoint_read", folder.path());
         }

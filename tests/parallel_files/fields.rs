@@ -2,6 +2,7 @@
 
 use crate::mpirun::{self, owner};
 use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use clarke::output::inspect::inspect;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
@@ -16,7 +17,7 @@ fn point(node: u64) -> [f64; 2] {
 
 fn corners(cell: u64) -> [u64; 3] {
     let low = 2 * (cell / 2);
-    if cell % 2 == 0 { [low, low + 2, low + 1] } else { [low + 1, low + 2, low + 3] }
+    if cell.is_multiple_of(2) { [low, low + 2, low + 1] } else { [low + 1, low + 2, low + 3] }
 }
 
 fn displacement(node: u64, time: f64) -> [f64; 2] {
@@ -109,6 +110,34 @@ pub fn resume(world: &impl Communicator, folder: &Path) {
     assert!(error.contains("another mesh"), "{error}");
 }
 
+/// Two tetrahedra on five nodes: the first rank owns the first cell and four nodes, the last rank the rest.
+pub fn write_solid(world: &impl Communicator, folder: &Path) {
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
+    let cells = [0, 1, 2, 3, 1, 2, 3, 4];
+    let (first, last) = (world.rank() == 0, world.rank() == world.size() - 1);
+    let nodes = if first { 0 } else { 4 }..if last { 5 } else { 4 };
+    let owned = if first { 0 } else { 1 }..if last { 2 } else { 1 };
+    let mesh = FieldMesh::<3> {
+        points: &points[nodes.clone()],
+        point_ids: &[0, 1, 2, 3, 4][nodes.clone()],
+        cells: &cells[4 * owned.start..4 * owned.end],
+        cell_ids: &[0, 1][owned.clone()],
+    };
+    let mut file = FieldFile::create(folder, world, mesh).expect("create");
+    for step in 0..2 {
+        let values: Vec<f64> = nodes.clone().flat_map(|node| [node as f64, step as f64, 7.0]).collect();
+        let mandel = [11.0, 22.0, 33.0, 23.0 * SQRT_2, 13.0 * SQRT_2, 12.0 * SQRT_2];
+        let tensors: Vec<f64> =
+            owned.clone().flat_map(|cell| mandel.map(|value| value + cell as f64)).collect();
+        let fields = [
+            Field { name: "velocity", place: Place::Node, shape: Shape::Vector, values: &values },
+            Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: &tensors },
+        ];
+        file.write_step(f64::from(step), &fields).expect("step");
+    }
+    file.close().expect("close");
+}
+
 fn close_to(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 1e-12 * (1.0 + expected.abs())
 }
@@ -162,6 +191,31 @@ fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
         let folder = tempfile::tempdir().expect("folder");
         mpirun::run(ranks, "fields_write", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
+        let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");
+        for part in ["42 nodes", "40 triangles", "steps: 4", "t = 0.75 s", "tensor at each cell"] {
+            assert!(words.contains(part), "{words}");
+        }
+    }
+}
+
+#[test]
+fn a_solid_is_written_as_tetrahedra_with_all_components() {
+    for ranks in [1, 2, 3] {
+        let folder = tempfile::tempdir().expect("folder");
+        mpirun::run(ranks, "fields_solid", folder.path());
+        let file = hdf5::File::open(folder.path().join("fields.vtkhdf")).expect("open");
+        let floats = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<f64>()).expect("numbers");
+        let whole = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<i64>()).expect("numbers");
+        assert_eq!(whole("VTKHDF/Types"), [10, 10]);
+        assert_eq!(whole("VTKHDF/Offsets"), [0, 4, 8]);
+        assert_eq!(whole("VTKHDF/Connectivity"), [0, 1, 2, 3, 1, 2, 3, 4]);
+        assert_eq!(floats("VTKHDF/PointData/velocity")[15..18], [0.0, 1.0, 7.0]);
+        let stress = floats("VTKHDF/CellData/stress");
+        assert_eq!(stress.len(), 24);
+        let expected = [11.0, 22.0, 33.0, 12.0, 23.0, 13.0];
+        assert!(stress[12..].iter().zip(expected).all(|(a, b)| close_to(*a, b)), "{stress:?}");
+        let xdmf = std::fs::read_to_string(folder.path().join("fields.xdmf")).expect("xdmf");
+        assert!(xdmf.contains("TopologyType=\"Tetrahedron\" NumberOfElements=\"2\""));
     }
 }
 

@@ -33,6 +33,7 @@ fn scenario() {
         "checkpoint_damage" => checkpoints::damage(&world, &folder),
         "fields_write" => fields::write(&world, &folder),
         "fields_die" => fields::die(&world, &folder),
+        "fields_solid" => fields::write_solid(&world, &folder),
         "fields_resume" => fields::resume(&world, &folder),
         other => panic!("no scenario {other}"),
     }
