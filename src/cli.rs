@@ -9,7 +9,7 @@ use crate::{
 use clap::{Args, Parser, Subcommand};
 use std::{
     io::{IsTerminal, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
@@ -29,8 +29,11 @@ enum Command {
     Run(RunArguments),
     /// Everything but the run: parse, mesh, effects, cost.
     Check {
-        #[command(flatten)]
-        job: JobArguments,
+        /// The job file.
+        job: PathBuf,
+        /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        overrides: Vec<String>,
         /// Print one JSON object.
         #[arg(long)]
         json: bool,
@@ -61,18 +64,12 @@ enum Command {
 }
 
 #[derive(Debug, Args)]
-struct JobArguments {
+struct RunArguments {
     /// The job file.
     job: PathBuf,
     /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-}
-
-#[derive(Debug, Args)]
-struct RunArguments {
-    #[command(flatten)]
-    job: JobArguments,
     /// Go on from the newest good checkpoint of the output folder, or from this file.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1, default_missing_value = "")]
     restart: Option<PathBuf>,
@@ -90,7 +87,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
-        Some(Command::Check { job, json }) => check(&job, json),
+        Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) => inspect(&file),
         Some(Command::Study { .. }) => Err(Error::Refused("solver study is not available yet".into())),
@@ -127,7 +124,7 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let colour = std::io::stderr().is_terminal();
-    let loaded = Job::load_coloured(&arguments.job.job, &arguments.job.overrides, colour);
+    let loaded = Job::load_coloured(&arguments.job, &arguments.overrides, colour);
     let loaded = session.agree_quietly(loaded)?;
     let result = run::run(&session, loaded, &start);
     if let Err(error) = &result {
@@ -137,7 +134,7 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
     Ok(exit)
 }
 
-fn check(_arguments: &JobArguments, _json: bool) -> Result<Exit> {
+fn check(_job: &Path, _overrides: &[String], _json: bool) -> Result<Exit> {
     Err(Error::Refused("solver check is not available yet".into()))
 }
 
@@ -147,6 +144,6 @@ fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-fn inspect(_file: &std::path::Path) -> Result<Exit> {
+fn inspect(_file: &Path) -> Result<Exit> {
     Err(Error::Refused("solver inspect is not available yet".into()))
 }

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     body::Body,
-    error::{Error, Result},
+    error::{Error, Exit, Result},
     job::differing_keys,
     petsc::DistributedVector,
     session::Session,
@@ -101,7 +101,7 @@ pub fn restore<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &mut State,
 ) -> Result<Header> {
-    let checkpoint = Checkpoint::open(path, session.world())?;
+    let checkpoint = Checkpoint::open(path, session.world()).map_err(damaged)?;
     let header = check(path, checkpoint.header(), identity, body)?;
     let nodes = owned_node_ids(body);
     let names = ["displacement", "velocity", "previous_velocity"].map(|name| (name, D));
@@ -118,6 +118,11 @@ pub fn restore<const D: usize, const S: usize>(
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)
+}
+
+/// A file that can't be opened leaves the way to an older one open.
+fn damaged(error: Error) -> Error {
+    if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error }
 }
 
 fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
