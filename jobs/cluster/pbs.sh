@@ -14,6 +14,9 @@
 #   SCRIPT     this file, for the resubmission (default: jobs/cluster/pbs.sh)
 #   MARGIN     seconds before the limit at which the ranks are asked to stop (default: 120)
 #
+# Not yet run under a real PBS, only with stand-ins for qstat and qsub. Some clusters refuse qsub on compute nodes: then
+# submit again by hand with -v RESTART=yes.
+#
 #PBS -N clarke
 #PBS -l select=1:ncpus=2:mpiprocs=2
 #PBS -l walltime=01:00:00
