@@ -7,6 +7,7 @@ pub mod error;
 pub mod tensor;
 pub mod job;
 pub mod petsc;
+pub mod agreement;
 pub mod session;
 pub mod exchange;
 pub mod material;

@@ -1,6 +1,7 @@
 //! One process of a parallel run: MPI, PETSc, collective failure, and requests to stop.
 
 use crate::{
+    agreement::agree,
     error::{Error, Exit, Result},
     petsc::Petsc,
 };
@@ -9,7 +10,7 @@ use mpi::{
     collective::SystemOperation,
     environment::Universe,
     topology::{Communicator, SimpleCommunicator},
-    traits::{CommunicatorCollectives, Root},
+    traits::CommunicatorCollectives,
 };
 use std::sync::{
     Arc,
@@ -78,34 +79,10 @@ impl Session<'_> {
         &self.petsc
     }
 
-    /// Makes a failure on any rank a failure on all: the lowest failing rank keeps its own error, the others get its
-    /// words. Collective; stands at the end of every phase in which one rank alone can fail.
+    /// Makes a failure on any rank a failure on all: a rank that failed keeps its own error, the others get the words of
+    /// the lowest. Collective; stands at the end of every phase in which one rank alone can fail.
     pub fn agree<T>(&self, result: Result<T>) -> Result<T> {
-        let fine = self.world.size();
-        let mine = if result.is_err() { self.world.rank() } else { fine };
-        let mut lowest = fine;
-        self.world.all_reduce_into(&mine, &mut lowest, SystemOperation::min());
-        if lowest == fine {
-            return result;
-        }
-        let root = self.world.process_at_rank(lowest);
-        let (mut words, mut code) = match &result {
-            Err(error) if mine == lowest => (error.to_string().into_bytes(), error.exit() as i32),
-            _ => (Vec::new(), 0),
-        };
-        let mut length = words.len();
-        root.broadcast_into(&mut length);
-        words.resize(length, 0);
-        root.broadcast_into(&mut words[..]);
-        root.broadcast_into(&mut code);
-        match result {
-            Err(error) if mine == lowest => Err(error),
-            _ => Err(Error::Elsewhere {
-                rank: usize::try_from(lowest).unwrap_or(0),
-                exit: Exit::from_code(code),
-                message: String::from_utf8_lossy(&words).into_owned(),
-            }),
-        }
+        agree(&self.world, result)
     }
 
     /// Like [`Session::agree`] for a step that fails alike on all ranks: only rank 0 keeps the words.

@@ -55,7 +55,14 @@ pub trait Effect<const D: usize, const S: usize> {
     fn phases(&self) -> Phases;
 
     /// Adds its part of the matrix that multiplies the velocity in a step of this length.
-    fn add_matrix(&self, _cell: usize, _geometry: &Simplex<D>, _step_length: f64, _matrix: &mut CellMatrix<D>) {}
+    fn add_matrix(
+        &self,
+        _cell: usize,
+        _geometry: &Simplex<D>,
+        _step_length: f64,
+        _matrix: &mut CellMatrix<D>,
+    ) {
+    }
 
     /// Adds its explicit stress or force, from the converged state, to the batch; may write its trial history.
     fn add_explicit(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}

@@ -93,7 +93,10 @@ impl<const D: usize> Mesh<D> {
 }
 
 /// Hands the parts of `whole` (on rank 0, `None` elsewhere) out to all ranks; rank 0 frees it. Collective.
-pub fn distribute<const D: usize>(session: &Session, whole: Option<(GlobalMesh<D>, Partition)>) -> Result<Mesh<D>> {
+pub fn distribute<const D: usize>(
+    session: &Session,
+    whole: Option<(GlobalMesh<D>, Partition)>,
+) -> Result<Mesh<D>> {
     let world = session.world();
     let ranks = session.ranks();
     let mut mesh = Mesh { node_starts: vec![0; ranks + 1], ..Mesh::default() };
@@ -222,7 +225,10 @@ impl Part {
                 .flat_map(|&f| mesh.facets[f as usize])
                 .map(|node| order.numbers[node as usize])
                 .collect(),
-            facet_cells: facet_ids.iter().map(|&f| position(cell_ids, mesh.facet_cells[f as usize])).collect(),
+            facet_cells: facet_ids
+                .iter()
+                .map(|&f| position(cell_ids, mesh.facet_cells[f as usize]))
+                .collect(),
             boundaries: boundaries_here(&mesh.boundaries, facet_ids),
         }
     }

@@ -103,9 +103,9 @@ fn edge_cut(dual: &DualGraph, cell_ranks: &[u32]) -> usize {
 mod tests {
     use super::*;
     use crate::mesh::{
+        Tags,
         generate::{Diagonal, rectangle},
         surface::Topology,
-        Tags,
     };
 
     fn square(n: usize) -> (GlobalMesh<2>, DualGraph) {

@@ -83,10 +83,8 @@ pub fn save<const D: usize, const S: usize>(
     let [displacement, velocity, previous] =
         [state.displacement.owned()?, state.velocity.owned()?, state.previous_velocity.owned()?];
     let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
-    let mut tables: Vec<Table> = nodal
-        .into_iter()
-        .map(|(name, values)| Table { name, set: "nodes", width: D, values })
-        .collect();
+    let mut tables: Vec<Table> =
+        nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
     let histories = body.effects.iter().filter_map(|e| e.history());
     tables.extend(histories.map(|h| Table { name: h.name, set: "cells", width: h.width, values: h.values }));
     checkpoint_file::write(path, session.world(), &header, &sets, &tables)
@@ -139,7 +137,11 @@ fn check<const D: usize, const S: usize>(
     let refuse = |words: String| Err(Error::Refused(format!("{}: {words}", path.display())));
     let header: Header = match serde_json::from_slice(bytes) {
         Ok(header) => header,
-        Err(e) => return refuse(format!("the header of the checkpoint can't be understood ({e}); start the run anew")),
+        Err(e) => {
+            return refuse(format!(
+                "the header of the checkpoint can't be understood ({e}); start the run anew"
+            ));
+        }
     };
     if header.format != FORMAT {
         return refuse(format!(
@@ -152,7 +154,9 @@ fn check<const D: usize, const S: usize>(
         let lines: Vec<String> = differing
             .iter()
             .map(|key| {
-                let value = |side: &BTreeMap<String, String>| side.get(key).cloned().unwrap_or_else(|| "absent".into());
+                let value = |side: &BTreeMap<String, String>| {
+                    side.get(key).cloned().unwrap_or_else(|| "absent".into())
+                };
                 format!("  {key}: checkpoint {}, job {}", value(&header.physics), value(&identity.physics))
             })
             .collect();

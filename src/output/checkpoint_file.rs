@@ -9,12 +9,12 @@
 //! The file is written under another name, sealed (see [`super::seal`]), brought to the disk and only then renamed: a
 //! file with the final name is whole. It is read on any number of ranks, no rank ever holding more than its share.
 
-use super::agreement::agree;
 use super::checksum::table_checksum;
 use super::hyperslab::{Element, Rows};
 use super::parallel_file::ParallelFile;
 use super::redistribution::{Redistribution, first_of_part};
 use super::seal;
+use crate::agreement::agree;
 use crate::error::{Error, Result};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;

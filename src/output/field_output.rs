@@ -45,7 +45,12 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// Appends the state, whose total stress is given one a cell. Collective.
-    pub fn write<const S: usize>(&mut self, body: &Body<D, S>, state: &State, stress: &[Mandel<S>]) -> Result<()> {
+    pub fn write<const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        stress: &[Mandel<S>],
+    ) -> Result<()> {
         let (displacement, velocity) = (state.displacement.owned()?, state.velocity.owned()?);
         let norms: Vec<f64> = stress.iter().map(von_mises).collect();
         let mut fields = vec![

@@ -17,7 +17,6 @@
 //! A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file of a run that dies holds
 //! all steps before.
 
-use super::agreement::agree;
 use super::field::{
     FieldKind, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread, view_columns,
 };
@@ -25,6 +24,7 @@ use super::field_slab::Slab;
 use super::hyperslab::Element;
 use super::parallel_file::ParallelFile;
 use super::xdmf;
+use crate::agreement::agree;
 use crate::error::{Error, Result};
 use crate::tensor::Vector;
 use mpi::topology::SimpleCommunicator;

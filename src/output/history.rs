@@ -1,11 +1,7 @@
 //! `history.csv`: a row a step.
 
 use super::csv::{CsvFile, number, numbers};
-use crate::{
-    effect::Energy,
-    error::Result,
-    stepping::StepOutcome,
-};
+use crate::{effect::Energy, error::Result, stepping::StepOutcome};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -99,7 +95,14 @@ impl History {
     }
 
     /// Writes the row of a step.
-    pub fn row(&mut self, step: u64, time: f64, length: f64, outcome: &StepOutcome, totals: &Totals) -> Result<()> {
+    pub fn row(
+        &mut self,
+        step: u64,
+        time: f64,
+        length: f64,
+        outcome: &StepOutcome,
+        totals: &Totals,
+    ) -> Result<()> {
         self.0.row(format_args!(
             "{step},{},{},{},{},{},{},{}",
             number(time),
@@ -133,7 +136,14 @@ mod tests {
 
     #[test]
     fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {
-        let energy = Energy { kinetic: 1.0, elastic: 2.0, viscous: 3.0, work: 6.5, numerical: -0.5, ..Energy::default() };
+        let energy = Energy {
+            kinetic: 1.0,
+            elastic: 2.0,
+            viscous: 3.0,
+            work: 6.5,
+            numerical: -0.5,
+            ..Energy::default()
+        };
         let mut totals = Totals::default();
         totals.add(&StepOutcome { energy, ..StepOutcome::default() });
         assert_eq!(totals.energy_imbalance, 0.0);

@@ -27,7 +27,11 @@ impl Log {
         if self.speaks {
             let mut options = OpenOptions::new();
             options.create(true);
-            if goes_on { options.append(true) } else { options.write(true).truncate(true) };
+            if goes_on {
+                options.append(true)
+            } else {
+                options.write(true).truncate(true)
+            };
             self.file = Some(options.open(path).map_err(|e| Error::unwritable(path, e))?);
         }
         Ok(())
@@ -66,7 +70,9 @@ impl Log {
     pub fn start_progress(&mut self, steps: u64, taken: u64) {
         if self.speaks && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
             let bar = ProgressBar::new(steps);
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}");
+            let style = ProgressStyle::with_template(
+                "{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}",
+            );
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_position(taken);
             bar.reset_eta();

@@ -1,6 +1,5 @@
 //! What a run leaves on disk.
 
-pub mod agreement;
 pub mod checkpoint;
 pub mod checkpoint_file;
 pub mod checkpoint_folder;

@@ -7,9 +7,9 @@
 //! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
 //! open for writing, so that nobody could open the results of a process that died.
 
-use super::agreement::agree;
 use super::hyperslab::{Element, Rows};
 use super::stacked_view;
+use crate::agreement::agree;
 use crate::error::{Error, Result};
 use hdf5::plist::dataset_create::AllocTime;
 use hdf5::types::{FixedAscii, TypeDescriptor};

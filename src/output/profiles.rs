@@ -10,11 +10,7 @@ use crate::{
     state::State,
     tensor::{Mandel, apply, dot, norm},
 };
-use mpi::{
-    datatype::PartitionMut,
-    topology::Communicator,
-    traits::Root,
-};
+use mpi::{datatype::PartitionMut, topology::Communicator, traits::Root};
 use std::path::Path;
 
 /// A boundary whose values are written.
@@ -36,7 +32,11 @@ pub struct Profiles<const D: usize> {
 
 impl<const D: usize> Profiles<D> {
     /// Prepares profiles along these boundaries, each with the contact that acts on it. Collective.
-    pub fn new<const S: usize>(session: &Session, body: &Body<D, S>, boundaries: &[(String, Option<usize>)]) -> Self {
+    pub fn new<const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        boundaries: &[(String, Option<usize>)],
+    ) -> Self {
         let prepare = |(name, contact): &(String, Option<usize>)| {
             let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
             let points = surface_points(session, &body.mesh, &facets);
@@ -96,7 +96,8 @@ impl<const D: usize> Profile<D> {
         state: &State,
         stress: &[Mandel<S>],
     ) -> Result<Vec<f64>> {
-        let by_stress = if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
+        let by_stress =
+            if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
         let mut out = Vec::with_capacity(self.points.len() * (D + 3));
         for (at, point) in self.points.iter().enumerate() {

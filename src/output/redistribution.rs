@@ -2,7 +2,7 @@
 //!
 //! A directory of all ids is spread over the ranks in equal blocks, so that no rank ever knows more than its share.
 
-use super::agreement::agree;
+use crate::agreement::agree;
 use crate::error::{Error, Result};
 use mpi::Count;
 use mpi::datatype::{Partition, PartitionMut};

@@ -15,8 +15,8 @@
 //! The digest is the wrapping sum over blocks of 1 MiB of the XXH3 of the block, seeded with its number; ranks share
 //! the blocks.
 
-use super::agreement::agree;
 use super::redistribution::first_of_part;
+use crate::agreement::agree;
 use crate::error::{Error, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives};

@@ -108,7 +108,9 @@ impl Ksp {
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         let iterations = index(iterations, "linear iterations")?;
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetTolerances(self.raw, relative, absolute, f64::from(sys::PETSC_DEFAULT), iterations) })
+        check(unsafe {
+            sys::KSPSetTolerances(self.raw, relative, absolute, f64::from(sys::PETSC_DEFAULT), iterations)
+        })
     }
 
     /// Starts from the values already in the solution.
@@ -130,7 +132,11 @@ impl Ksp {
     }
 
     /// Solves for `solution`. Collective. Non-convergence is an outcome, not an error.
-    pub fn solve(&mut self, right_hand_side: &DistributedVector, solution: &mut DistributedVector) -> Result<LinearOutcome> {
+    pub fn solve(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<LinearOutcome> {
         // SAFETY: live objects of matching layout; the two vectors differ.
         check(unsafe { sys::KSPSolve(self.raw, right_hand_side.raw, solution.raw) })?;
         self.outcome()

@@ -35,8 +35,18 @@ impl Matrix {
             check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
             check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
             check(sys::MatSetType(raw, c"aij".as_ptr()))?;
-            check(sys::MatSeqAIJSetPreallocationCSR(raw, starts.as_ptr(), columns.as_ptr(), values.as_ptr()))?;
-            check(sys::MatMPIAIJSetPreallocationCSR(raw, starts.as_ptr(), columns.as_ptr(), values.as_ptr()))?;
+            check(sys::MatSeqAIJSetPreallocationCSR(
+                raw,
+                starts.as_ptr(),
+                columns.as_ptr(),
+                values.as_ptr(),
+            ))?;
+            check(sys::MatMPIAIJSetPreallocationCSR(
+                raw,
+                starts.as_ptr(),
+                columns.as_ptr(),
+                values.as_ptr(),
+            ))?;
             check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
             Ok(matrix)

@@ -1,4 +1,6 @@
-use super::{DistributedVector, Ksp, Matrix, c_string, check, index, ksp::linear_reason, library::communicator, sys};
+use super::{
+    DistributedVector, Ksp, Matrix, c_string, check, index, ksp::linear_reason, library::communicator, sys,
+};
 use crate::error::{Error, Result};
 use std::{
     any::Any,
@@ -18,7 +20,8 @@ pub trait NonlinearProblem {
     fn linearise(&mut self, x: &DistributedVector) -> Result<()>;
 
     /// Writes the Jacobian at the last point of linearisation times `direction`.
-    fn apply_jacobian(&mut self, direction: &DistributedVector, result: &mut DistributedVector) -> Result<()>;
+    fn apply_jacobian(&mut self, direction: &DistributedVector, result: &mut DistributedVector)
+    -> Result<()>;
 }
 
 /// How a nonlinear solve ended.
@@ -94,7 +97,8 @@ impl Snes {
             ))?;
             snes.jacobian = jacobian;
             check(sys::MatSetBlockSize(jacobian, index(block, "block size")?))?;
-            let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode = multiply;
+            let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
+                multiply;
             let multiply: unsafe extern "C" fn() = std::mem::transmute(multiply);
             check(sys::MatShellSetOperation(jacobian, sys::MATOP_MULT, Some(multiply)))?;
             check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
@@ -202,6 +206,9 @@ impl Drop for Snes {
     }
 }
 
+/// What a callback returns to make PETSc stop.
+const USER_ERROR: sys::PetscErrorCode = sys::PETSC_ERR_USER as sys::PetscErrorCode;
+
 /// Runs a callback; an error is kept and `spoil` marks the output, so that all ranks see the same failure.
 fn guard(context: &Context, body: impl FnOnce() -> Result<()>, spoil: impl FnOnce()) -> sys::PetscErrorCode {
     match catch_unwind(AssertUnwindSafe(body)) {
@@ -213,7 +220,7 @@ fn guard(context: &Context, body: impl FnOnce() -> Result<()>, spoil: impl FnOnc
         }
         Err(panic) => {
             context.panic.set(Some(panic));
-            sys::PETSC_ERR_USER.cast_signed()
+            USER_ERROR
         }
     }
 }
@@ -225,11 +232,15 @@ fn spoil(vector: &mut DistributedVector) {
     }
 }
 
-unsafe extern "C" fn residual(_: sys::SNES, x: sys::Vec, f: sys::Vec, context: *mut c_void) -> sys::PetscErrorCode {
+unsafe extern "C" fn residual(
+    _: sys::SNES,
+    x: sys::Vec,
+    f: sys::Vec,
+    context: *mut c_void,
+) -> sys::PetscErrorCode {
     // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call.
-    let (context, x, mut f) = unsafe {
-        (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(f))
-    };
+    let (context, x, mut f) =
+        unsafe { (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(f)) };
     // SAFETY: a second view of the same live vector, used only after the first is done.
     let mut spoilt = unsafe { DistributedVector::view(f.raw) };
     guard(context, || context.problem.borrow_mut().residual(&x, &mut f), || spoil(&mut spoilt))
@@ -252,12 +263,11 @@ unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys
     // SAFETY: a live shell matrix; PETSc writes its context pointer.
     let code = unsafe { sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) };
     if code != 0 || context.is_null() {
-        return sys::PETSC_ERR_USER.cast_signed();
+        return USER_ERROR;
     }
     // SAFETY: `solve` set the context to its live frame; PETSc's vectors live for the call.
-    let (context, x, mut y) = unsafe {
-        (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(y))
-    };
+    let (context, x, mut y) =
+        unsafe { (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(y)) };
     // SAFETY: a second view of the same live vector, used only after the first is done.
     let mut spoilt = unsafe { DistributedVector::view(y.raw) };
     guard(context, || context.problem.borrow_mut().apply_jacobian(&x, &mut y), || spoil(&mut spoilt))

@@ -2,12 +2,7 @@
 
 use super::Summary;
 use crate::{
-    body::Body,
-    error::Result,
-    job::Loaded,
-    output::log::Log,
-    session::Session,
-    stepping::LaggedEuler,
+    body::Body, error::Result, job::Loaded, output::log::Log, session::Session, stepping::LaggedEuler,
 };
 use std::path::Path;
 
@@ -20,7 +15,8 @@ pub(super) fn write<const D: usize, const S: usize>(
     scheme: &LaggedEuler,
 ) -> Result<()> {
     let (job, mesh) = (&loaded.job, &body.mesh);
-    log.line(format!("Clarke {}, PETSc {}, {} ranks", super::VERSION, session.petsc().version()?, session.ranks()));
+    let ranks = if session.ranks() == 1 { "1 rank".into() } else { format!("{} ranks", session.ranks()) };
+    log.line(format!("Clarke {}, PETSc {}, {ranks}", super::VERSION, session.petsc().version()?));
     if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
         log.line(format!("job        {title}"));
     }

@@ -19,7 +19,11 @@ pub struct Inventory {
 
 impl Inventory {
     /// Counts. Collective.
-    pub fn of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, scheme: &LaggedEuler) -> Self {
+    pub fn of<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        scheme: &LaggedEuler,
+    ) -> Self {
         let mut history_bytes = BTreeMap::new();
         for history in body.effects.iter().filter_map(|e| e.history()) {
             let bytes = session.total(2 * size_of_val(history.values));

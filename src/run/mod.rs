@@ -17,8 +17,8 @@ use crate::{
     job::{self, Loaded},
     session::Session,
 };
-use mpi::traits::Root;
 use mpi::topology::Communicator;
+use mpi::traits::Root;
 use scene::AnyScene;
 use std::{path::PathBuf, time::Instant};
 

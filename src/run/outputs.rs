@@ -55,7 +55,8 @@ impl<const D: usize> Outputs<D> {
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
         let mut history = None;
         let opened = if session.is_first() {
-            history_and_tables(&folder, job, step, time, &mut probes, &mut profiles).map(|h| history = Some(h))
+            history_and_tables(&folder, job, step, time, &mut probes, &mut profiles)
+                .map(|h| history = Some(h))
         } else {
             Ok(())
         };
@@ -94,7 +95,7 @@ impl<const D: usize> Outputs<D> {
     fn fields_due(&self, state: &State) -> bool {
         match self.every {
             None => false,
-            Some(Every::Every(steps)) => state.step % steps == 0,
+            Some(Every::Every(steps)) => state.step.is_multiple_of(steps),
             Some(Every::Interval(interval)) => {
                 let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
                 count(state.time) > count(state.time - state.step_length)
@@ -103,12 +104,22 @@ impl<const D: usize> Outputs<D> {
     }
 
     /// Writes the initial state, where fields are wanted along the way. Collective.
-    pub fn at_start<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    pub fn at_start<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+    ) -> Result<()> {
         if self.every.is_some() { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
     /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
-    pub fn at_end<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    pub fn at_end<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+    ) -> Result<()> {
         let start = Instant::now();
         if self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
@@ -118,7 +129,12 @@ impl<const D: usize> Outputs<D> {
         Ok(())
     }
 
-    fn write_fields<const S: usize>(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    fn write_fields<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+    ) -> Result<()> {
         let stress = session.agree(body.stress(state))?;
         self.fields.write(body, state, &stress)?;
         if !self.profiles.is_empty() {

@@ -63,14 +63,19 @@ pub fn whole_mesh(job: &Job) -> Result<AnyMesh> {
             rectangle(r.size, cells, diagonal, [r.grading.x, r.grading.y]).map(AnyMesh::Two)
         }
         job::Mesh::Box(b) => {
-            box_mesh(b.size, b.cells.map(|n| n as usize), [b.grading.x, b.grading.y, b.grading.z]).map(AnyMesh::Three)
+            box_mesh(b.size, b.cells.map(|n| n as usize), [b.grading.x, b.grading.y, b.grading.z])
+                .map(AnyMesh::Three)
         }
         job::Mesh::File(path) => gmsh::read(path),
     }
 }
 
 /// Holds the mesh against the job and splits it.
-pub(super) fn scene<const D: usize>(mesh: GlobalMesh<D>, loaded: &mut Loaded, ranks: usize) -> Result<Scene<D>> {
+pub(super) fn scene<const D: usize>(
+    mesh: GlobalMesh<D>,
+    loaded: &mut Loaded,
+    ranks: usize,
+) -> Result<Scene<D>> {
     let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
     let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
     loaded.check_mesh(MeshNames { dimension: D, boundaries: &boundaries, regions: &regions })?;
@@ -96,7 +101,11 @@ pub(super) fn scene<const D: usize>(mesh: GlobalMesh<D>, loaded: &mut Loaded, ra
     Ok(Scene { mesh, partition })
 }
 
-fn refuse_free_bodies<const D: usize>(mesh: &GlobalMesh<D>, topology: &Topology<D>, loaded: &Loaded) -> Result<()> {
+fn refuse_free_bodies<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    topology: &Topology<D>,
+    loaded: &Loaded,
+) -> Result<()> {
     let mut fixed = vec![[false; D]; mesh.nodes.len()];
     for support in &loaded.job.support {
         for name in &support.on {
@@ -124,7 +133,10 @@ fn refuse_free_bodies<const D: usize>(mesh: &GlobalMesh<D>, topology: &Topology<
     let key = if loaded.job.support.is_empty() { "material" } else { "support" };
     Err(loaded.fault(
         key,
-        format!("without [material] density the problem is quasistatic, and these motions are free: {}", free.join("; ")),
+        format!(
+            "without [material] density the problem is quasistatic, and these motions are free: {}",
+            free.join("; ")
+        ),
         "add supports that hold them, or give a density",
     ))
 }

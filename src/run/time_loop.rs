@@ -72,7 +72,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         outputs.at_start(session, &body, &state)?;
     }
     scheme.prepare_length(session, &body, job.time.step)?;
-    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, began, setup: began.elapsed() };
+    let mut run =
+        Run { session, job, body, state, scheme, totals, outputs, log, began, setup: began.elapsed() };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -102,7 +103,12 @@ fn restore<const D: usize, const S: usize>(
     for path in &candidates {
         match checkpoint::restore(session, path, identity, body, state) {
             Ok(header) => {
-                log.line(format!("going on from {} (step {}, t = {} s)", path.display(), header.step, header.time));
+                log.line(format!(
+                    "going on from {} (step {}, t = {} s)",
+                    path.display(),
+                    header.step,
+                    header.time
+                ));
                 let file = path.display().to_string();
                 return Ok(Some(Restored { file, totals: header.totals }));
             }
@@ -154,10 +160,10 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
             self.report(&outcome, last);
             let wish = self.wish(saved_at);
-            if let Some(reason) = wish.stop {
-                if self.state.time < end {
-                    return Ok(Ended::Stopped(reason));
-                }
+            if let Some(reason) = wish.stop
+                && self.state.time < end
+            {
+                return Ok(Ended::Stopped(reason));
             }
             if wish.save && self.state.time < end {
                 self.save()?;
@@ -191,7 +197,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             self.totals.energy_imbalance
         );
         self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
-        if step % last.div_ceil(LOGGED_STEPS).max(1) == 0 || step == last {
+        if step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last {
             self.log.quiet_line(words);
         }
     }
@@ -202,9 +208,10 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let mut clocks = [0.0; 2];
         let mut by_steps = false;
         if let Some(checkpoint) = &self.job.checkpoint {
-            by_steps = checkpoint.every.is_some_and(|every| self.state.step % every == 0);
+            by_steps = checkpoint.every.is_some_and(|every| self.state.step.is_multiple_of(every));
             let due = checkpoint.interval.is_some_and(|seconds| saved_at.elapsed().as_secs_f64() >= seconds);
-            let late = checkpoint.wall_limit.is_some_and(|seconds| self.began.elapsed().as_secs_f64() >= seconds);
+            let late =
+                checkpoint.wall_limit.is_some_and(|seconds| self.began.elapsed().as_secs_f64() >= seconds);
             clocks = self.session.largest([f64::from(u8::from(due)), f64::from(u8::from(late))]);
         }
         let limit = self.job.checkpoint.as_ref().and_then(|c| c.wall_limit).unwrap_or_default();
@@ -243,14 +250,18 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         if self.session.is_first() {
             super::header::closing(&mut self.log, &summary, self.job.output_folder());
         }
-        let written =
-            if self.session.is_first() { summary.write(self.job.output_folder()) } else { Ok(()) };
+        let written = if self.session.is_first() { summary.write(self.job.output_folder()) } else { Ok(()) };
         self.session.agree(written)?;
         self.outputs.close()?;
         ended.map(|_| exit)
     }
 
-    fn summary(&self, status: &'static str, error: Option<String>, restarted_from: Option<String>) -> Result<Summary> {
+    fn summary(
+        &self,
+        status: &'static str,
+        error: Option<String>,
+        restarted_from: Option<String>,
+    ) -> Result<Summary> {
         let stress = self.body.stress(&self.state)?;
         let von_mises = stress.iter().map(crate::tensor::von_mises).fold(0.0, f64::max);
         let fixed = self.body.fixed[..self.body.mesh.owned * D].iter().filter(|f| **f).count();

@@ -21,7 +21,8 @@ impl<const D: usize> CellMatrix<D> {
                 let block = &mut self.blocks[a][b];
                 for i in 0..D {
                     for j in 0..D {
-                        block[i][j] += cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
+                        block[i][j] +=
+                            cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
                     }
                     block[i][i] += cell.volume * inner;
                 }
@@ -157,9 +158,10 @@ impl LocalRows {
             let (mine, others) = rest.split_at(here);
             rest = others;
             row.clear();
-            row.extend((self.offsets[node]..self.offsets[node + 1]).map(|at| {
-                (mesh.global_node(self.columns[at]), &self.values[at * size..(at + 1) * size])
-            }));
+            row.extend(
+                (self.offsets[node]..self.offsets[node + 1])
+                    .map(|at| (mesh.global_node(self.columns[at]), &self.values[at * size..(at + 1) * size])),
+            );
             row.extend(mine.iter().map(|&(_, column, at)| (column, &blocks[at * size..(at + 1) * size])));
             row.sort_by_key(|entry| entry.0);
             for same in row.chunk_by(|a, b| a.0 == b.0) {

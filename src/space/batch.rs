@@ -115,7 +115,8 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             if needs.velocity_change {
                 let before = values_at::<D>(nodal.previous_velocity, nodes);
                 for a in 0..=D {
-                    self.velocity_change[at * (D + 1) + a] = std::array::from_fn(|i| values[a][i] - before[a][i]);
+                    self.velocity_change[at * (D + 1) + a] =
+                        std::array::from_fn(|i| values[a][i] - before[a][i]);
                 }
             }
         }

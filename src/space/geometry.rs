@@ -112,8 +112,10 @@ mod tests {
     fn gradients_of_an_affine_field_are_exact() {
         let corners = [[0.1, 0.2, 0.3], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.0, 0.3, 0.9]];
         let matrix = [[1.0, 2.0, 3.0], [-4.0, 5.0, 6.0], [0.5, -8.0, 9.0]];
-        let nodal: Vec<Vector<3>> =
-            corners.iter().map(|x| std::array::from_fn(|i| (0..3).map(|j| matrix[i][j] * x[j]).sum())).collect();
+        let nodal: Vec<Vector<3>> = corners
+            .iter()
+            .map(|x| std::array::from_fn(|i| (0..3).map(|j| matrix[i][j] * x[j]).sum()))
+            .collect();
         let gradient = Simplex::new(&corners).field_gradient(&nodal);
         for i in 0..3 {
             for j in 0..3 {

@@ -25,7 +25,11 @@ const SAME_FACE: f64 = 0.766_044_443_118_978;
 ///
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
 /// point with their mean normal.
-pub fn surface_points<const D: usize>(session: &Session, mesh: &Mesh<D>, facets: &[u32]) -> Vec<SurfacePoint<D>> {
+pub fn surface_points<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+) -> Vec<SurfacePoint<D>> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let nodes = mesh.facets[facet as usize];
@@ -45,7 +49,9 @@ pub fn surface_points<const D: usize>(session: &Session, mesh: &Mesh<D>, facets:
         .collect();
     shares.sort_by(|a, b| {
         let vectors = a.1.iter().zip(&b.1);
-        a.0.cmp(&b.0).then_with(|| vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal))
+        a.0.cmp(&b.0).then_with(|| {
+            vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+        })
     });
     shares.chunk_by(|a, b| a.0 == b.0).flat_map(|around| points_of_node(mesh, around)).collect()
 }

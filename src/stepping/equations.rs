@@ -63,7 +63,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         Ok(())
     }
 
-    fn apply_jacobian(&mut self, direction: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
+    fn apply_jacobian(
+        &mut self,
+        direction: &DistributedVector,
+        result: &mut DistributedVector,
+    ) -> Result<()> {
         self.matrix.multiply(direction, result)?;
         self.add_contact(direction, result, Contact::add_derivative)
     }

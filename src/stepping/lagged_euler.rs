@@ -204,11 +204,11 @@ impl LaggedEuler {
         state: &State,
         step: Step,
     ) -> Result<Energy> {
-        if let Some(load) = &mut self.load {
-            if !self.load_is_current {
-                session.agree(body.write_loads(step.time, load))?;
-                self.load_is_current = body.load.is_steady();
-            }
+        if let Some(load) = &mut self.load
+            && !self.load_is_current
+        {
+            session.agree(body.write_loads(step.time, load))?;
+            self.load_is_current = body.load.is_steady();
         }
         let energy = {
             let mut forces = self.right_hand_side.local_mut()?;
@@ -244,7 +244,11 @@ impl LaggedEuler {
     ) -> Result<StepOutcome> {
         let norm = self.right_hand_side.norm()?;
         if !norm.is_finite() {
-            return Err(failed(step, "the forces are not finite", "check loads and initial values; use smaller steps"));
+            return Err(failed(
+                step,
+                "the forces are not finite",
+                "check loads and initial values; use smaller steps",
+            ));
         }
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE);
         let Some((_, matrix)) = &self.matrix else {
@@ -304,10 +308,14 @@ impl LaggedEuler {
     }
 }
 
-const REMEDY: &str = "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
+const REMEDY: &str =
+    "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
 
 fn failed(step: Step, what: &str, remedy: &str) -> Error {
-    Error::Failed(format!("step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}", step.time, step.length))
+    Error::Failed(format!(
+        "step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}",
+        step.time, step.length
+    ))
 }
 
 fn prepare(ksp: &mut Ksp, preconditioner: Preconditioner) -> Result<()> {
