@@ -58,7 +58,6 @@ impl Texts {
         let mut text = String::new();
         for fault in faults.iter().take(SHOWN) {
             text.push_str(&self.render(fault));
-            text.push('\n');
         }
         if faults.len() > SHOWN {
             text.push_str(&format!("... and {} more\n\n", faults.len() - SHOWN));
@@ -83,15 +82,16 @@ impl Texts {
     }
 }
 
-/// The text with control characters replaced by question marks of the same length in bytes, so that a job can't
+/// The text with control characters replaced by as many bytes of plain ones, so that a job can't
 /// drive the user's terminal.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        if c.is_control() && !matches!(c, '\n' | '\r' | '\t') {
-            out.extend(std::iter::repeat_n('?', c.len_utf8()));
-        } else {
-            out.push(c);
+        match c {
+            '\r' => out.push(' '),
+            '\n' | '\t' => out.push(c),
+            c if c.is_control() => out.extend(std::iter::repeat_n('?', c.len_utf8())),
+            c => out.push(c),
         }
     }
     out
