@@ -16,6 +16,11 @@ const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
     ("time.adaptive", None, "adaptive time stepping is"),
 ];
 
+/// Whether the table or key `path` (without positions in lists), or its choice `word`, is not available yet.
+pub fn is_unavailable(path: &str, word: Option<&str>) -> bool {
+    UNAVAILABLE.iter().any(|(pattern, only, _)| pattern.replace(".*", "") == path && *only == word)
+}
+
 /// A fault for everything in the document that is not available yet.
 pub fn faults(root: &Node) -> Vec<Fault> {
     let mut faults = Vec::new();

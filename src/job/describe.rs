@@ -2,11 +2,13 @@
 
 use serde_json::Value;
 
+use super::available;
 use super::nearest::nearest;
 use super::schema::{Schema, resolve, schema};
 use crate::error::{Error, Result};
 
 const WIDTH: usize = 100;
+const NOT_YET: &str = " Not available yet.";
 
 /// A table of the job and its keys.
 struct Table {
@@ -70,16 +72,24 @@ pub fn tables_with(key: &str) -> Option<String> {
 
 fn tables() -> Vec<Table> {
     let mut all = Vec::new();
-    for (key, property) in resolve(schema()).properties() {
-        collect(key, property, &mut all);
+    let job = resolve(schema());
+    let required: Vec<&str> = job.required().collect();
+    for (key, property) in job.properties() {
+        collect(key, property, required.contains(&key.as_str()), &mut all);
     }
     all
 }
 
-fn collect(path: &str, schema: Schema, all: &mut Vec<Table>) {
+fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
     let several = schema.accepts("array");
     let body = if several { schema.items().unwrap_or(schema) } else { schema };
     let mut meaning = flat(schema.text("description").unwrap_or_default());
+    if required {
+        meaning.push_str(" Required.");
+    }
+    if available::is_unavailable(path, None) {
+        meaning.push_str(NOT_YET);
+    }
     let tagged = body.tagged();
     let at = all.len();
     let mut keys = Vec::new();
@@ -90,7 +100,8 @@ fn collect(path: &str, schema: Schema, all: &mut Vec<Table>) {
             .collect()
     } else {
         let names: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
-        meaning.push_str(&format!(" Exactly one of: {}.", names.join(", ")));
+        let choice = if names.len() == 1 { "One table or key" } else { "Exactly one of" };
+        meaning.push_str(&format!(" {choice}: {}.", names.join(", ")));
         tagged.iter().filter_map(|(name, branch)| Some((*name, branch.property(name)?, false))).collect()
     };
     for (key, inner, required) in properties {
@@ -99,15 +110,15 @@ fn collect(path: &str, schema: Schema, all: &mut Vec<Table>) {
             || is_tables(inner)
             || !inner.tagged().is_empty()
         {
-            collect(&format!("{path}.{key}"), inner, all);
+            collect(&format!("{path}.{key}"), inner, required, all);
         } else {
-            keys.push((key, key_text(key, inner, branch, required)));
+            keys.push((key, key_text(path, key, inner, branch, required)));
         }
     }
     if let Some(free) = body.items().filter(|items| items.accepts("object")) {
         for (key, inner) in free.properties() {
             let required = free.required().any(|name| name == key);
-            keys.push((key, key_text(key, inner, None, required)));
+            keys.push((key, key_text(path, key, inner, None, required)));
         }
         meaning.push_str(&format!(" Each: [{path}.\"name\"] or \"name\" = {{ .. }}."));
     }
@@ -129,7 +140,7 @@ impl Table {
     }
 }
 
-fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
+fn key_text(path: &str, key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
     let mut facts = vec![kind(schema)];
     let range = range(schema.items().filter(|_| schema.accepts("array")).unwrap_or(schema));
     if range != "any number" {
@@ -146,13 +157,17 @@ fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -
     text.push_str(&wrapped(&flat(meaning.unwrap_or_default()), 6));
     for choice in schema.alternatives() {
         if let (Some(word), Some(meaning)) = (choice.text("const"), choice.text("description")) {
-            text.push_str(&wrapped(&format!("\"{word}\": {}", flat(meaning)), 8));
+            text.push_str(&wrapped(&format!("\"{word}\": {}{}", flat(meaning), not_yet(path, key, word)), 8));
         }
     }
     for example in schema.get("examples").as_array().into_iter().flatten() {
         text.push_str(&format!("      example: {key} = {}\n", toml(example)));
     }
     text
+}
+
+fn not_yet(path: &str, key: &str, word: &str) -> &'static str {
+    if available::is_unavailable(&format!("{path}.{key}"), Some(word)) { NOT_YET } else { "" }
 }
 
 /// What may stand here, in words.

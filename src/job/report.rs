@@ -58,7 +58,6 @@ impl Texts {
         let mut text = String::new();
         for fault in faults.iter().take(SHOWN) {
             text.push_str(&self.render(fault));
-            text.push('\n');
         }
         if faults.len() > SHOWN {
             text.push_str(&format!("... and {} more\n\n", faults.len() - SHOWN));
@@ -70,28 +69,34 @@ impl Texts {
 
     fn render(&self, fault: &Fault) -> String {
         let label =
-            Label::primary(fault.at.file, fault.at.start..fault.at.end).with_message(printable(&fault.label));
-        let notes = fault.notes.iter().map(|note| printable(note)).collect();
+            Label::primary(fault.at.file, fault.at.start..fault.at.end).with_message(one_line(&fault.label));
+        let notes = fault.notes.iter().map(|note| one_line(note)).collect();
         let diagnostic =
-            Diagnostic::error().with_message(printable(&fault.message)).with_label(label).with_notes(notes);
+            Diagnostic::error().with_message(one_line(&fault.message)).with_label(label).with_notes(notes);
         let config = Config { chars: Chars::ascii(), ..Config::default() };
         let mut buffer = if self.colour { Buffer::ansi() } else { Buffer::no_color() };
         match emit_to_write_style(&mut buffer, &config, &self.files, &diagnostic) {
             Ok(()) => String::from_utf8_lossy(buffer.as_slice()).into_owned(),
-            Err(_) => format!("error: {}\n", printable(&fault.message)),
+            Err(_) => format!("error: {}\n", one_line(&fault.message)),
         }
     }
 }
 
-/// The text with control characters replaced by question marks of the same length in bytes, so that a job can't
+/// A message that can't look like several.
+fn one_line(text: &str) -> String {
+    printable(text).replace(['\n', '\t'], " ")
+}
+
+/// The text with control characters replaced by as many bytes of plain ones, so that a job can't
 /// drive the user's terminal.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        if c.is_control() && !matches!(c, '\n' | '\r' | '\t') {
-            out.extend(std::iter::repeat_n('?', c.len_utf8()));
-        } else {
-            out.push(c);
+        match c {
+            '\r' => out.push(' '),
+            '\n' | '\t' => out.push(c),
+            c if c.is_control() => out.extend(std::iter::repeat_n('?', c.len_utf8())),
+            c => out.push(c),
         }
     }
     out

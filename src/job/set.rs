@@ -2,6 +2,7 @@
 
 use toml_edit::Key;
 
+use super::expression::Expression;
 use super::report::Fault;
 use super::source::{Node, Place, Value, parse_value};
 
@@ -51,11 +52,16 @@ fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
     };
     match parse_value(text, file, start..end) {
         Ok(node) => Ok(node),
-        Err(_) if first.is_alphabetic() || matches!(first, '/' | '.' | '_' | '~') => {
+        Err(_) if is_bare(first, &text[start..end]) => {
             Ok(Node { value: Value::Text(text[start..end].to_owned()), at: place.clone(), key: place })
         }
         Err(fault) => Err(fault.help(help)),
     }
+}
+
+/// Words, paths and expressions need no quotes.
+fn is_bare(first: char, text: &str) -> bool {
+    first.is_alphabetic() || matches!(first, '/' | '.' | '_' | '~') || Expression::parse(text).is_ok()
 }
 
 fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(), Fault> {

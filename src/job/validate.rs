@@ -63,7 +63,7 @@ impl Walk<'_> {
             let inner = join(path, key);
             match (schema.property(key), schema.items()) {
                 (Some(property), _) => self.value(child, property, &inner),
-                (None, Some(free)) => self.value(child, free, &inner),
+                (None, Some(free)) => self.free_key(child, free, schema, &inner),
                 (None, None) => meant.extend(self.unknown_key(child, key, &known, path)),
             }
         }
@@ -71,6 +71,18 @@ impl Walk<'_> {
             if !table.contains_key(key) && !meant.contains(&key) {
                 self.missing(node, key, schema.property(key), path);
             }
+        }
+    }
+
+    /// A key whose name the user chooses.
+    fn free_key(&mut self, child: &Node, free: Schema, schema: Schema, path: &str) {
+        let split = matches!(&child.value, Value::Table(inner) if inner.values().any(|node| matches!(node.value, Value::Table(_))));
+        match schema.text("key_help").filter(|_| split) {
+            Some(help) => {
+                let message = format!("`{path}` is not a quantity by itself");
+                self.faults.push(Fault::new(child.key.clone(), message, "").help(help));
+            }
+            None => self.value(child, free, path),
         }
     }
 
@@ -252,9 +264,6 @@ impl Walk<'_> {
                 fault = fault.help(format!("write {number:.0}, without a point"));
             }
             _ => {}
-        }
-        if let Some(help) = schema.text("key_help") {
-            fault = fault.help(help);
         }
         self.faults.push(fault);
     }

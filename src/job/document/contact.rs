@@ -33,7 +33,7 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// The normal law; exactly one.
+/// The normal law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalLaw {
@@ -115,7 +115,7 @@ pub struct Unilateral {
     pub gap: Scalar,
 }
 
-/// The friction law; exactly one.
+/// The friction law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Friction {

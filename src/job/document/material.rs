@@ -59,7 +59,7 @@ pub struct Viscosity {
     pub shear: f64,
 }
 
-/// The viscoplastic law; exactly one.
+/// The viscoplastic law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Viscoplasticity {

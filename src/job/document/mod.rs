@@ -1,7 +1,7 @@
 //! The job as plain structs: the single source of every key's name, meaning, unit, range and default.
 //!
 //! Doc comments become the text of `solver describe`; the `schemars` attributes become the ranges that
-//! [`validate`](super::validate) checks before these structs are filled.
+//! `validate` checks before these structs are filled.
 
 mod boundary;
 mod contact;
@@ -33,7 +33,7 @@ pub struct Job {
     /// What the job is about; changes nothing in the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<About>,
-    /// The body's mesh: exactly one of rectangle, box, file.
+    /// The body's mesh.
     pub mesh: Mesh,
     /// The material of every cell that no region names.
     pub material: Material,

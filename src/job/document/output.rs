@@ -25,7 +25,7 @@ pub struct Output {
     pub profile: Vec<Profile>,
 }
 
-/// How often: exactly one of every, interval.
+/// How often.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Every {

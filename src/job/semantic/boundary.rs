@@ -100,12 +100,10 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
             check_name(findings, &path, &name, mesh.boundaries, "boundary");
         }
     }
-    if root.find("mesh.file").is_some() {
-        for region in items(root, "region") {
-            let path = format!("{region}.name");
-            if let Some(name) = root.read::<String>(&path) {
-                check_name(findings, &path, &name, mesh.regions, "region");
-            }
+    for region in items(root, "region") {
+        let path = format!("{region}.name");
+        if let Some(name) = root.read::<String>(&path) {
+            check_name(findings, &path, &name, mesh.regions, "region");
         }
     }
     for table in ["traction", "body_force"] {

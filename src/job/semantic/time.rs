@@ -22,7 +22,8 @@ pub fn check(findings: &mut Findings<'_>) {
 }
 
 fn check_steps(findings: &mut Findings<'_>) {
-    let read = |key: &str| findings.root.read::<f64>(key).filter(|number| *number > 0.0);
+    let read =
+        |key: &str| findings.root.read::<f64>(key).filter(|number| number.is_finite() && *number > 0.0);
     let (end, step) = (read("time.end"), read("time.step"));
     let (smallest, largest) = (read("time.adaptive.smallest_step"), read("time.adaptive.largest_step"));
     if let (Some(end), Some(step)) = (end, step) {
