@@ -59,7 +59,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let restored = restore(session, start, folder, &identity, &mut body, &mut state, &mut log)?;
-    let mut scheme = session.agree(LaggedEuler::new(&body, &state, build::settings(job)))?;
+    let mut scheme = session.agree(LaggedEuler::new(session, &body, &state, build::settings(job)))?;
     super::header::write(session, &mut log, loaded, &body, &scheme)?;
     let energy = {
         let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };

@@ -78,6 +78,7 @@ pub struct LaggedEuler {
 impl LaggedEuler {
     /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
     pub fn new<const D: usize, const S: usize>(
+        session: &Session,
         body: &Body<D, S>,
         state: &State,
         settings: SolverSettings,
@@ -86,13 +87,13 @@ impl LaggedEuler {
         let preconditioner = settings.preconditioner.resolve(D, unknowns);
         let solver = if body.contacts.is_empty() {
             let mut ksp = Ksp::new("")?;
-            prepare(&mut ksp, preconditioner)?;
+            preconditioner.configure(&mut ksp, session.ranks(), unknowns)?;
             ksp.start_from_solution()?;
             ksp.apply_options()?;
             Solver::Linear(ksp)
         } else {
             let mut snes = Snes::new("", &state.velocity, D)?;
-            prepare(&mut snes.linear_solver()?, preconditioner)?;
+            preconditioner.configure(&mut snes.linear_solver()?, session.ranks(), unknowns)?;
             snes.apply_options()?;
             let scratch = if body.contacts.iter().any(|c| c.needs_ghosts()) {
                 Some([state.velocity.like()?, state.velocity.like()?])
@@ -316,10 +317,6 @@ fn failed(step: Step, what: &str, remedy: &str) -> Error {
         "step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}",
         step.time, step.length
     ))
-}
-
-fn prepare(ksp: &mut Ksp, preconditioner: Preconditioner) -> Result<()> {
-    preconditioner.configure(ksp)
 }
 
 /// Branches of all contact points at owned or ghost velocities.

@@ -10,7 +10,7 @@ use crate::{
 pub enum Preconditioner {
     /// Chosen by size.
     Auto,
-    /// Cholesky factorisation by MUMPS.
+    /// Cholesky factorisation.
     Cholesky,
     /// PETSc's smoothed aggregation multigrid with the rigid motions.
     Gamg,
@@ -32,6 +32,8 @@ pub struct SolverSettings {
 /// Most unknowns for which a factorisation is faster than multigrid, by dimension.
 const DIRECT_2D: usize = 20_000;
 const DIRECT_3D: usize = 6_000;
+/// Most unknowns whose matrix every rank factors for itself.
+const REDUNDANT: usize = 50_000;
 /// Krylov iterations after which a linear solve has failed.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
@@ -57,9 +59,19 @@ impl Preconditioner {
     }
 
     /// Sets the method and the preconditioner; PETSc options that the user gave stay.
-    pub(super) fn configure(self, ksp: &mut Ksp) -> Result<()> {
+    ///
+    /// Cholesky of a small matrix is done by CHOLMOD on every rank at once: MUMPS on several ranks sums in the order in
+    /// which messages arrive, so that no two runs agree to the last bit. It serves where the matrix is too large for that.
+    pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
         ksp.set_method("cg")?;
         match self {
+            Self::Auto | Self::Cholesky if ranks == 1 => ksp.set_preconditioner("cholesky", Some("cholmod")),
+            Self::Auto | Self::Cholesky if unknowns <= REDUNDANT => {
+                ksp.set_preconditioner("redundant", None)?;
+                set_default_option("redundant_ksp_type", "preonly")?;
+                set_default_option("redundant_pc_type", "cholesky")?;
+                set_default_option("redundant_pc_factor_mat_solver_type", "cholmod")
+            }
             Self::Auto | Self::Cholesky => ksp.set_preconditioner("cholesky", Some("mumps")),
             Self::Gamg => {
                 ksp.set_preconditioner("gamg", None)?;
