@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Exit, Result},
     job::{self, Job},
-    run::{self, Start},
+    run::{self, Clock, Start},
     session::Mpi,
 };
 use clap::{Args, Parser, Subcommand};
@@ -11,6 +11,7 @@ use std::{
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
+    time::Instant,
 };
 
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
@@ -121,12 +122,14 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         Some(file) if file.as_os_str().is_empty() => Start::Newest,
         Some(file) => Start::From(file.clone()),
     };
+    let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
+    let clock = Clock { began, launched: began.elapsed() };
     let colour = std::io::stderr().is_terminal();
     let loaded = Job::load_coloured(&arguments.job, &arguments.overrides, colour);
     let loaded = session.agree_quietly(loaded)?;
-    let result = run::run(&session, loaded, &start);
+    let result = run::run(&session, loaded, &start, clock);
     if let Err(error) = &result {
         print_error(error);
     }

@@ -62,7 +62,12 @@ pub fn set_option(name: &str, value: &str) -> Result<()> {
     let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
     let value = c_string(value)?;
     // SAFETY: NUL-terminated strings that PETSc copies; NULL is the global options database.
-    check(unsafe { sys::PetscOptionsSetValue(ptr::null_mut(), name.as_ptr(), value.as_ptr()) })
+    check(unsafe { sys::PetscOptionsSetValue(ptr::null_mut(), name.as_ptr(), value.as_ptr()) })?;
+    if name.as_c_str() == c"-log_view" {
+        // SAFETY: PETSc is started; it looks for this option only then, so logging is begun here.
+        check(unsafe { sys::PetscLogDefaultBegin() })?;
+    }
+    Ok(())
 }
 
 /// Sets a PETSc option unless the user has set it already.
@@ -88,13 +93,22 @@ impl Stage {
         Ok(Self(stage))
     }
 
-    /// Runs `body` inside the stage.
-    pub fn run<T>(self, body: impl FnOnce() -> Result<T>) -> Result<T> {
+    /// Enters the stage; it is left when the guard is dropped.
+    pub fn enter(self) -> Result<Entered> {
         // SAFETY: the stage was registered.
         check(unsafe { sys::PetscLogStagePush(self.0) })?;
-        let result = body();
-        // SAFETY: pops the stage pushed above.
-        check(unsafe { sys::PetscLogStagePop() })?;
-        result
+        Ok(Entered(PhantomData))
+    }
+}
+
+/// A stage that was entered.
+#[must_use]
+#[derive(Debug)]
+pub struct Entered(PhantomData<*mut ()>);
+
+impl Drop for Entered {
+    fn drop(&mut self) {
+        // SAFETY: leaves the stage entered when this guard was made.
+        unsafe { sys::PetscLogStagePop() };
     }
 }

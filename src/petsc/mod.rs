@@ -13,7 +13,7 @@ pub mod sys;
 mod vector;
 
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Petsc, Stage, set_default_option, set_option};
+pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use vector::{DistributedVector, LocalRead, LocalWrite};

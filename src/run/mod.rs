@@ -20,7 +20,10 @@ use crate::{
 use mpi::topology::Communicator;
 use mpi::traits::Root;
 use scene::AnyScene;
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 /// Version of the solver with the id of its source.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
@@ -36,17 +39,25 @@ pub enum Start {
     From(PathBuf),
 }
 
+/// When the process began and how long MPI and PETSc took to start.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    /// The beginning.
+    pub began: Instant,
+    /// Time until MPI and PETSc were up.
+    pub launched: Duration,
+}
+
 /// Runs a job to its end or to a request to stop. Collective.
-pub fn run(session: &Session, loaded: Loaded, start: &Start) -> Result<Exit> {
-    let began = Instant::now();
+pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit> {
     let mut loaded = loaded;
     let scene = session.agree(scene::AnyScene::of(session, &mut loaded))?;
     match (dimension(session, &scene), loaded.job.material.hypothesis) {
         (2, Some(job::Hypothesis::PlaneStrain)) => {
-            time_loop::run::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), start, began)
+            time_loop::run::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), start, clock)
         }
-        (2, _) => time_loop::run::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), start, began),
-        (3, _) => time_loop::run::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), start, began),
+        (2, _) => time_loop::run::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), start, clock),
+        (3, _) => time_loop::run::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), start, clock),
         (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
     }
 }

@@ -1,7 +1,7 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Inventory, Scene, Start, build,
+    Clock, Inventory, Scene, Start, build,
     outputs::{Outputs, prepare_folder},
     scene::refuse_empty_matrix,
     summary::{Certificates, PartitionQuality, Summary, peak_memory},
@@ -39,7 +39,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     loaded: &Loaded,
     scene: Option<Scene<D>>,
     start: &Start,
-    began: Instant,
+    clock: Clock,
 ) -> Result<Exit> {
     let job = &loaded.job;
     session.agree(refuse_empty_matrix(loaded))?;
@@ -72,8 +72,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         outputs.at_start(session, &body, &state)?;
     }
     scheme.prepare_length(session, &body, job.time.step)?;
-    let mut run =
-        Run { session, job, body, state, scheme, totals, outputs, log, began, setup: began.elapsed() };
+    let setup = clock.began.elapsed() - clock.launched;
+    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, clock, setup };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -141,7 +141,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     totals: Totals,
     outputs: Outputs<D>,
     log: Log,
-    began: Instant,
+    clock: Clock,
     setup: Duration,
 }
 
@@ -210,8 +210,9 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         if let Some(checkpoint) = &self.job.checkpoint {
             by_steps = checkpoint.every.is_some_and(|every| self.state.step.is_multiple_of(every));
             let due = checkpoint.interval.is_some_and(|seconds| saved_at.elapsed().as_secs_f64() >= seconds);
-            let late =
-                checkpoint.wall_limit.is_some_and(|seconds| self.began.elapsed().as_secs_f64() >= seconds);
+            let late = checkpoint
+                .wall_limit
+                .is_some_and(|seconds| self.clock.began.elapsed().as_secs_f64() >= seconds);
             clocks = self.session.largest([f64::from(u8::from(due)), f64::from(u8::from(late))]);
         }
         let limit = self.job.checkpoint.as_ref().and_then(|c| c.wall_limit).unwrap_or_default();
@@ -308,9 +309,10 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     /// Seconds by phase of the slowest rank; a phase without an effect in it is absent. Collective.
     fn seconds(&self) -> serde_json::Map<String, serde_json::Value> {
         let clock = &self.scheme.clock;
-        let total = self.began.elapsed();
+        let total = self.clock.began.elapsed();
         let phases = [
             ("total", total),
+            ("launch", self.clock.launched),
             ("setup", self.setup.saturating_sub(clock.first_assembly)),
             ("assembly", clock.assembly),
             ("history", clock.history),

@@ -15,7 +15,7 @@ use crate::{
     body::Body,
     effect::{Energy, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, Snes},
+    petsc::{DistributedVector, Ksp, Matrix, Snes, Stage},
     session::Session,
     state::State,
 };
@@ -56,6 +56,25 @@ pub struct StepClock {
     pub first_assembly: Duration,
 }
 
+/// Stages of PETSc's `-log_view`.
+struct Stages {
+    assembly: Stage,
+    history: Stage,
+    solve: Stage,
+    balance: Stage,
+}
+
+impl Stages {
+    fn register() -> Result<Self> {
+        Ok(Self {
+            assembly: Stage::register("assembly")?,
+            history: Stage::register("history")?,
+            solve: Stage::register("solve")?,
+            balance: Stage::register("balance")?,
+        })
+    }
+}
+
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
 enum Solver {
     Linear(Ksp),
@@ -65,6 +84,7 @@ enum Solver {
 /// The scheme with its matrix, solver and work vectors.
 pub struct LaggedEuler {
     settings: SolverSettings,
+    stages: Stages,
     matrix: Option<(f64, Matrix)>,
     solver: Solver,
     load: Option<DistributedVector>,
@@ -104,6 +124,7 @@ impl LaggedEuler {
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
+            stages: Stages::register()?,
             matrix: None,
             solver,
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
@@ -140,6 +161,7 @@ impl LaggedEuler {
             return Ok(());
         }
         let start = Instant::now();
+        let _stage = self.stages.assembly.enter()?;
         self.matrix = None;
         let rows = session.agree(body.matrix(session, length))?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
@@ -172,15 +194,20 @@ impl LaggedEuler {
     ) -> Result<StepOutcome> {
         self.prepare_length(session, body, step.length)?;
         let start = Instant::now();
+        let stage = self.stages.history.enter()?;
         let explicit = self.write_right_hand_side(session, body, state, step)?;
         self.extrapolate(state, step)?;
+        drop(stage);
         let solving = Instant::now();
         self.clock.history += solving - start;
+        let stage = self.stages.solve.enter()?;
         let mut outcome = self.solve(session, body, state, step)?;
         state.commit(&self.trial, step.time, step.length)?;
         body.commit();
+        drop(stage);
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
+        let _stage = self.stages.balance.enter()?;
         let mut energy = body.energy(state, step)?;
         energy += explicit;
         {
