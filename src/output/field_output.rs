@@ -1,9 +1,12 @@
 //! Which fields go into `fields.vtkhdf`.
 
-use super::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use super::{
+    fields::{Field, FieldFile, FieldMesh, Place, Shape},
+    log::Log,
+};
 use crate::{
     body::Body,
-    error::Result,
+    error::{Error, Result},
     session::Session,
     state::State,
     tensor::{Mandel, von_mises},
@@ -14,12 +17,14 @@ use std::path::Path;
 pub struct FieldOutput<const D: usize>(FieldFile<D>);
 
 impl<const D: usize> FieldOutput<D> {
-    /// Creates the files with the mesh, or goes on with them behind this time. Collective.
+    /// Creates the files with the mesh, or goes on with them behind this time; files that
+    /// can't be read are put aside. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         folder: &Path,
         body: &Body<D, S>,
         goes_on_after: Option<f64>,
+        log: &mut Log,
     ) -> Result<Self> {
         let mesh = &body.mesh;
         let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
@@ -31,12 +36,21 @@ impl<const D: usize> FieldOutput<D> {
             cells: &cells,
             cell_ids: &cell_ids,
         };
-        let exists = session.is_first() && folder.join("fields.vtkhdf").exists();
-        let exists = session.largest([f64::from(u8::from(exists))])[0] > 0.0;
-        Ok(Self(match goes_on_after {
-            Some(time) if exists => FieldFile::resume(folder, session.world(), parts, time)?,
-            _ => FieldFile::create(folder, session.world(), parts)?,
-        }))
+        let file = folder.join("fields.vtkhdf");
+        let exists = session.largest([f64::from(u8::from(session.is_first() && file.exists()))])[0] > 0.0;
+        let (Some(time), true) = (goes_on_after, exists) else {
+            return Ok(Self(FieldFile::create(folder, session.world(), parts)?));
+        };
+        match FieldFile::resume(folder, session.world(), parts, time) {
+            Ok(resumed) => Ok(Self(resumed)),
+            Err(error) => {
+                let aside = folder.join("fields.damaged.vtkhdf");
+                log.line(format!("warning: {error}; it is kept as {}, a new one is begun", aside.display()));
+                let moved = if session.is_first() { std::fs::rename(&file, &aside) } else { Ok(()) };
+                session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
+                Ok(Self(FieldFile::create(folder, session.world(), parts)?))
+            }
+        }
     }
 
     /// The last time written, if any.

@@ -47,6 +47,7 @@ impl<const D: usize> Outputs<D> {
         body: &Body<D, S>,
         state: &State,
         goes_on: bool,
+        log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
         let folder = job.output_folder().to_owned();
@@ -61,7 +62,7 @@ impl<const D: usize> Outputs<D> {
             Ok(())
         };
         session.agree(opened)?;
-        let fields = FieldOutput::open(session, &folder, body, time)?;
+        let fields = FieldOutput::open(session, &folder, body, time, log)?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let every = job.output.fields;
         Ok(Self { folder, identity, history, probes, profiles, fields, every, keep, spent: start.elapsed() })

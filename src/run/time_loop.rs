@@ -67,7 +67,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         crate::effect::Energy::from_array(session.sum(mine.to_array()))
     };
     let totals = restored.as_ref().map_or_else(|| Totals::at_start(energy), |r| r.totals);
-    let mut outputs = Outputs::open(session, job, identity, &body, &state, goes_on)?;
+    let mut outputs = Outputs::open(session, job, identity, &body, &state, goes_on, &mut log)?;
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
     }
@@ -230,31 +230,49 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         Ok(())
     }
 
-    /// Writes the last files and the summary; gives the exit code or the error that ended the steps. Collective.
+    /// Writes the last files and the summary; gives the exit code or the first error. Collective.
     fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit> {
         self.log.end_progress();
-        let (status, error, exit) = match &ended {
-            Ok(Ended::Completed) => ("completed", None, Exit::Done),
+        let mut result = match ended {
+            Ok(Ended::Completed) => Ok(Exit::Done),
             Ok(Ended::Stopped(reason)) => {
                 self.log.line(format!("stopping on {reason}; go on with --restart"));
-                ("stopped", None, Exit::Stopped)
+                Ok(Exit::Stopped)
             }
-            Err(error) => ("failed", Some(error.to_string()), error.exit()),
+            Err(error) => Err(error),
         };
-        if exit != Exit::Done {
-            self.save()?;
+        if result != Ok(Exit::Done) || self.job.checkpoint.is_some() {
+            let saved = self.save();
+            self.keep_first(&mut result, saved);
         }
-        if exit != Exit::Stopped {
-            self.outputs.at_end(self.session, &self.body, &self.state)?;
+        if result != Ok(Exit::Stopped) {
+            let written = self.outputs.at_end(self.session, &self.body, &self.state);
+            self.keep_first(&mut result, written);
         }
+        let (status, error) = match &result {
+            Ok(Exit::Done) => ("completed", None),
+            Ok(_) => ("stopped", None),
+            Err(error) => ("failed", Some(error.to_string())),
+        };
         let summary = self.summary(status, error, restarted_from)?;
+        let mut written = Ok(());
         if self.session.is_first() {
             super::header::closing(&mut self.log, &summary, self.job.output_folder());
+            written = summary.write(self.job.output_folder());
         }
-        let written = if self.session.is_first() { summary.write(self.job.output_folder()) } else { Ok(()) };
-        self.session.agree(written)?;
-        self.outputs.close()?;
-        ended.map(|_| exit)
+        let written = self.session.agree(written);
+        self.keep_first(&mut result, written);
+        let closed = self.outputs.close();
+        result.and_then(|exit| closed.map(|()| exit))
+    }
+
+    /// A later error is logged, not lost, and does not hide the first.
+    fn keep_first<T>(&mut self, result: &mut Result<Exit>, later: Result<T>) {
+        let Err(error) = later else { return };
+        match result {
+            Ok(_) => *result = Err(error),
+            Err(_) => self.log.line(format!("error: {error}")),
+        }
     }
 
     fn summary(
