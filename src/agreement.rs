@@ -4,30 +4,35 @@ use crate::error::{Error, Exit, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 
-/// Turns the results of the ranks into one outcome: a value everywhere, or an error everywhere. A rank that failed
-/// keeps its own error, the others get that of the lowest rank that failed. Collective.
+/// Turns the results of the ranks into one outcome: a value everywhere, or an error everywhere. The lowest rank that
+/// failed by itself keeps its error, the others get its words. Collective.
 pub fn agree<T>(communicator: &impl Communicator, result: Result<T>) -> Result<T> {
-    let size = communicator.size();
-    let own = if result.is_ok() { size } else { communicator.rank() };
-    let mut lowest = size;
+    let (size, rank) = (communicator.size(), communicator.rank());
+    let own = match &result {
+        Ok(_) => 2 * size,
+        Err(Error::Elsewhere { .. }) => size + rank,
+        Err(_) => rank,
+    };
+    let mut lowest = 2 * size;
     communicator.all_reduce_into(&own, &mut lowest, SystemOperation::min());
-    if lowest == size {
+    if lowest == 2 * size {
         return result;
     }
     let (mut exit, mut text) = match &result {
         Err(error) if own == lowest => (error.exit() as u8, error.to_string().into_bytes()),
         _ => (0, Vec::new()),
     };
-    let culprit = communicator.process_at_rank(lowest);
+    let speaker = lowest % size;
+    let culprit = communicator.process_at_rank(speaker);
     let mut length = text.len() as u64;
     culprit.broadcast_into(&mut exit);
     culprit.broadcast_into(&mut length);
     text.resize(length as usize, 0);
     culprit.broadcast_into(&mut text[..]);
     match result {
-        Err(error) => Err(error),
-        Ok(_) => Err(Error::Elsewhere {
-            rank: lowest as usize,
+        Err(error) if own == lowest => Err(error),
+        _ => Err(Error::Elsewhere {
+            rank: speaker as usize,
             exit: Exit::from_code(i32::from(exit)),
             message: String::from_utf8_lossy(&text).into_owned(),
         }),

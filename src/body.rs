@@ -98,6 +98,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter_mut().for_each(|effect| effect.commit());
     }
 
+    /// Velocity components that no support holds, over all ranks. Collective.
+    pub fn unknowns(&self, session: &Session) -> usize {
+        session.total(self.fixed[..self.mesh.owned * D].iter().filter(|fixed| !**fixed).count())
+    }
+
     /// Names of all that is simulated.
     pub fn effect_names(&self) -> Vec<&'static str> {
         let mut names: Vec<&str> = self.effects.iter().map(|e| e.name()).collect();

@@ -3,20 +3,42 @@
 use crate::{
     error::{Error, Exit, Result},
     job::{self, Job},
-    run::{self, Clock, Start},
+    output::inspect::inspect,
+    run::{self, Clock, Purpose, Start},
     session::Mpi,
 };
 use clap::{Args, Parser, Subcommand};
 use std::{
+    ffi::OsString,
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
     time::Instant,
 };
 
+const EXAMPLES: &str = "\
+Examples:
+  mpirun -n 2 solver job.toml              run a job on two processes
+  solver check job.toml                    see what it would simulate and cost
+  solver job.toml --set time.step=0.01     run it with another step
+  solver job.toml --restart                go on where it stopped
+  solver describe contact                  read about the keys of [[contact]]
+
+Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
+
+/// What the commands are called, for misspelt ones.
+const COMMANDS: [&str; 6] = ["run", "check", "describe", "inspect", "study", "report"];
+
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
 #[derive(Debug, Parser)]
-#[command(name = "solver", version = run::VERSION, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(
+    name = "solver",
+    version = run::VERSION,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    arg_required_else_help = true,
+    after_help = EXAMPLES
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -41,10 +63,10 @@ enum Command {
     },
     /// Every key of a job file: meaning, unit, range, default.
     Describe {
-        /// Show this table only, such as material.elasticity.
+        /// Show this table or key only, such as material.elasticity or time.step.
         table: Option<String>,
-        /// Print a JSON Schema.
-        #[arg(long)]
+        /// Print the JSON Schema of the whole job.
+        #[arg(long, conflicts_with = "table")]
         json: bool,
     },
     /// What is in a checkpoint or result file.
@@ -72,81 +94,137 @@ struct RunArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Go on from the newest good checkpoint of the output folder, or from this file.
-    #[arg(long, value_name = "FILE.h5", num_args = 0..=1, default_missing_value = "")]
-    restart: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
+    restart: Option<Option<PathBuf>>,
 }
 
 /// Runs the command line and gives the exit code.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            let code = if error.use_stderr() { Exit::Refused } else { Exit::Done };
-            let _ = error.print();
-            return ExitCode::from(code as u8);
-        }
+    let arguments: Vec<OsString> = std::env::args_os().collect();
+    let result = match Cli::try_parse_from(&arguments) {
+        Ok(cli) => dispatch(cli),
+        Err(error) => match remedy(&arguments) {
+            Some(words) if error.use_stderr() => Err(Error::Refused(words)),
+            _ => {
+                if is_first_process() {
+                    let _ = error.print();
+                }
+                return ExitCode::from(if error.use_stderr() { Exit::Refused } else { Exit::Done } as u8);
+            }
+        },
     };
-    let result = match cli.command {
+    match result {
+        Ok(exit) => ExitCode::from(exit as u8),
+        Err(error) => {
+            if is_first_process() {
+                print_error(&error);
+            }
+            ExitCode::from(error.exit() as u8)
+        }
+    }
+}
+
+fn dispatch(cli: Cli) -> Result<Exit> {
+    match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
-        Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
-        Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
-        Some(Command::Inspect { file }) => inspect(&file),
+        Some(Command::Check { job, overrides, json }) => start(&job, &overrides, &Purpose::Check { json }),
+        Some(Command::Describe { table, json }) => {
+            say(&if json { job::describe_json() } else { job::describe(table.as_deref())? })
+        }
+        Some(Command::Inspect { file }) => say(&inspect(&file)?),
         Some(Command::Study { .. }) => Err(Error::Refused("solver study is not available yet".into())),
         Some(Command::Report { .. }) => Err(Error::Refused("solver report is not available yet".into())),
         None => match &cli.run {
             Some(arguments) => run_job(arguments),
             None => Err(Error::Refused("name a job file; see solver --help".into())),
         },
-    };
-    match result {
-        Ok(exit) => ExitCode::from(exit as u8),
-        Err(error) => {
-            print_error(&error);
-            ExitCode::from(error.exit() as u8)
-        }
     }
 }
 
-/// Only the rank with the fault of its own speaks.
-fn print_error(error: &Error) {
-    if !matches!(error, Error::Elsewhere { .. }) {
-        let words = error.to_string();
-        let prefix = if words.starts_with("error") { "" } else { "error: " };
-        let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
+/// Better words than the parser's for a command line it refused.
+fn remedy(arguments: &[OsString]) -> Option<String> {
+    let words: Vec<&str> = arguments.iter().skip(1).filter_map(|word| word.to_str()).collect();
+    let behind = words.iter().position(|word| *word == "--restart").and_then(|at| words.get(at + 1));
+    if let Some(job) = behind.filter(|word| is_job(Path::new(word))) {
+        return Some(job_behind_restart(job));
     }
+    let first = words.first()?;
+    if first.starts_with('-') {
+        let command = words.iter().find(|word| COMMANDS.contains(word))?;
+        return Some(format!("the command stands first, its options behind it: solver {command} ..."));
+    }
+    if COMMANDS.contains(first) { None } else { misspelt_command(Path::new(first)) }
+}
+
+fn is_job(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "toml")
+}
+
+fn job_behind_restart(job: &str) -> String {
+    format!(
+        "--restart takes a checkpoint (FILE.h5), and {job} is a job. To go on from the newest checkpoint of its output \
+         folder, write the job first: solver {job} --restart"
+    )
+}
+
+/// What to say if this is no file but much like a command.
+fn misspelt_command(path: &Path) -> Option<String> {
+    let word = path.to_str()?;
+    let near = job::nearest(word, COMMANDS.into_iter())?;
+    (!path.exists() && path.extension().is_none())
+        .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
+}
+
+/// Whether this process is the one that speaks before MPI has started, going by what launchers tell their processes.
+fn is_first_process() -> bool {
+    ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"]
+        .iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<u64>().ok())
+        .is_none_or(|rank| rank == 0)
+}
+
+fn print_error(error: &Error) {
+    let words = error.to_string();
+    let prefix = if words.starts_with("error") { "" } else { "error: " };
+    let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
+}
+
+/// Prints on one process; a closed pipe is no fault.
+fn say(text: &str) -> Result<Exit> {
+    if is_first_process() {
+        let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+    }
+    Ok(Exit::Done)
 }
 
 fn run_job(arguments: &RunArguments) -> Result<Exit> {
-    let start = match &arguments.restart {
+    let from = match &arguments.restart {
         None => Start::Anew,
-        Some(file) if file.as_os_str().is_empty() => Start::Newest,
-        Some(file) => Start::From(file.clone()),
+        Some(None) => Start::Newest,
+        Some(Some(file)) if is_job(file) => {
+            return Err(Error::Refused(job_behind_restart(&file.display().to_string())));
+        }
+        Some(Some(file)) => Start::From(file.clone()),
     };
+    if let Some(words) = misspelt_command(&arguments.job) {
+        return Err(Error::Refused(words));
+    }
+    start(&arguments.job, &arguments.overrides, &Purpose::Run(from))
+}
+
+/// Loads a job on all ranks and runs or checks it; the rank with the fault of its own speaks.
+fn start(job: &Path, overrides: &[String], purpose: &Purpose) -> Result<Exit> {
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let clock = Clock { began, launched: began.elapsed() };
     let colour = std::io::stderr().is_terminal();
-    let loaded = Job::load_coloured(&arguments.job, &arguments.overrides, colour);
-    let loaded = session.agree_quietly(loaded)?;
-    let result = run::run(&session, loaded, &start, clock);
-    if let Err(error) = &result {
-        print_error(error);
-    }
-    let exit = result.as_ref().map_or_else(Error::exit, |exit| *exit);
-    Ok(exit)
-}
-
-fn check(_job: &Path, _overrides: &[String], _json: bool) -> Result<Exit> {
-    Err(Error::Refused("solver check is not available yet".into()))
-}
-
-fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
-    let text = if json { job::describe_json() } else { job::describe(table)? };
-    let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
-    Ok(Exit::Done)
-}
-
-fn inspect(_file: &Path) -> Result<Exit> {
-    Err(Error::Refused("solver inspect is not available yet".into()))
+    let loaded = session.agree(Job::load_coloured(job, overrides, colour));
+    let result = loaded.and_then(|loaded| run::run(&session, loaded, purpose, clock));
+    Ok(result.unwrap_or_else(|error| {
+        if !matches!(error, Error::Elsewhere { .. }) {
+            print_error(&error);
+        }
+        error.exit()
+    }))
 }

@@ -79,18 +79,10 @@ impl Session<'_> {
         &self.petsc
     }
 
-    /// Makes a failure on any rank a failure on all: a rank that failed keeps its own error, the others get the words of
-    /// the lowest. Collective; stands at the end of every phase in which one rank alone can fail.
+    /// Makes a failure on any rank a failure on all: the lowest rank that failed keeps its error, the others get its
+    /// words. Collective; stands at the end of every phase in which ranks can fail, alone or alike.
     pub fn agree<T>(&self, result: Result<T>) -> Result<T> {
         agree(&self.world, result)
-    }
-
-    /// Like [`Session::agree`] for a step that fails alike on all ranks: only rank 0 keeps the words.
-    pub fn agree_quietly<T>(&self, result: Result<T>) -> Result<T> {
-        self.agree(result).map_err(|error| match error {
-            error if self.is_first() => error,
-            error => Error::Elsewhere { rank: 0, exit: error.exit(), message: error.to_string() },
-        })
     }
 
     /// Sum over all ranks of each entry. Collective.

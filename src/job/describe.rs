@@ -21,10 +21,23 @@ struct Table {
     meaning: String,
 }
 
-/// Every key of the tables at or below `table` (of all if `None`): meaning, unit, range, default, example.
+const OPENING: &str = "\
+A job is a TOML file of the tables below. [table] stands once, [[table]] any number of times. A table that is absent
+is an effect that is not simulated. Lengths, forces and times are in SI units; paths are relative to the job file.
+
+";
+
+/// Every key of the tables at or below `table` (of all if `None`), or the one key it names: meaning, unit, range, default,
+/// example.
 pub fn describe(table: Option<&str>) -> Result<String> {
     let all = tables();
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
+    if let Some((path, key)) = wanted.rsplit_once('.') {
+        let found = all.iter().find(|table| table.path == path);
+        if let Some((_, text)) = found.and_then(|table| table.keys.iter().find(|(name, _)| *name == key)) {
+            return Ok(format!("[{path}]\n{text}"));
+        }
+    }
     let shown: Vec<&Table> = all
         .iter()
         .filter(|table| {
@@ -38,7 +51,8 @@ pub fn describe(table: Option<&str>) -> Result<String> {
     if shown.is_empty() {
         return Err(unknown_table(wanted, &all));
     }
-    Ok(shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
+    let opening = if wanted.is_empty() { OPENING } else { "" };
+    Ok(opening.to_owned() + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
 }
 
 /// The JSON Schema (draft 2020-12) of a job.
@@ -50,7 +64,10 @@ fn unknown_table(wanted: &str, all: &[Table]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
         None => match tables_with(wanted) {
-            Some(elsewhere) => format!("it is a key of {elsewhere}"),
+            Some(elsewhere) => {
+                let table = elsewhere.split(']').next().unwrap_or_default().trim_start_matches('[');
+                format!("it is a key of {elsewhere}: try solver describe {table}.{wanted}")
+            }
             None => {
                 let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
                 format!("tables: {}", names.join(", "))

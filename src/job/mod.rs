@@ -23,4 +23,5 @@ pub use document::*;
 pub use effective::differing_keys;
 pub use expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub use load::Loaded;
+pub(crate) use nearest::nearest;
 pub use semantic::MeshNames;

@@ -63,6 +63,20 @@ impl<const D: usize> Mesh<D> {
         self.cell_ids.len()
     }
 
+    /// Bytes of memory that this rank's part takes.
+    pub fn bytes(&self) -> usize {
+        let named: usize = self.boundaries.iter().map(|b| size_of_val(&b.facets[..])).sum();
+        named
+            + size_of_val(&self.nodes[..])
+            + size_of_val(&self.node_ids[..])
+            + size_of_val(&self.ghosts[..])
+            + size_of_val(&self.cells[..])
+            + size_of_val(&self.cell_ids[..])
+            + size_of_val(&self.cell_regions[..])
+            + size_of_val(&self.facets[..])
+            + size_of_val(&self.facet_cells[..])
+    }
+
     /// Local nodes of a cell, `D + 1` of them.
     #[inline(always)]
     pub fn cell(&self, cell: usize) -> &[u32] {

@@ -13,15 +13,20 @@ pub fn inspect(path: &Path) -> Result<String> {
     if sealed {
         verify_alone(path)?;
     }
-    let bytes = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?.len();
-    let file = hdf5::File::open(path).map_err(|error| Error::unreadable(path, error))?;
+    let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
+    let refused = |words: &str| Error::Refused(format!("{}: {words}", path.display()));
+    if !facts.is_file() {
+        return Err(refused("it is not a file; give a checkpoint-<step>.h5 or fields.vtkhdf"));
+    }
+    let bytes = facts.len();
+    std::fs::File::open(path).map_err(|error| Error::unreadable(path, error))?;
+    let file = hdf5::File::open(path).map_err(|_| refused("it is not an HDF5 file, or a damaged one"))?;
     let words = if sealed {
         describe_checkpoint(&file)
     } else if file.link_exists("VTKHDF") && file.link_exists("Fields") {
         describe_fields(&file)
     } else {
-        let words = "it is neither a checkpoint nor a field file of this program";
-        return Err(Error::Refused(format!("{}: {words}", path.display())));
+        return Err(refused("it is neither a checkpoint nor a field file of this program"));
     };
     let words = words.map_err(|error| Error::unreadable(path, error))?;
     Ok(format!("{}: {bytes} bytes, {words}", path.display()))
@@ -92,8 +97,11 @@ mod tests {
         hdf5::File::create(&path).expect("create").close().expect("close");
         assert!(inspect(&path).expect_err("refused").to_string().contains("neither"));
         std::fs::write(&path, "no HDF5").expect("write");
-        assert!(inspect(&path).expect_err("refused").to_string().contains("foreign.h5"));
+        let text = inspect(&path).expect_err("refused").to_string();
+        assert!(text.contains("foreign.h5: it is not an HDF5 file"), "{text}");
         let missing = inspect(&folder.path().join("nowhere.h5")).expect_err("refused").to_string();
         assert!(missing.contains("nowhere.h5"), "{missing}");
+        let directory = inspect(folder.path()).expect_err("refused").to_string();
+        assert!(directory.contains("not a file"), "{directory}");
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = supports(job, &mesh);
     let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
-    let effects = effects(job, mesh.cell_count())?;
+    let effects = session.agree(effects(job, mesh.cell_count()))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {

@@ -6,30 +6,29 @@ use crate::{
 };
 use std::path::Path;
 
-/// Title, versions, mesh, partition, effects, solver, warnings. Collective.
-pub(super) fn write<const D: usize, const S: usize>(
+/// Versions, title, mesh, partition, effects, solver, output folder, warnings: a line each. Collective.
+pub(super) fn lines<const D: usize, const S: usize>(
     session: &Session,
-    log: &mut Log,
     loaded: &Loaded,
     body: &Body<D, S>,
     scheme: &LaggedEuler,
-) -> Result<()> {
+) -> Result<Vec<String>> {
     let (job, mesh) = (&loaded.job, &body.mesh);
     let ranks = if session.ranks() == 1 { "1 rank".into() } else { format!("{} ranks", session.ranks()) };
-    log.line(format!("Clarke {}, PETSc {}, {ranks}", super::VERSION, session.petsc().version()?));
+    let mut lines = vec![format!("Clarke {}, PETSc {}, {ranks}", super::VERSION, session.petsc().version()?)];
     if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
-        log.line(format!("job        {title}"));
+        lines.push(format!("job        {title}"));
     }
     let kind = if D == 2 { "triangles" } else { "tetrahedra" };
-    log.line(format!(
+    lines.push(format!(
         "mesh       {} {kind}, {} nodes, {} velocity components",
         mesh.total_cells,
         mesh.total_nodes,
         mesh.total_nodes * D
     ));
-    log.line(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
-    log.line(format!("effects    {}", body.effect_names().join(", ")));
-    log.line(format!(
+    lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
+    lines.push(format!("effects    {}", body.effect_names().join(", ")));
+    lines.push(format!(
         "scheme     lagged_euler, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
         job.time.step,
         job.time.end,
@@ -37,11 +36,9 @@ pub(super) fn write<const D: usize, const S: usize>(
         scheme.preconditioner().name(),
         job.solver.tolerance
     ));
-    log.line(format!("output     {}", job.output_folder().display()));
-    for warning in &loaded.warnings {
-        log.line(format!("warning: {warning}"));
-    }
-    Ok(())
+    lines.push(format!("output     {}", job.output_folder().display()));
+    lines.extend(loaded.warnings.iter().map(|warning| format!("warning: {warning}")));
+    Ok(lines)
 }
 
 /// Status, sums, times.

@@ -1,10 +1,13 @@
 //! From a job to results: builds only what the job calls for, then takes the steps.
 
 mod build;
+mod check;
+mod estimate;
 mod header;
 mod inventory;
 mod outputs;
 mod scene;
+mod setup;
 mod summary;
 mod time_loop;
 
@@ -48,17 +51,42 @@ pub struct Clock {
     pub launched: Duration,
 }
 
-/// Runs a job to its end or to a request to stop. Collective.
-pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit> {
+/// What is to be done with a job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Purpose {
+    /// Run it to its end or to a request to stop.
+    Run(Start),
+    /// Print what a run would be, as text or as a JSON object; no file is written.
+    Check {
+        /// Print one JSON object.
+        json: bool,
+    },
+}
+
+/// Runs or checks a job. Collective.
+pub fn run(session: &Session, loaded: Loaded, purpose: &Purpose, clock: Clock) -> Result<Exit> {
     let mut loaded = loaded;
     let scene = session.agree(scene::AnyScene::of(session, &mut loaded))?;
     match (dimension(session, &scene), loaded.job.material.hypothesis) {
         (2, Some(job::Hypothesis::PlaneStrain)) => {
-            time_loop::run::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), start, clock)
+            go_on::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), purpose, clock)
         }
-        (2, _) => time_loop::run::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), start, clock),
-        (3, _) => time_loop::run::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), start, clock),
+        (2, _) => go_on::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), purpose, clock),
+        (3, _) => go_on::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), purpose, clock),
         (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
+    }
+}
+
+fn go_on<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    scene: Option<Scene<D>>,
+    purpose: &Purpose,
+    clock: Clock,
+) -> Result<Exit> {
+    match purpose {
+        Purpose::Run(start) => time_loop::run::<D, S>(session, loaded, scene, start, clock),
+        Purpose::Check { json } => check::check::<D, S>(session, loaded, scene, *json),
     }
 }
 

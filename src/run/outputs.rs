@@ -4,7 +4,6 @@ use crate::{
     body::Body,
     error::{Error, Result},
     job::{Every, Job},
-    mesh::Mesh,
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, list, prune},
@@ -17,7 +16,6 @@ use crate::{
     session::Session,
     state::State,
     stepping::StepOutcome,
-    tensor::Vector,
 };
 use std::{
     path::{Path, PathBuf},
@@ -39,11 +37,12 @@ pub(super) struct Outputs<const D: usize> {
 }
 
 impl<const D: usize> Outputs<D> {
-    /// Finds probes and profiles and opens the files; behind the state's step if the run goes on. Collective.
+    /// Finds profiles and opens the files; behind the state's step if the run goes on. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         job: &Job,
         identity: Identity,
+        mut probes: Probes<D>,
         body: &Body<D, S>,
         state: &State,
         goes_on: bool,
@@ -51,7 +50,6 @@ impl<const D: usize> Outputs<D> {
     ) -> Result<Self> {
         let start = Instant::now();
         let folder = job.output_folder().to_owned();
-        let mut probes = probes(session, &body.mesh, job)?;
         let mut profiles = profiles(session, body, job);
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
         let mut history = None;
@@ -192,16 +190,6 @@ fn history_and_tables<const D: usize>(
         profiles.open(folder, time)?;
     }
     History::open(folder, step)
-}
-
-fn probes<const D: usize>(session: &Session, mesh: &Mesh<D>, job: &Job) -> Result<Probes<D>> {
-    let points: Vec<(String, Vector<D>)> = job
-        .output
-        .probe
-        .iter()
-        .map(|p| (p.name.clone(), std::array::from_fn(|i| p.point.get(i).copied().unwrap_or(0.0))))
-        .collect();
-    Probes::locate(session, mesh, &points)
 }
 
 fn profiles<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, job: &Job) -> Profiles<D> {

@@ -1,7 +1,12 @@
 //! `summary.json`: what a run did, in one object.
 
 use super::{Inventory, VERSION};
-use crate::error::{Error, Result};
+use crate::{
+    body::Body,
+    error::{Error, Result},
+    job::{Job, Viscosity},
+    material::Isotropic,
+};
 use serde::Serialize;
 use std::path::Path;
 
@@ -77,6 +82,40 @@ pub struct Certificates {
     pub trace_norm_squared: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
+}
+
+impl Certificates {
+    /// What the material and the contact laws say by themselves.
+    pub(super) fn of<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> Self {
+        let modulus =
+            |v: &Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear }.smallest_modulus::<S>();
+        Self {
+            viscosity_modulus: job.material.viscosity.as_ref().map(modulus),
+            monotonicity_constant: body
+                .contacts
+                .iter()
+                .map(|c| c.graph.monotonicity_constant())
+                .reduce(f64::max),
+            ..Self::default()
+        }
+    }
+
+    /// What is known, in words.
+    pub(super) fn words(&self) -> String {
+        let all = [
+            ("theta", self.theta, ""),
+            ("theta of a step", self.theta_step, ""),
+            ("viscosity modulus", self.viscosity_modulus, " Pa s"),
+            ("monotonicity constant", self.monotonicity_constant, " Pa s/m"),
+            ("squared trace norm", self.trace_norm_squared, ""),
+            ("largest stable step", self.explicit_step_bound, " s"),
+        ];
+        let known: Vec<String> = all
+            .iter()
+            .filter_map(|(name, value, unit)| value.map(|value| format!("{name} {value:.6}{unit}")))
+            .collect();
+        if known.is_empty() { "nothing".into() } else { known.join(", ") }
+    }
 }
 
 /// How the mesh was split.

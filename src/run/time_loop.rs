@@ -1,9 +1,9 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Clock, Inventory, Scene, Start, build,
+    Clock, Inventory, Scene, Start,
     outputs::{Outputs, prepare_folder},
-    scene::refuse_empty_matrix,
+    setup::{Setup, setup},
     summary::{Certificates, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -11,14 +11,12 @@ use crate::{
     effect::Step,
     error::{Error, Exit, Result},
     job::{Job, Loaded},
-    mesh::distribute,
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::list,
         history::Totals,
         log::Log,
     },
-    petsc::set_option,
     session::Session,
     state::State,
     stepping::{LaggedEuler, StepOutcome},
@@ -42,38 +40,37 @@ pub(super) fn run<const D: usize, const S: usize>(
     clock: Clock,
 ) -> Result<Exit> {
     let job = &loaded.job;
-    session.agree(refuse_empty_matrix(loaded))?;
-    for (name, value) in &job.solver.petsc {
-        session.agree(set_option(name, value))?;
-    }
-    let mut log = Log::new(session.is_first());
+    let Setup { mut body, mut state, mut scheme, probes } = setup::<D, S>(session, loaded, scene)?;
     let folder = job.output_folder();
     let goes_on = *start != Start::Anew;
+    let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
+    let restored = restore(session, start, folder, &identity, &mut body, &mut state);
+    let restored = session.agree(restored)?;
+    let mut log = Log::new(session.is_first());
     let prepared = if session.is_first() {
         prepare_folder(folder, goes_on, &mut log).and_then(|()| log.open(&folder.join("run.log"), goes_on))
     } else {
         Ok(())
     };
     session.agree(prepared)?;
-    let mesh = distribute(session, scene.map(|s| (s.mesh, s.partition)))?;
-    let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
-    let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
-    let restored = restore(session, start, folder, &identity, &mut body, &mut state, &mut log)?;
-    let mut scheme = session.agree(LaggedEuler::new(session, &body, &state, build::settings(job)))?;
-    super::header::write(session, &mut log, loaded, &body, &scheme)?;
+    if let Some(restored) = &restored {
+        restored.words.iter().for_each(|words| log.line(words));
+    }
+    super::header::lines(session, loaded, &body, &scheme)?.iter().for_each(|line| log.line(line));
     let energy = {
         let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
         let mine = session.agree(body.energy(&state, rest))?;
         crate::effect::Energy::from_array(session.sum(mine.to_array()))
     };
     let totals = restored.as_ref().map_or_else(|| Totals::at_start(energy), |r| r.totals);
-    let mut outputs = Outputs::open(session, job, identity, &body, &state, goes_on, &mut log)?;
+    let mut outputs = Outputs::open(session, job, identity, probes, &body, &state, goes_on, &mut log)?;
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
     }
     scheme.prepare_length(session, &body, job.time.step)?;
     let setup = clock.began.elapsed() - clock.launched;
-    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, clock, setup };
+    let stepping = (Instant::now(), state.step);
+    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, clock, setup, stepping };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -82,6 +79,8 @@ pub(super) fn run<const D: usize, const S: usize>(
 struct Restored {
     file: String,
     totals: Totals,
+    /// What the log says about it.
+    words: Vec<String>,
 }
 
 /// Puts the checkpoint that `start` asks for into the state. Collective.
@@ -92,7 +91,6 @@ fn restore<const D: usize, const S: usize>(
     identity: &Identity,
     body: &mut Body<D, S>,
     state: &mut State,
-    log: &mut Log,
 ) -> Result<Option<Restored>> {
     let candidates = match start {
         Start::Anew => return Ok(None),
@@ -103,20 +101,13 @@ fn restore<const D: usize, const S: usize>(
     for path in &candidates {
         match checkpoint::restore(session, path, identity, body, state) {
             Ok(header) => {
-                log.line(format!(
-                    "going on from {} (step {}, t = {} s)",
-                    path.display(),
-                    header.step,
-                    header.time
-                ));
                 let file = path.display().to_string();
-                return Ok(Some(Restored { file, totals: header.totals }));
+                let mut words: Vec<String> = faults.iter().map(|fault| format!("warning: {fault}")).collect();
+                words.push(format!("going on from {file} (step {}, t = {} s)", header.step, header.time));
+                return Ok(Some(Restored { file, totals: header.totals, words }));
             }
             Err(error) if error.exit() == Exit::Refused => return Err(error),
-            Err(error) => {
-                log.line(format!("warning: {error}"));
-                faults.push(error.to_string());
-            }
+            Err(error) => faults.push(error.to_string()),
         }
     }
     Err(Error::Refused(if faults.is_empty() {
@@ -124,6 +115,11 @@ fn restore<const D: usize, const S: usize>(
     } else {
         format!("no good checkpoint to go on from; run without --restart\n{}", faults.join("\n"))
     }))
+}
+
+/// Steps of this length from a time to the end.
+pub(super) fn steps_between(time: f64, end: f64, length: f64) -> u64 {
+    ((end - time) / length - SNAP).ceil().max(0.0) as u64
 }
 
 /// Why the steps ended.
@@ -143,13 +139,15 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     log: Log,
     clock: Clock,
     setup: Duration,
+    /// When and from which step the steps began.
+    stepping: (Instant, u64),
 }
 
 impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     /// Steps to the end, to a request to stop, or to a failure. Collective.
     fn advance(&mut self) -> Result<Ended> {
         let (end, length) = (self.job.time.end, self.job.time.step);
-        let left = ((end - self.state.time) / length - SNAP).ceil().max(0.0) as u64;
+        let left = steps_between(self.state.time, end, length);
         let last = self.state.step + left;
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
@@ -188,18 +186,26 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
         let step = self.state.step;
         let words = format!(
-            "step {step:>6}/{last}  t = {:.6} s  newton {:>2}  linear {:>4}  branch changes {:>4}  inclusion {:.1e}  energy {:.1e}",
+            "step {step:>6}/{last}  t = {:.6} s  newton {:>2}  linear {:>4}  branch changes {:>4}  inclusion {:.1e}  \
+             energy {:.1e}  {} left",
             self.state.time,
             outcome.newton_iterations,
             outcome.linear_iterations,
             outcome.active_changes,
             outcome.inclusion_residual,
-            self.totals.energy_imbalance
+            self.totals.energy_imbalance,
+            clock_time(self.pace() * (last - step) as f64)
         );
         self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
         if step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last {
             self.log.quiet_line(words);
         }
+    }
+
+    /// Seconds a step took so far.
+    fn pace(&self) -> f64 {
+        let taken = self.state.step - self.stepping.1;
+        self.stepping.0.elapsed().as_secs_f64() / taken.max(1) as f64
     }
 
     /// What the outside or the clock asks for, the same on all ranks. Collective.
@@ -233,7 +239,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     /// Writes the last files and the summary; gives the exit code or the first error. Collective.
     fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit> {
         self.log.end_progress();
-        let mut result = match ended {
+        let mut result = match self.session.agree(ended) {
             Ok(Ended::Completed) => Ok(Exit::Done),
             Ok(Ended::Stopped(reason)) => {
                 self.log.line(format!("stopping on {reason}; go on with --restart"));
@@ -283,13 +289,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     ) -> Result<Summary> {
         let stress = self.body.stress(&self.state)?;
         let von_mises = stress.iter().map(crate::tensor::von_mises).fold(0.0, f64::max);
-        let fixed = self.body.fixed[..self.body.mesh.owned * D].iter().filter(|f| **f).count();
         let mesh = &self.body.mesh;
-        let material = &self.job.material;
-        let fall = self.body.contacts.iter().map(|c| c.graph.monotonicity_constant()).reduce(f64::max);
-        let modulus = material.viscosity.as_ref().map(|v| {
-            crate::material::Isotropic { volumetric: v.volumetric, shear: v.shear }.smallest_modulus::<S>()
-        });
         Ok(Summary {
             status,
             error,
@@ -299,7 +299,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             dimension: D,
             cells: mesh.total_cells,
             nodes: mesh.total_nodes,
-            unknowns: mesh.total_nodes * D - self.session.total(fixed),
+            unknowns: self.body.unknowns(self.session),
             effects: self.body.effect_names(),
             scheme: "lagged_euler",
             preconditioner: self.scheme.preconditioner().name(),
@@ -312,11 +312,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             max_von_mises: self.session.largest([von_mises])[0],
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
-            certificates: Certificates {
-                viscosity_modulus: modulus,
-                monotonicity_constant: fall,
-                ..Certificates::default()
-            },
+            certificates: Certificates::of(self.job, &self.body),
             wall_seconds: self.seconds(),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
@@ -340,6 +336,16 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         ];
         let seconds = self.session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
         phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
+    }
+}
+
+/// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.
+fn clock_time(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
     }
 }
 

@@ -48,6 +48,29 @@ impl Preconditioner {
         }
     }
 
+    /// Why [`resolve`](Self::resolve) chooses what it does, in words.
+    pub fn reason(self, dimension: usize, unknowns: usize) -> String {
+        let direct = if dimension == 2 { DIRECT_2D } else { DIRECT_3D };
+        match self {
+            Self::Auto if unknowns <= direct => {
+                format!(
+                    "up to {direct} velocity components in {dimension}D a factorisation is faster than multigrid"
+                )
+            }
+            Self::Auto => {
+                format!(
+                    "above {direct} velocity components in {dimension}D multigrid is faster than a factorisation"
+                )
+            }
+            _ => "[solver] preconditioner asks for it".into(),
+        }
+    }
+
+    /// Whether every rank factors the whole matrix for itself.
+    pub fn is_redundant(self, ranks: usize, unknowns: usize) -> bool {
+        matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
+    }
+
     /// Its name in job files.
     pub fn name(self) -> &'static str {
         match self {
@@ -66,7 +89,7 @@ impl Preconditioner {
         ksp.set_method("cg")?;
         match self {
             Self::Auto | Self::Cholesky if ranks == 1 => ksp.set_preconditioner("cholesky", Some("cholmod")),
-            Self::Auto | Self::Cholesky if unknowns <= REDUNDANT => {
+            Self::Auto | Self::Cholesky if self.is_redundant(ranks, unknowns) => {
                 ksp.set_preconditioner("redundant", None)?;
                 set_default_option("redundant_ksp_type", "preonly")?;
                 set_default_option("redundant_pc_type", "cholesky")?;

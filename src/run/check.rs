@@ -1,0 +1,233 @@
+//! Everything but the run: what a job would simulate, on which mesh, how and at what cost.
+
+use super::{
+    Inventory, Scene, build,
+    estimate::Estimate,
+    header,
+    setup::{Setup, setup},
+    summary::{Certificates, PartitionQuality},
+    time_loop::steps_between,
+};
+use crate::{
+    body::Body,
+    error::{Error, Exit, Result},
+    job::{Job, Loaded},
+    mesh::check::Quality,
+    session::Session,
+    state::State,
+};
+use serde::Serialize;
+use std::io::Write;
+
+/// The object that `solver check --json` prints; names are part of the contract.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Report {
+    version: &'static str,
+    petsc_version: String,
+    ranks: usize,
+    dimension: usize,
+    cells: usize,
+    nodes: usize,
+    unknowns: usize,
+    effects: Vec<&'static str>,
+    contact_points: u64,
+    probes: Vec<Probe>,
+    scheme: &'static str,
+    steps: u64,
+    newton: bool,
+    preconditioner: &'static str,
+    preconditioner_reason: String,
+    certificates: Certificates,
+    partition: PartitionQuality,
+    cell_quality: CellQuality,
+    estimate: Estimate,
+    warnings: Vec<String>,
+    output_folder: String,
+}
+
+/// A probe, which lies inside the body.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Probe {
+    name: String,
+    point: Vec<f64>,
+}
+
+/// The shapes of the cells, from 0 (flat) to 1 (regular).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct CellQuality {
+    smallest: f64,
+    worst_cell: usize,
+    poor_cells: usize,
+}
+
+/// Sets the problem up as a run does, then prints what it found on rank 0. Collective.
+pub(super) fn check<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    scene: Option<Scene<D>>,
+    json: bool,
+) -> Result<Exit> {
+    let quality = scene.as_ref().map(|s| s.mesh.quality_summary());
+    let ready = setup::<D, S>(session, loaded, scene)?;
+    session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
+    let lines = header::lines(session, loaded, &ready.body, &ready.scheme)?;
+    let report = report(session, loaded, &ready, quality)?;
+    let printed = if session.is_first() { print(&report, lines, json) } else { Ok(()) };
+    session.agree(printed)?;
+    Ok(Exit::Done)
+}
+
+/// Evaluates the loads at the first and the last step: what is not finite there would end the run.
+fn try_loads<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>, state: &State) -> Result<()> {
+    if body.load.is_empty() {
+        return Ok(());
+    }
+    let mut forces = state.velocity.like()?;
+    let tried = [job.time.step, job.time.end].map(|time| body.write_loads(time, &mut forces));
+    tried.into_iter().collect::<Result<()>>().map_err(|error| Error::Refused(error.to_string()))
+}
+
+/// Collective; cell quality is known on rank 0 only.
+fn report<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    ready: &Setup<D, S>,
+    quality: Option<Quality>,
+) -> Result<Report> {
+    let (job, body, scheme) = (&loaded.job, &ready.body, &ready.scheme);
+    let mesh = &body.mesh;
+    let steps = steps_between(0.0, job.time.end, job.time.step);
+    let inventory = Inventory::of(session, body, scheme);
+    let preconditioner = scheme.preconditioner();
+    let asked = build::settings(job).preconditioner;
+    let quality = quality.unwrap_or(Quality { smallest: 1.0, worst_cell: 0, poor: 0 });
+    Ok(Report {
+        version: super::VERSION,
+        petsc_version: session.petsc().version()?,
+        ranks: session.ranks(),
+        dimension: D,
+        cells: mesh.total_cells,
+        nodes: mesh.total_nodes,
+        unknowns: body.unknowns(session),
+        effects: body.effect_names(),
+        contact_points: inventory.contact_points,
+        probes: job
+            .output
+            .probe
+            .iter()
+            .map(|p| Probe { name: p.name.clone(), point: p.point.clone() })
+            .collect(),
+        scheme: "lagged_euler",
+        steps,
+        newton: inventory.newton,
+        preconditioner: preconditioner.name(),
+        preconditioner_reason: asked.reason(D, mesh.total_nodes * D),
+        certificates: Certificates::of(job, body),
+        partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
+        cell_quality: CellQuality {
+            smallest: quality.smallest,
+            worst_cell: quality.worst_cell,
+            poor_cells: quality.poor,
+        },
+        estimate: Estimate::new(session, body, &inventory, preconditioner, steps),
+        warnings: loaded.warnings.clone(),
+        output_folder: job.output_folder().display().to_string(),
+    })
+}
+
+fn print(report: &Report, lines: Vec<String>, json: bool) -> Result<()> {
+    let text = if json {
+        serde_json::to_string_pretty(report)
+            .map_err(|e| Error::Internal(format!("the report can't be written: {e}")))?
+    } else {
+        lines.into_iter().chain(report.lines()).collect::<Vec<_>>().join("\n")
+    };
+    // A closed pipe is no fault of the job.
+    let _ = writeln!(std::io::stdout(), "{text}");
+    Ok(())
+}
+
+impl Report {
+    /// What the log of a run doesn't say.
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![
+            format!("unknowns   {} velocity components; supports hold the others", self.unknowns),
+            format!("cells      shape quality at least {:.3} of 1", self.cell_quality.smallest),
+        ];
+        if self.newton {
+            lines.push(format!("contact    {} points", self.contact_points));
+        }
+        if !self.probes.is_empty() {
+            let names: Vec<&str> = self.probes.iter().map(|p| p.name.as_str()).collect();
+            lines.push(format!("probes     {}: inside the body", names.join(", ")));
+        }
+        lines.push(format!("steps      {}", self.steps));
+        lines.push(format!("solver     {}: {}", self.preconditioner, self.preconditioner_reason));
+        lines.push(format!("certified  {}", self.certificates.words()));
+        let memory = &self.estimate.memory_bytes;
+        let parts = [
+            ("program", memory.program),
+            ("mesh", memory.mesh),
+            ("matrix", memory.matrix),
+            ("history", memory.history),
+            ("vectors", memory.vectors),
+            ("preconditioner", memory.preconditioner),
+        ];
+        let parts: Vec<String> = parts
+            .iter()
+            .filter(|(_, bytes)| *bytes > 0)
+            .map(|(name, bytes)| format!("{name} {}", size(*bytes)))
+            .collect();
+        lines.push(format!(
+            "memory     about {} over all ranks ({}); rank 0 holds the whole mesh at first, {}",
+            size(memory.total),
+            parts.join(", "),
+            size(memory.whole_mesh_at_start)
+        ));
+        let seconds = &self.estimate.seconds;
+        lines.push(format!(
+            "time       about {} to set up, {} a step, {} in all without output; rough, from one core of a common \
+             server, divided by the ranks",
+            duration(seconds.set_up),
+            duration(seconds.step),
+            duration(seconds.run)
+        ));
+        lines.push("the job can be run; nothing was written".into());
+        lines
+    }
+}
+
+fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    match bytes {
+        1e9.. => format!("{} GB", rounded(bytes / 1e9)),
+        1e6.. => format!("{} MB", rounded(bytes / 1e6)),
+        _ => format!("{} kB", rounded(bytes / 1e3)),
+    }
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        7200.0.. => format!("{} h", rounded(seconds / 3600.0)),
+        120.0.. => format!("{} min", rounded(seconds / 60.0)),
+        1.0.. => format!("{} s", rounded(seconds)),
+        1e-3.. => format!("{} ms", rounded(seconds * 1e3)),
+        _ => format!("{} µs", rounded(seconds * 1e6)),
+    }
+}
+
+/// Two digits are more than an estimate is worth.
+fn rounded(number: f64) -> String {
+    if number < 10.0 { format!("{number:.1}") } else { format!("{number:.0}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_times_have_readable_units() {
+        assert_eq!([size(900), size(2_340_000), size(55_000_000)], ["0.9 kB", "2.3 MB", "55 MB"]);
+        assert_eq!([duration(2.5e-4), duration(0.012), duration(9000.0)], ["250 µs", "12 ms", "2.5 h"]);
+    }
+}

@@ -1,0 +1,182 @@
+//! What a run will cost, roughly.
+//!
+//! Memory is counted where the run's arrays are known and modelled for the preconditioner. Times come from constants
+//! that were measured on one core of a common server, at 10^4 to 10^5 unknowns; they are divided by the number of ranks
+//! that share the work.
+//! Expect a factor of two either way, and more where ranks share memory bandwidth.
+
+use super::Inventory;
+use crate::{body::Body, session::Session, stepping::Preconditioner};
+use serde::Serialize;
+
+/// What a run will cost; an estimate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Estimate {
+    /// Bytes by part, over all ranks.
+    pub memory_bytes: MemoryEstimate,
+    /// Seconds.
+    pub seconds: TimeEstimate,
+}
+
+/// Bytes by part, over all ranks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct MemoryEstimate {
+    /// The program itself with MPI, PETSc and HDF5.
+    pub program: u64,
+    /// Mesh and geometry.
+    pub mesh: u64,
+    /// Sparse matrix.
+    pub matrix: u64,
+    /// Histories of the cells.
+    pub history: u64,
+    /// Vectors of nodal values.
+    pub vectors: u64,
+    /// Factor or multigrid hierarchy.
+    pub preconditioner: u64,
+    /// All of these.
+    pub total: u64,
+    /// The whole mesh on rank 0, before it is handed out; gone afterwards.
+    pub whole_mesh_at_start: u64,
+}
+
+/// Seconds, without output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct TimeEstimate {
+    /// Assembly and preconditioner.
+    pub set_up: f64,
+    /// A step.
+    pub step: f64,
+    /// Set-up and all steps.
+    pub run: f64,
+}
+
+/// What a preconditioner costs in some dimension.
+struct Cost {
+    /// Bytes.
+    memory: f64,
+    /// Seconds of assembly and set-up.
+    set_up: f64,
+    /// Seconds of a Krylov iteration.
+    iteration: f64,
+    /// Krylov iterations of a step with contact.
+    with_contact: f64,
+    /// Krylov iterations of a step without.
+    without: f64,
+}
+
+/// Bytes of a process before it has a mesh.
+const PROGRAM: f64 = 55e6;
+/// Vectors of the state, the scheme, Newton's and the Krylov method.
+const VECTORS: f64 = 16.0;
+/// Seconds of stress, history, forces and energies, a cell and step.
+const CELL: [f64; 2] = [60e-9, 100e-9];
+
+impl Estimate {
+    /// For a body and so many steps. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        inventory: &Inventory,
+        preconditioner: Preconditioner,
+        steps: u64,
+    ) -> Self {
+        let mesh = &body.mesh;
+        let (nodes, cells) = (mesh.total_nodes as f64, mesh.total_cells as f64);
+        let own = [
+            (mesh.bytes() + size_of_val(&body.geometry.cells[..])) as f64,
+            mesh.facets.len() as f64,
+            ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
+        ];
+        let [mesh_bytes, facets, vectors] = session.sum(own);
+        let matrix = matrix_bytes(D, nodes, cells, facets);
+        let cost = cost(preconditioner, D, nodes * D as f64, matrix);
+        let history = inventory.history_bytes.values().sum::<u64>() as f64;
+        let ranks = session.ranks() as f64;
+        let redundant = preconditioner.is_redundant(session.ranks(), mesh.total_nodes * D);
+        let (copies, sharers) = if redundant { (ranks, 1.0) } else { (1.0, ranks) };
+        let program = PROGRAM * ranks;
+        let iterations = if inventory.newton { cost.with_contact } else { cost.without };
+        let step = cells * CELL[usize::from(D == 3)] / ranks + iterations * cost.iteration / sharers;
+        let set_up = cost.set_up / sharers;
+        let preconditioner = copies * cost.memory;
+        let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
+        let total = program + mesh_bytes + matrix + history + vectors + preconditioner;
+        Self {
+            memory_bytes: MemoryEstimate {
+                program: program as u64,
+                mesh: mesh_bytes as u64,
+                matrix: matrix as u64,
+                history: history as u64,
+                vectors: vectors as u64,
+                preconditioner: preconditioner as u64,
+                total: total as u64,
+                whole_mesh_at_start: whole as u64,
+            },
+            seconds: TimeEstimate { set_up, step, run: set_up + step * steps as f64 },
+        }
+    }
+}
+
+/// Bytes of the matrix: a block for each node and two for each edge, whose number Euler's formula gives for a body
+/// without holes.
+fn matrix_bytes(dimension: usize, nodes: f64, cells: f64, facets: f64) -> f64 {
+    let edges = if dimension == 2 { nodes + cells - 1.0 } else { nodes + cells + facets / 2.0 - 1.0 };
+    let entries = (nodes + 2.0 * edges) * (dimension * dimension) as f64;
+    12.0 * entries + 4.0 * nodes * dimension as f64
+}
+
+/// The model: nested dissection's `n log n` and `n^(4/3)` entries of a factor, and work proportional to the unknowns for
+/// multigrid.
+fn cost(preconditioner: Preconditioner, dimension: usize, unknowns: f64, matrix: f64) -> Cost {
+    let plane = dimension == 2;
+    let pick = |in_plane: f64, in_space: f64| if plane { in_plane } else { in_space };
+    match preconditioner {
+        Preconditioner::Auto | Preconditioner::Cholesky => {
+            let entries =
+                if plane { 7.0 * unknowns * unknowns.log2() } else { 28.0 * unknowns.powf(4.0 / 3.0) };
+            Cost {
+                memory: 8.0 * entries,
+                set_up: if plane { 3.5e-6 * unknowns } else { 1.2e-9 * unknowns * unknowns },
+                iteration: entries * pick(2.4e-9, 1.2e-9),
+                with_contact: 6.0,
+                without: 1.0,
+            }
+        }
+        Preconditioner::Gamg => Cost {
+            memory: 2.0 * matrix,
+            set_up: unknowns * pick(2e-6, 10e-6),
+            iteration: unknowns * pick(50e-9, 150e-9),
+            with_contact: 30.0,
+            without: 20.0,
+        },
+        Preconditioner::Boomeramg => Cost {
+            memory: 3.5 * matrix,
+            set_up: unknowns * pick(1.5e-6, 5e-6),
+            iteration: unknowns * pick(120e-9, 300e-9),
+            with_contact: 20.0,
+            without: 14.0,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_matrix_of_a_square_is_counted_exactly() {
+        // Two triangles: 4 nodes, 5 edges, so 14 blocks of 4 entries and 8 rows.
+        assert_eq!(matrix_bytes(2, 4.0, 2.0, 4.0), 12.0 * 56.0 + 32.0);
+        // One tetrahedron: 4 nodes, 6 edges.
+        assert_eq!(matrix_bytes(3, 4.0, 1.0, 4.0), 12.0 * 144.0 + 48.0);
+    }
+
+    #[test]
+    fn a_factor_in_space_soon_outgrows_multigrid() {
+        let large = 1e6;
+        let matrix = 500.0 * large;
+        let factor = cost(Preconditioner::Cholesky, 3, large, matrix);
+        let multigrid = cost(Preconditioner::Gamg, 3, large, matrix);
+        assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
+    }
+}
