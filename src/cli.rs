@@ -71,8 +71,8 @@ struct RunArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Go on from the newest good checkpoint of the output folder, or from this file.
-    #[arg(long, value_name = "FILE.h5", num_args = 0..=1, default_missing_value = "")]
-    restart: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
+    restart: Option<Option<PathBuf>>,
 }
 
 /// Runs the command line and gives the exit code.
@@ -118,8 +118,8 @@ fn print_error(error: &Error) {
 fn run_job(arguments: &RunArguments) -> Result<Exit> {
     let start = match &arguments.restart {
         None => Start::Anew,
-        Some(file) if file.as_os_str().is_empty() => Start::Newest,
-        Some(file) => Start::From(file.clone()),
+        Some(None) => Start::Newest,
+        Some(Some(file)) => Start::From(file.clone()),
     };
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
