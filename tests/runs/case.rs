@@ -1,0 +1,107 @@
+//! Jobs made for a test from the paper's, each in a folder of its own.
+
+use crate::{
+    launch::{self, Outcome, Running},
+    results::Results,
+};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use toml::{Table, Value};
+
+/// The paper's own job.
+pub fn paper_job() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml")
+}
+
+/// The paper's job in three dimensions.
+pub fn paper_cube() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_cube.toml")
+}
+
+/// A job file in a temporary folder, its results beside it in `out`.
+pub struct Case {
+    folder: TempDir,
+    job: Value,
+}
+
+impl Case {
+    /// The paper's square with n x n cells, 16 steps.
+    pub fn square(n: usize) -> Self {
+        let probes = "[{name = 'tip', point = [1, 0]}, {name = 'middle', point = [0.5, 0]}, \
+                      {name = 'inside', point = [0.37, 0.61]}]";
+        Self::from(&paper_job()).set("mesh.rectangle.cells", &format!("[{n}, {n}]")).set("output.probe", probes)
+    }
+
+    /// The cube with n x n x n cells, 16 steps.
+    pub fn cube(n: usize) -> Self {
+        let probes = "[{name = 'tip', point = [1, 0.5, 0]}, {name = 'inside', point = [0.37, 0.61, 0.29]}]";
+        Self::from(&paper_cube()).set("mesh.box.cells", &format!("[{n}, {n}, {n}]")).set("output.probe", probes)
+    }
+
+    fn from(file: &Path) -> Self {
+        let text = std::fs::read_to_string(file).expect("job");
+        let job = Value::Table(text.parse::<Table>().expect("TOML"));
+        Self { folder: tempfile::tempdir().expect("folder"), job }
+            .set("time.step", "0.0625")
+            .set("output.folder", "'out'")
+            .without("checkpoint")
+    }
+
+    /// Sets a key, given by names and positions joined by dots, to a TOML value.
+    pub fn set(mut self, key: &str, value: &str) -> Self {
+        let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
+        let value = format!("value = {value}").parse::<Table>().expect(value).remove("value").expect("value");
+        let table = parent.split('.').filter(|part| !part.is_empty()).fold(&mut self.job, |node, part| {
+            if let Ok(position) = part.parse::<usize>() {
+                return &mut node.as_array_mut().expect(key)[position];
+            }
+            let table = node.as_table_mut().expect(key);
+            table.entry(part).or_insert_with(|| Value::Table(Table::new()))
+        });
+        table.as_table_mut().expect(key).insert(name.into(), value);
+        self
+    }
+
+    /// Removes a key or table.
+    pub fn without(mut self, key: &str) -> Self {
+        let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
+        let parts = parent.split('.').filter(|part| !part.is_empty());
+        let table = parts.fold(&mut self.job, |node, part| &mut node[part]);
+        table.as_table_mut().expect(key).remove(name);
+        self
+    }
+
+    /// Where the job file is.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Where the results are.
+    pub fn results(&self) -> Results {
+        Results::of(self.folder().join("out"))
+    }
+
+    /// Starts the job; `options` are for `mpirun`.
+    pub fn start(&self, ranks: usize, options: &[&str]) -> Running {
+        Running::start(ranks, options, &self.arguments(&[]))
+    }
+
+    /// Runs the job with these arguments behind its name.
+    pub fn run_with(&self, ranks: usize, arguments: &[&str]) -> Outcome {
+        launch::run(ranks, &self.arguments(arguments))
+    }
+
+    /// Runs the job, which must succeed.
+    #[track_caller]
+    pub fn run(&self, ranks: usize) -> Results {
+        self.run_with(ranks, &[]).expect(0);
+        self.results()
+    }
+
+    fn arguments(&self, more: &[&str]) -> Vec<String> {
+        let file = self.folder().join("job.toml");
+        std::fs::write(&file, toml::to_string(&self.job).expect("TOML")).expect("written");
+        let first = ["run".to_owned(), file.display().to_string()];
+        first.into_iter().chain(more.iter().map(|a| (*a).to_owned())).collect()
+    }
+}

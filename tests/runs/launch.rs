@@ -1,0 +1,232 @@
+//! The solver under `mpirun`, watched by a clock: a run that hangs is ended with all its processes, and the test fails.
+
+use std::{
+    io::Read,
+    os::unix::process::ExitStatusExt,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+/// Runs are small: one that takes longer hangs.
+const GUARD: Duration = Duration::from_secs(120);
+/// How long processes may outlive their `mpirun`.
+const FAREWELL: Duration = Duration::from_secs(5);
+/// Every process of a run carries the number of the run under this name.
+const MARK: &str = "CLARKE_TEST_RUN";
+
+/// What a run said and how it ended.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Exit code; 128 and the number where a signal ended it.
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Outcome {
+    /// This run must have ended so.
+    #[track_caller]
+    pub fn expect(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "exit code\n{}\n{}", self.stdout, self.stderr);
+        self
+    }
+
+    /// The run must have said this.
+    #[track_caller]
+    pub fn says(self, words: &str) -> Self {
+        let said = self.stdout.contains(words) || self.stderr.contains(words);
+        assert!(said, "{words:?} is not in\n{}\n{}", self.stdout, self.stderr);
+        self
+    }
+}
+
+/// Runs the solver on this many ranks to its end.
+pub fn run<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Outcome {
+    Running::start(ranks, &[], arguments).wait()
+}
+
+/// Runs the solver without `mpirun`.
+pub fn run_alone<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_solver"));
+    command.args(arguments);
+    Running::spawn(command).wait()
+}
+
+/// Text that a thread collects from a pipe.
+struct Collected {
+    text: Arc<Mutex<String>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Collected {
+    fn from(mut pipe: impl Read + Send + 'static) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let target = Arc::clone(&text);
+        let thread = std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count @ 1..) = pipe.read(&mut bytes) {
+                target.lock().expect("text").push_str(&String::from_utf8_lossy(&bytes[..count]));
+            }
+        });
+        Self { text, thread: Some(thread) }
+    }
+
+    fn so_far(&self) -> String {
+        self.text.lock().expect("text").clone()
+    }
+
+    fn whole(&mut self) -> String {
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("reader");
+        }
+        self.so_far()
+    }
+}
+
+/// Whom a signal is sent to.
+#[derive(Clone, Copy)]
+pub enum Target {
+    /// `mpirun`.
+    Launcher,
+    /// The process of one rank.
+    OneRank,
+}
+
+/// A run that goes on.
+pub struct Running {
+    launcher: Child,
+    mark: String,
+    began: Instant,
+    stdout: Collected,
+    stderr: Collected,
+}
+
+impl Running {
+    /// Starts the solver; `options` are for `mpirun`.
+    pub fn start<A: AsRef<std::ffi::OsStr>>(ranks: usize, options: &[&str], arguments: &[A]) -> Self {
+        let mut command = Command::new("mpirun");
+        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]).args(options);
+        command.arg(env!("CARGO_BIN_EXE_solver")).args(arguments);
+        Self::spawn(command)
+    }
+
+    fn spawn(mut command: Command) -> Self {
+        static NUMBER: AtomicUsize = AtomicUsize::new(0);
+        let mark = format!("{}.{}.", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+        command.env(MARK, &mark).env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+        if is_root() {
+            command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+        }
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut launcher = command.spawn().expect("mpirun starts");
+        let stdout = Collected::from(launcher.stdout.take().expect("stdout"));
+        let stderr = Collected::from(launcher.stderr.take().expect("stderr"));
+        Self { launcher, mark, began: Instant::now(), stdout, stderr }
+    }
+
+    /// Waits until the run has said this.
+    #[track_caller]
+    pub fn wait_for(&mut self, words: &str) {
+        while !self.stdout.so_far().contains(words) {
+            let ended = self.launcher.try_wait().expect("status");
+            assert!(ended.is_none(), "ended before it said {words:?}:\n{}", self.stdout.so_far());
+            self.sleep();
+        }
+    }
+
+    /// Sends a signal.
+    pub fn signal(&self, signal: &str, target: Target) {
+        let process = match target {
+            Target::Launcher => self.launcher.id(),
+            Target::OneRank => {
+                let ranks = self.processes().into_iter().filter(|p| runs_solver(*p));
+                ranks.max().expect("a rank")
+            }
+        };
+        assert!(send(signal, process), "no process {process}");
+    }
+
+    /// Waits for the end; none of its processes may be left then.
+    #[track_caller]
+    pub fn wait(mut self) -> Outcome {
+        let status = loop {
+            match self.launcher.try_wait().expect("status") {
+                Some(status) => break status,
+                None => self.sleep(),
+            }
+        };
+        let gone = Instant::now();
+        while !self.processes().is_empty() && gone.elapsed() < FAREWELL {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let left = self.end_all();
+        let code = status.code().or_else(|| status.signal().map(|s| 128 + s)).expect("a code or a signal");
+        let (stdout, stderr) = (self.stdout.whole(), self.stderr.whole());
+        assert!(left.is_empty(), "processes {left:?} outlived their mpirun\n{stdout}\n{stderr}");
+        Outcome { code, stdout, stderr }
+    }
+
+    #[track_caller]
+    fn sleep(&mut self) {
+        if self.began.elapsed() > GUARD {
+            let left = self.end_all();
+            let _ = self.launcher.wait();
+            let (stdout, stderr) = (self.stdout.so_far(), self.stderr.so_far());
+            panic!("hangs: no end after {GUARD:?}, processes {left:?} were ended\n{stdout}\n{stderr}");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+
+    /// All processes of this run, `mpirun` among them: ranks are in process groups of their own, so the mark finds them.
+    fn processes(&self) -> Vec<u32> {
+        let wanted = format!("{MARK}={}", self.mark);
+        let carries_mark = |process: &u32| {
+            let environment = std::fs::read(process_file(*process, "environ")).unwrap_or_default();
+            environment.split(|byte| *byte == 0).any(|entry| entry == wanted.as_bytes())
+        };
+        let entries = std::fs::read_dir("/proc").expect("/proc");
+        let numbers = entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok());
+        numbers.filter(carries_mark).collect()
+    }
+
+    /// Ends what is left of the run.
+    fn end_all(&self) -> Vec<u32> {
+        let left = self.processes();
+        for process in &left {
+            send("KILL", *process);
+        }
+        left
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.end_all();
+        let _ = self.launcher.wait();
+    }
+}
+
+fn send(signal: &str, process: u32) -> bool {
+    let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {process}")]).stderr(Stdio::null()).status();
+    sent.is_ok_and(|status| status.success())
+}
+
+fn runs_solver(process: u32) -> bool {
+    let program = std::fs::read_link(process_file(process, "exe")).unwrap_or_default();
+    program == Path::new(env!("CARGO_BIN_EXE_solver"))
+}
+
+fn process_file(process: u32, name: &str) -> PathBuf {
+    PathBuf::from(format!("/proc/{process}/{name}"))
+}
+
+/// Whether this is the superuser, whom Open MPI refuses to serve unless told twice.
+fn is_root() -> bool {
+    std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").expect("/proc/self")) == 0
+}

@@ -1,0 +1,14 @@
+//! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
+
+mod case;
+mod check_values;
+// mod effects;
+// mod failures;
+mod hdf5_file;
+mod launch;
+// mod outputs;
+mod ranks;
+// mod readers;
+mod restart;
+mod results;
+mod signals;

@@ -1,0 +1,98 @@
+//! A run on more ranks is the same run.
+
+use crate::{
+    case::Case,
+    results::{Results, assert_same_answer},
+};
+
+/// Partition and rounding change the iterates, not the answer.
+const SHARE: f64 = 1e-8;
+
+/// Runs on 1, 2, 3, 4 and 7 ranks and compares with one rank.
+fn compare(make: impl Fn() -> Case, what: &str) {
+    let alone = make();
+    let alone = (alone.run(1), alone);
+    assert_eq!(alone.0.summary()["partition"]["edge_cut"], 0);
+    for ranks in [2, 3, 4, 7] {
+        let case = make();
+        let results = case.run(ranks);
+        let what = format!("{what} on {ranks} ranks");
+        assert_same_answer(&alone.0, &results, SHARE, &what);
+        assert_same_effort(&alone.0, &results, &what);
+        assert_same_problem(&alone.0, &results, ranks);
+    }
+}
+
+/// Newton's method takes the same path; the linear solves may differ by what the preconditioner sees of the ranks.
+fn assert_same_effort(alone: &Results, results: &Results, what: &str) {
+    let (one, other) = (alone.table("history.csv"), results.table("history.csv"));
+    let (one, other) = (one.numbers("newton_iterations"), other.numbers("newton_iterations"));
+    let worst = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst <= 1.0, "{what}: {worst} Newton iterations more or less in a step");
+    let (one, other) = (alone.number("linear_iterations"), results.number("linear_iterations"));
+    assert!(other <= 1.5 * one + 16.0, "{what}: {other} linear iterations instead of {one}");
+    assert!(results.number("max_inclusion_residual") < 1e-6, "{what}");
+    assert!(results.number("max_energy_imbalance") < 1e-10, "{what}");
+}
+
+/// Counts of the whole problem do not depend on how it is split, and the split is reported.
+fn assert_same_problem(alone: &Results, results: &Results, ranks: usize) {
+    let (one, other) = (alone.summary(), results.summary());
+    for key in ["dimension", "cells", "nodes", "unknowns", "effects", "scheme", "preconditioner", "steps", "inventory"] {
+        assert_eq!(one[key], other[key], "{key}");
+    }
+    assert_eq!(other["ranks"], ranks);
+    let partition = &other["partition"];
+    assert!(partition["edge_cut"].as_u64().expect("a count") > 0, "{partition}");
+    let imbalance = partition["imbalance"].as_f64().expect("a number");
+    assert!((1.0..1.5).contains(&imbalance), "{partition}");
+}
+
+fn square(preconditioner: &str, quadrature: &str) {
+    let make = || {
+        Case::square(12)
+            .set("solver.preconditioner", &format!("'{preconditioner}'"))
+            .set("contact.0.quadrature", &format!("'{quadrature}'"))
+    };
+    compare(make, &format!("square, {preconditioner}, {quadrature}"));
+}
+
+fn cube(preconditioner: &str, quadrature: &str) {
+    let make = || {
+        Case::cube(4)
+            .set("time.end", "0.5")
+            .set("solver.preconditioner", &format!("'{preconditioner}'"))
+            .set("contact.0.quadrature", &format!("'{quadrature}'"))
+    };
+    compare(make, &format!("cube, {preconditioner}, {quadrature}"));
+}
+
+#[test]
+fn a_square_factorised_is_the_same_on_any_number_of_ranks() {
+    square("cholesky", "nodal");
+}
+
+#[test]
+fn a_square_under_gamg_is_the_same_on_any_number_of_ranks() {
+    square("gamg", "nodal");
+}
+
+#[test]
+fn a_square_under_boomeramg_with_gauss_points_is_the_same_on_any_number_of_ranks() {
+    square("boomeramg", "gauss");
+}
+
+#[test]
+fn a_cube_factorised_with_gauss_points_is_the_same_on_any_number_of_ranks() {
+    cube("cholesky", "gauss");
+}
+
+#[test]
+fn a_cube_under_gamg_is_the_same_on_any_number_of_ranks() {
+    cube("gamg", "nodal");
+}
+
+#[test]
+fn a_cube_under_boomeramg_is_the_same_on_any_number_of_ranks() {
+    cube("boomeramg", "nodal");
+}

@@ -1,0 +1,266 @@
+//! A run that was interrupted and went on is the run that was not.
+
+use crate::{
+    case::Case,
+    hdf5_file::NumberFile,
+    launch::Outcome,
+    results::{Results, assert_same_answer, relative_difference},
+};
+use std::path::Path;
+
+/// Saves after 4, 8 and 12 of 16 steps.
+fn saving() -> Case {
+    Case::square(8).set("checkpoint.every", "4")
+}
+
+/// Runs past the checkpoint of step 8 and no further.
+#[track_caller]
+fn interrupt(case: &Case, ranks: usize) {
+    case.run_with(ranks, &["--set", "time.end=0.5625"]).expect(0);
+    assert_eq!(case.results().checkpoints(), [8, 4]);
+}
+
+#[track_caller]
+fn go_on(case: &Case, ranks: usize) -> Results {
+    case.run_with(ranks, &["--restart"]).expect(0).says("going on from").says("checkpoint-8.h5 (step 8, t = 0.5 s)");
+    let results = case.results();
+    let from = results.summary()["restarted_from"].as_str().map(str::to_owned);
+    assert!(from.is_some_and(|file| file.ends_with("out/checkpoint-8.h5")));
+    results
+}
+
+/// Not a bit may differ, neither in the tables nor in the fields nor in the next checkpoint.
+#[track_caller]
+fn assert_identical(straight: &Results, results: &Results, what: &str) {
+    for name in ["probes.csv", "history.csv", "profiles.csv"] {
+        assert_eq!(straight.text(name), results.text(name), "{what}: {name}");
+    }
+    let open = |name: &str| [straight, results].map(|r| NumberFile::open(&r.path(name)));
+    let [one, other] = open("checkpoint-12.h5").map(|file| file.checkpoint_tables());
+    assert!(one.len() >= 3);
+    assert!(one == other, "{what}: checkpoint-12.h5");
+    let [one, other] = open("fields.vtkhdf");
+    assert_eq!(one.times(), [0.0, 0.5, 1.0]);
+    assert_eq!(other.times(), [0.0, 0.5, 1.0]);
+    assert_eq!(one.names("Fields"), other.names("Fields"));
+    for name in one.names("Fields") {
+        assert!((0..3).all(|step| one.field(&name, step) == other.field(&name, step)), "{what}: field {name}");
+    }
+    let (one, other) = (straight.summary(), results.summary());
+    let same = ["steps", "newton_iterations", "linear_iterations", "max_von_mises", "max_energy_imbalance"];
+    for key in same.into_iter().chain(["max_inclusion_residual", "inventory", "effects"]) {
+        assert_eq!(one[key], other[key], "{what}: {key}");
+    }
+}
+
+fn compare_with_straight(make: impl Fn() -> Case, ranks: usize, what: &str) {
+    let what = format!("{what} on {ranks} ranks");
+    let (straight, stopped) = (make(), make());
+    straight.run(ranks);
+    interrupt(&stopped, ranks);
+    assert_identical(&straight.results(), &go_on(&stopped, ranks), &what);
+}
+
+#[test]
+fn a_restarted_run_is_the_straight_run_to_the_last_bit() {
+    for ranks in [1, 2, 3, 4] {
+        compare_with_straight(|| saving().set("solver.preconditioner", "'cholesky'"), ranks, "cholesky");
+    }
+}
+
+#[test]
+fn a_restarted_run_under_gamg_is_the_straight_run_to_the_last_bit() {
+    for ranks in [1, 2, 3, 4] {
+        compare_with_straight(|| saving().set("solver.preconditioner", "'gamg'"), ranks, "gamg");
+    }
+}
+
+#[test]
+fn a_restarted_run_with_fewer_effects_is_the_straight_run_to_the_last_bit() {
+    for preconditioner in ["'cholesky'", "'gamg'"] {
+        let make = || saving().set("solver.preconditioner", preconditioner);
+        let elastic = || make().without("material.viscoplasticity");
+        compare_with_straight(elastic, 2, "without viscoplasticity");
+        compare_with_straight(|| make().without("material.density"), 2, "without density");
+        compare_with_straight(|| elastic().without("material.density"), 3, "without both");
+        compare_with_straight(|| make().without("contact"), 2, "without contact");
+    }
+}
+
+#[test]
+fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
+    let make = || {
+        Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]")
+    };
+    compare_with_straight(make, 3, "cube");
+}
+
+#[test]
+fn a_run_goes_on_on_any_number_of_ranks() {
+    // Solved further than by default, so that what is left of the equations does not hide the restart.
+    let case = saving().set("solver.tolerance", "1e-13");
+    let straight = case.run_with(1, &["--set", "output.folder='straight'"]).expect(0);
+    drop(straight);
+    let straight = Results::of(case.folder().join("straight"));
+    for writers in [1, 2, 3, 4] {
+        let saved = format!("saved on {writers}");
+        let to_saved = format!("output.folder='{saved}'");
+        case.run_with(writers, &["--set", &to_saved, "--set", "time.end=0.5625"]).expect(0);
+        let saved = case.folder().join(saved);
+        for readers in [1, 2, 3, 4] {
+            let what = format!("saved on {writers} ranks, gone on on {readers}");
+            assert_restored(&case, &saved, readers, &what);
+            let copy = case.folder().join(&what);
+            copy_folder(&saved, &copy);
+            let to_copy = format!("output.folder='{what}'");
+            case.run_with(readers, &["--set", &to_copy, "--restart"]).expect(0);
+            assert_same_answer(&straight, &Results::of(copy), 1e-9, &what);
+        }
+    }
+}
+
+/// Goes on from a checkpoint without taking a step, so that the restored state is what the field file gets.
+fn assert_restored(case: &Case, saved: &Path, readers: usize, what: &str) {
+    let file = saved.join("checkpoint-8.h5").display().to_string();
+    let folder = format!("restored, {what}");
+    let to_folder = format!("output.folder='{folder}'");
+    case.run_with(readers, &["--set", "time.end=0.5", "--set", &to_folder, "--restart", &file]).expect(0);
+    let restored = NumberFile::open(&case.folder().join(folder).join("fields.vtkhdf"));
+    let written = NumberFile::open(&saved.join("fields.vtkhdf"));
+    assert_eq!((written.times()[1], restored.times()), (0.5, vec![0.5]), "{what}");
+    for name in ["displacement", "velocity", "viscoplastic_history"] {
+        assert!(written.field(name, 1) == restored.field(name, 0), "{what}: {name}");
+    }
+    for name in ["stress", "von_mises"] {
+        let difference = relative_difference(&written.field(name, 1), &restored.field(name, 0));
+        assert!(difference < 1e-9, "{what}: {name} differs by {difference:e}");
+    }
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir(to).expect("folder");
+    for name in crate::results::names(from) {
+        std::fs::copy(from.join(&name), to.join(&name)).expect("copied");
+    }
+}
+
+fn truncate(file: &Path) {
+    let bytes = std::fs::read(file).expect("checkpoint");
+    std::fs::write(file, &bytes[..bytes.len() * 2 / 3]).expect("written");
+}
+
+fn flip_a_bit(file: &Path) {
+    let mut bytes = std::fs::read(file).expect("checkpoint");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    std::fs::write(file, bytes).expect("written");
+}
+
+#[test]
+fn a_damaged_checkpoint_is_passed_over_with_a_warning() {
+    let straight = saving();
+    let straight = (straight.run(2), straight);
+    for damage in [truncate, flip_a_bit] {
+        let case = saving();
+        case.run(2);
+        assert_eq!(case.results().checkpoints(), [12, 8]);
+        damage(&case.results().path("checkpoint-12.h5"));
+        let outcome = case.run_with(2, &["--restart"]).expect(0);
+        outcome.says("warning: ").says("checkpoint-12.h5").says("going on from").says("(step 8, t = 0.5 s)");
+        assert_identical(&straight.0, &case.results(), "behind a damaged checkpoint");
+    }
+}
+
+#[test]
+fn a_run_is_refused_where_every_checkpoint_is_damaged() {
+    let case = saving();
+    case.run(2);
+    truncate(&case.results().path("checkpoint-12.h5"));
+    flip_a_bit(&case.results().path("checkpoint-8.h5"));
+    let outcome = case.run_with(2, &["--restart"]).expect(2);
+    outcome.says("no good checkpoint").says("checkpoint-12.h5").says("checkpoint-8.h5");
+}
+
+#[test]
+fn a_run_is_refused_where_there_is_no_checkpoint() {
+    let case = Case::square(4);
+    case.run_with(1, &["--restart"]).expect(2).says("no checkpoint to go on from");
+    let outcome = case.run_with(2, &["--restart", "nowhere.h5"]).expect(2);
+    outcome.says("nowhere.h5");
+}
+
+/// Interrupts the run and goes on with another key.
+fn go_on_with(change: &str) -> (Outcome, Case) {
+    let case = saving();
+    interrupt(&case, 1);
+    (case.run_with(2, &["--restart", "--set", change]), case)
+}
+
+#[test]
+fn a_checkpoint_of_another_problem_is_refused_and_the_key_is_named() {
+    for (change, key) in [
+        ("material.viscosity.shear=51", "material.viscosity.shear: checkpoint 50.0, job 51.0"),
+        ("time.step=0.03125", "time.step: checkpoint 0.0625, job 0.03125"),
+        ("contact.0.quadrature=gauss", "contact.0.quadrature"),
+        ("mesh.rectangle.diagonal=left", "mesh.rectangle.diagonal"),
+        ("traction.0.value=[0, '-10*t']", "traction.0.value"),
+    ] {
+        go_on_with(change).0.expect(2).says("belongs to another problem").says(key);
+    }
+}
+
+#[test]
+fn what_is_written_and_how_it_is_solved_may_change_on_the_way() {
+    for change in [
+        "output.fields={interval=0.25}",
+        "output.probe=[{name='other', point=[0.5, 0.5]}]",
+        "output.profile=[{on='top'}]",
+        "checkpoint.keep=1",
+        "solver.preconditioner=gamg",
+        "about.title=another",
+    ] {
+        let (outcome, case) = go_on_with(change);
+        outcome.expect(0);
+        assert_eq!(case.results().number("steps"), 16.0, "{change}");
+        assert_eq!(case.results().table("history.csv").rows.len(), 16, "{change}");
+    }
+}
+
+#[test]
+fn a_completed_run_that_is_restarted_repeats_its_last_steps() {
+    let case = saving();
+    let first = case.run(2);
+    let (probes, history) = (first.text("probes.csv"), first.text("history.csv"));
+    case.run_with(2, &["--restart"]).expect(0).says("(step 12, t = 0.75 s)");
+    assert_eq!(case.results().text("probes.csv"), probes);
+    assert_eq!(case.results().text("history.csv"), history);
+    assert_eq!(case.results().summary()["status"], "completed");
+}
+
+#[test]
+fn a_completed_run_goes_on_to_a_later_end() {
+    let longer = saving().set("time.end", "1.5");
+    let longer = (longer.run(2), longer);
+    let case = saving();
+    case.run(2);
+    case.run_with(2, &["--restart", "--set", "time.end=1.5"]).expect(0);
+    assert_eq!(longer.0.text("probes.csv"), case.results().text("probes.csv"));
+    assert_eq!(longer.0.text("history.csv"), case.results().text("history.csv"));
+}
+
+#[test]
+fn only_the_newest_checkpoints_are_kept() {
+    for (keep, left) in [("1", vec![15]), ("2", vec![15, 14]), ("4", vec![15, 14, 13, 12])] {
+        let case = Case::square(4).set("checkpoint.every", "1").set("checkpoint.keep", keep);
+        assert_eq!(case.run(1).checkpoints(), left);
+    }
+}
+
+#[test]
+fn a_new_start_removes_the_checkpoints_of_an_earlier_run() {
+    let case = saving();
+    case.run(1);
+    let outcome = case.run_with(1, &["--set", "time.end=0.3"]).expect(0);
+    outcome.says("checkpoint-12.h5 of an earlier run");
+    assert_eq!(case.results().checkpoints(), [4]);
+}

@@ -1,0 +1,144 @@
+//! What a run left, read the way a user's script would.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// An output folder.
+pub struct Results {
+    folder: PathBuf,
+}
+
+impl Results {
+    pub fn of(folder: PathBuf) -> Self {
+        Self { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    pub fn text(&self, name: &str) -> String {
+        let path = self.path(name);
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    }
+
+    pub fn summary(&self) -> Value {
+        serde_json::from_str(&self.text("summary.json")).expect("JSON")
+    }
+
+    /// A number of the summary.
+    pub fn number(&self, key: &str) -> f64 {
+        self.summary()[key].as_f64().unwrap_or_else(|| panic!("{key} is no number"))
+    }
+
+    pub fn table(&self, name: &str) -> Table {
+        Table::parse(&self.text(name))
+    }
+
+    /// Names of all files, sorted.
+    pub fn files(&self) -> Vec<String> {
+        names(&self.folder)
+    }
+
+    /// Steps of all checkpoints, the newest first.
+    pub fn checkpoints(&self) -> Vec<u64> {
+        let found = clarke::output::checkpoint_folder::list(&self.folder).expect("list");
+        found.into_iter().map(|(step, _)| step).collect()
+    }
+}
+
+/// Names of all files of a folder, sorted.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("folder");
+    let mut names: Vec<String> =
+        entries.map(|e| e.expect("entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// A CSV file.
+pub struct Table {
+    pub columns: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    fn parse(text: &str) -> Self {
+        let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let mut lines = text.lines();
+        let columns = split(lines.next().expect("a header"));
+        let rows: Vec<Vec<String>> = lines.map(split).collect();
+        assert!(rows.iter().all(|row| row.len() == columns.len()), "a row of another length:\n{text}");
+        Self { columns, rows }
+    }
+
+    fn position(&self, column: &str) -> usize {
+        self.columns.iter().position(|c| c == column).unwrap_or_else(|| panic!("no column {column}"))
+    }
+
+    pub fn words(&self, column: &str) -> Vec<&str> {
+        let at = self.position(column);
+        self.rows.iter().map(|row| row[at].as_str()).collect()
+    }
+
+    pub fn numbers(&self, column: &str) -> Vec<f64> {
+        self.words(column).iter().map(|word| word.parse().unwrap_or_else(|_| panic!("{word} in {column}"))).collect()
+    }
+
+    /// The rows with this word in this column.
+    pub fn only(&self, column: &str, word: &str) -> Self {
+        let at = self.position(column);
+        let rows = self.rows.iter().filter(|row| row[at] == word).cloned().collect();
+        Self { columns: self.columns.clone(), rows }
+    }
+
+    /// The last number of a column.
+    pub fn last(&self, column: &str) -> f64 {
+        *self.numbers(column).last().expect("a row")
+    }
+}
+
+/// Largest difference of two lists of numbers over the largest number.
+pub fn relative_difference(one: &[f64], other: &[f64]) -> f64 {
+    assert_eq!(one.len(), other.len(), "lists of other lengths");
+    let largest = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(f64::abs).fold(0.0, f64::max);
+    let scale = largest(&mut one.iter().chain(other).copied());
+    let difference = largest(&mut one.iter().zip(other).map(|(a, b)| a - b));
+    if difference == 0.0 { 0.0 } else { difference / scale }
+}
+
+/// Energies and what becomes of them, in `history.csv`.
+pub const ENERGIES: [&str; 7] = [
+    "kinetic_energy",
+    "elastic_energy",
+    "viscous_dissipation",
+    "viscoplastic_dissipation",
+    "contact_dissipation",
+    "external_work",
+    "numerical_dissipation",
+];
+
+/// Both runs must have gone through the same states: probes, energies and stress agree within this share of the largest.
+#[track_caller]
+pub fn assert_same_answer(one: &Results, other: &Results, share: f64, what: &str) {
+    let (a, b) = (one.table("probes.csv"), other.table("probes.csv"));
+    assert_eq!(a.columns, b.columns);
+    for word in ["step", "time", "probe"] {
+        assert_eq!(a.words(word), b.words(word), "{what}: {word} in probes.csv");
+    }
+    let check = |name: &str, a: &[f64], b: &[f64]| {
+        let difference = relative_difference(a, b);
+        assert!(difference <= share, "{what}: {name} differs by {difference:e} of its largest value");
+    };
+    for column in &a.columns[3..] {
+        check(column, &a.numbers(column), &b.numbers(column));
+    }
+    let (a, b) = (one.table("history.csv"), other.table("history.csv"));
+    for word in ["step", "time", "dt"] {
+        assert_eq!(a.words(word), b.words(word), "{what}: {word} in history.csv");
+    }
+    for column in ENERGIES {
+        check(column, &a.numbers(column), &b.numbers(column));
+    }
+    check("max_von_mises", &[one.number("max_von_mises")], &[other.number("max_von_mises")]);
+}

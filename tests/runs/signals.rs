@@ -1,0 +1,87 @@
+//! Requests to stop from outside: the state is saved, and the run goes on as if nothing had been.
+//!
+//! Open MPI's `mpirun` passes SIGUSR1 on and ends as its ranks do. On SIGTERM and SIGINT it sends its ranks SIGTERM,
+//! kills them after a while (one second by default), and ends with a code of its own.
+
+use crate::{
+    case::Case,
+    launch::{Outcome, Target},
+    results::Results,
+};
+
+/// Far more steps than any test waits for.
+fn endless() -> Case {
+    Case::square(6).set("time.step", "0.0009765625").set("time.end", "8").set("output.fields", "{every = 1000000}")
+}
+
+/// Sends a signal after some steps.
+fn stop(case: &Case, ranks: usize, signal: &str, target: Target) -> Outcome {
+    let mut running = case.start(ranks, &[]);
+    running.wait_for("step     27/");
+    running.signal(signal, target);
+    running.wait()
+}
+
+#[track_caller]
+fn assert_saved(results: &Results, reason: &str) -> u64 {
+    let summary = results.summary();
+    assert_eq!(summary["status"], "stopped");
+    let steps = summary["steps"].as_u64().expect("a count");
+    assert!((27..8192).contains(&steps), "{steps}");
+    assert_eq!(results.checkpoints(), [steps]);
+    assert_eq!(results.table("history.csv").rows.len() as u64, steps);
+    assert!(results.text("run.log").contains(&format!("stopping on {reason}; go on with --restart")));
+    steps
+}
+
+/// Goes on for a few steps and holds the result against a run that was not stopped.
+fn assert_goes_on(case: &Case, ranks: usize, steps: u64) {
+    let end = format!("time.end={}", (steps + 8) as f64 / 1024.0);
+    case.run_with(ranks, &["--restart", "--set", &end]).expect(0);
+    case.run_with(ranks, &["--set", "output.folder='straight'", "--set", &end]).expect(0);
+    let straight = Results::of(case.folder().join("straight"));
+    for name in ["probes.csv", "history.csv"] {
+        assert_eq!(straight.text(name), case.results().text(name), "{name}");
+    }
+    assert_eq!(case.results().summary()["status"], "completed");
+}
+
+fn stop_and_go_on(ranks: usize, signal: &str, target: Target) {
+    let case = endless();
+    stop(&case, ranks, signal, target).expect(3);
+    let steps = assert_saved(&case.results(), &format!("SIG{signal}"));
+    assert_goes_on(&case, ranks, steps);
+}
+
+#[test]
+fn a_run_that_a_batch_system_warns_saves_its_state_and_goes_on() {
+    stop_and_go_on(2, "USR1", Target::Launcher);
+}
+
+#[test]
+fn a_signal_to_one_rank_stops_all_of_them() {
+    stop_and_go_on(3, "TERM", Target::OneRank);
+    stop_and_go_on(1, "INT", Target::OneRank);
+}
+
+#[test]
+fn a_run_whose_launcher_is_told_to_end_saves_its_state() {
+    let case = endless();
+    let patient = ["--mca", "odls_base_sigkill_timeout", "20"];
+    for signal in ["TERM", "INT"] {
+        let mut running = case.start(2, &patient);
+        running.wait_for("step     27/");
+        running.signal(signal, Target::Launcher);
+        assert_ne!(running.wait().code, 0);
+        assert_saved(&case.results(), "SIGTERM");
+    }
+}
+
+#[test]
+fn a_run_stops_before_its_wall_time_is_over_and_goes_on() {
+    let case = endless().set("checkpoint.wall_limit", "1.5");
+    case.run_with(2, &[]).expect(3).says("stopping on the wall-time limit of 1.5 s; go on with --restart");
+    let steps = case.results().checkpoints()[0];
+    assert!(steps < 8192);
+    case.run_with(2, &["--restart", "--set", "checkpoint.wall_limit=1000", "--set", "time.end=0.001"]).expect(0);
+}
