@@ -22,7 +22,7 @@ const FUNCTIONS: &[&str] = &[
     "KSP(Create|Destroy|SetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
     "KSP(SetOptionsPrefix|GetType)",
-    "PC(SetType|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
+    "PC(Apply|SetType|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
     "SNESLineSearchSetType",

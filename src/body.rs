@@ -1,14 +1,14 @@
 //! A body on a mesh with all that acts on it: what a run advances in time.
 
 use crate::{
-    effect::{Contact, Effect, Energy, Load, Phases, Step},
+    effect::{Contact, Effect, Energy, Form, Load, Phases, Step},
     error::Result,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
     session::Session,
     space::{Batch, Geometry, Needs, Nodal, assemble},
     state::State,
-    tensor::Mandel,
+    tensor::{Mandel, add_scaled},
 };
 
 /// A body of `D` dimensions whose stresses have `S` components.
@@ -64,6 +64,37 @@ impl<const D: usize, const S: usize> Body<D, S> {
             });
         })?;
         Ok(energy)
+    }
+
+    /// Whether an effect stands for this form.
+    pub fn has_form(&self, form: Form) -> bool {
+        self.effects.iter().any(|e| e.form() == Some(form))
+    }
+
+    /// Adds `F x` of a form to `forces`; both with ghosts, held components not yet zeroed.
+    pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
+        let needs =
+            Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
+        let nodal = Nodal { displacement: x, velocity: x, previous_velocity: x };
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if form == Form::Strain {
+                for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
+                    *stress = add_scaled(stress, -1.0, rate);
+                }
+            }
+            self.effects.iter().filter(|e| e.form() == Some(form)).for_each(|e| e.add_form(batch));
+            batch.scatter(&self.mesh, forces);
+        });
+    }
+
+    /// The smallest eigenvalue of the viscosity in Pa s, if there is viscosity.
+    pub fn smallest_viscosity(&self) -> Option<f64> {
+        self.effects.iter().filter_map(|e| e.viscosity_modulus()).reduce(f64::min)
+    }
+
+    /// The step in s beyond which explicit viscoplastic flow alone is unstable, if there is any.
+    pub fn flow_step_bound(&self) -> Option<f64> {
+        self.effects.iter().filter_map(|e| e.flow_step_bound()).reduce(f64::min)
     }
 
     /// Total stress in Pa after a committed step, one a cell.

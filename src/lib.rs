@@ -18,6 +18,7 @@ pub mod state;
 pub mod effect;
 pub mod body;
 pub mod stepping;
+pub mod certificate;
 pub mod output;
 pub mod run;
 pub mod cli;

@@ -99,6 +99,7 @@ impl<const D: usize> Point<D> {
 pub struct Contact<const D: usize> {
     /// The law.
     pub graph: Graph,
+    facets: Vec<u32>,
     points: Vec<Point<D>>,
     needs_ghosts: bool,
 }
@@ -120,7 +121,7 @@ impl<const D: usize> Contact<D> {
                 .collect(),
             Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, fixed)).collect(),
         };
-        Self { graph, points, needs_ghosts: quadrature == Quadrature::Gauss }
+        Self { graph, facets: facets.to_vec(), points, needs_ghosts: quadrature == Quadrature::Gauss }
     }
 
     /// Whether velocities of ghost nodes are read and forces on them written.
@@ -131,6 +132,19 @@ impl<const D: usize> Contact<D> {
     /// Quadrature points on this rank.
     pub fn point_count(&self) -> usize {
         self.points.len()
+    }
+
+    /// Facets of this rank, local numbers.
+    pub fn facets(&self) -> &[u32] {
+        &self.facets
+    }
+
+    /// Adds the normals at the points to nodal values.
+    pub fn add_normals(&self, nodal: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.count == 1) {
+            let target = &mut nodal[point.nodes[0] as usize * D..][..D];
+            target.iter_mut().zip(point.normal).for_each(|(value, n)| *value += n);
+        }
     }
 
     /// Adds the contact forces `C(v)` in N to `forces`.

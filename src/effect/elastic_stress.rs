@@ -1,4 +1,4 @@
-use super::{Effect, Energy, Phases, Step};
+use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
     material::Isotropic,
     space::{Batch, Needs},
@@ -39,6 +39,16 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
             }
             let lag = dot(rate, &self.tensor.apply(rate));
             energy.numerical += 0.5 * cell.volume * step.length * step.length * lag;
+        }
+    }
+
+    fn form(&self) -> Option<Form> {
+        Some(Form::Elasticity)
+    }
+
+    fn add_form(&self, batch: &mut Batch<D, S>) {
+        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
+            *stress = add_scaled(stress, -1.0, &self.tensor.apply(rate));
         }
     }
 

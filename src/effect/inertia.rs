@@ -1,4 +1,4 @@
-use super::{Effect, Energy, Phases, Step};
+use super::{Effect, Energy, Form, Phases, Step};
 use crate::space::{Batch, CellMatrix, Needs, Simplex};
 
 /// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
@@ -23,6 +23,24 @@ impl Inertia {
         }
         factor * sum
     }
+
+    /// Adds `factor * M v` to the forces of a batch.
+    fn add_mass<const D: usize, const S: usize>(&self, factor: f64, batch: &mut Batch<D, S>) {
+        let factor = factor * self.density / ((D + 1) * (D + 2)) as f64;
+        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.force.chunks_exact_mut(D + 1));
+        for (cell, (velocity, force)) in batch.cells.iter().zip(nodal) {
+            let factor = factor * cell.volume;
+            for i in 0..D {
+                let mut total = 0.0;
+                for v in velocity {
+                    total += v[i];
+                }
+                for (f, v) in force.iter_mut().zip(velocity) {
+                    f[i] += factor * (total + v[i]);
+                }
+            }
+        }
+    }
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
@@ -41,20 +59,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
-        let factor = self.density / (step.length * ((D + 1) * (D + 2)) as f64);
-        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.force.chunks_exact_mut(D + 1));
-        for (cell, (velocity, force)) in batch.cells.iter().zip(nodal) {
-            let factor = factor * cell.volume;
-            for i in 0..D {
-                let mut total = 0.0;
-                for v in velocity {
-                    total += v[i];
-                }
-                for (f, v) in force.iter_mut().zip(velocity) {
-                    f[i] += factor * (total + v[i]);
-                }
-            }
-        }
+        self.add_mass(1.0 / step.length, batch);
+    }
+
+    fn form(&self) -> Option<Form> {
+        Some(Form::Mass)
+    }
+
+    fn add_form(&self, batch: &mut Batch<D, S>) {
+        self.add_mass(1.0, batch);
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {

@@ -46,6 +46,19 @@ pub struct Phases {
     pub stress: Option<Needs>,
 }
 
+/// A quadratic form of the velocity, for certificates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// `integral of density w . w`.
+    Mass,
+    /// `integral of A e(w) : e(w)`.
+    Viscosity,
+    /// `integral of E e(w) : e(w)`.
+    Elasticity,
+    /// `integral of e(w) : e(w)`, there without any effect.
+    Strain,
+}
+
 /// An effect of the body's interior.
 pub trait Effect<const D: usize, const S: usize> {
     /// Its name in logs and `summary.json`.
@@ -72,6 +85,24 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// Adds its part of the total stress after the step was committed.
     fn add_stress(&self, _step: Step, _batch: &mut Batch<D, S>) {}
+
+    /// The form it stands for, if any.
+    fn form(&self) -> Option<Form> {
+        None
+    }
+
+    /// Adds the force of its form to the batch: nodal force, or minus the stress; given velocity and strain rate.
+    fn add_form(&self, _batch: &mut Batch<D, S>) {}
+
+    /// The smallest eigenvalue of its viscosity in Pa s, if it has one.
+    fn viscosity_modulus(&self) -> Option<f64> {
+        None
+    }
+
+    /// The step in s beyond which its explicit flow alone is unstable, if it has one.
+    fn flow_step_bound(&self) -> Option<f64> {
+        None
+    }
 
     /// Makes the trial history the converged one.
     fn commit(&mut self) {}

@@ -66,6 +66,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         }
     }
 
+    fn flow_step_bound(&self) -> Option<f64> {
+        Some(4.0 * self.law.relaxation / self.law.elasticity.largest_modulus::<S>())
+    }
+
     fn commit(&mut self) {
         std::mem::swap(&mut self.converged, &mut self.trial);
     }

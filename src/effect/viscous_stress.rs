@@ -1,4 +1,4 @@
-use super::{Effect, Energy, Phases, Step};
+use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
     material::Viscosity,
     space::{Batch, CellMatrix, Needs, Simplex},
@@ -30,6 +30,20 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         for (cell, rate) in batch.cells.iter().zip(&batch.strain_rate) {
             energy.viscous += step.length * cell.volume * dot(rate, &self.tensor.apply(rate));
         }
+    }
+
+    fn form(&self) -> Option<Form> {
+        Some(Form::Viscosity)
+    }
+
+    fn add_form(&self, batch: &mut Batch<D, S>) {
+        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
+            *stress = add_scaled(stress, -1.0, &self.tensor.apply(rate));
+        }
+    }
+
+    fn viscosity_modulus(&self) -> Option<f64> {
+        Some(self.tensor.smallest_modulus::<S>())
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {

@@ -62,6 +62,11 @@ impl Isotropic {
     pub fn smallest_modulus<const S: usize>(&self) -> f64 {
         self.shear.min(self.shear + normal_components::<S>() as f64 * self.volumetric)
     }
+
+    /// Largest eigenvalue over the stored components.
+    pub fn largest_modulus<const S: usize>(&self) -> f64 {
+        self.shear.max(self.shear + normal_components::<S>() as f64 * self.volumetric)
+    }
 }
 
 /// Linear isotropic elasticity, section 5 of Wang and Cheng (2022) for plane stress.

@@ -142,6 +142,16 @@ impl Ksp {
         self.outcome()
     }
 
+    /// `z = P^-1 r` with the preconditioner, which must be set up. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        let mut pc = ptr::null_mut();
+        // SAFETY: the preconditioner belongs to the live solver; the two vectors differ.
+        unsafe {
+            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::PCApply(pc, r.raw, z.raw))
+        }
+    }
+
     /// How the last solve ended.
     pub fn outcome(&self) -> Result<LinearOutcome> {
         let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);

@@ -5,11 +5,12 @@ use super::{
     estimate::Estimate,
     header,
     setup::{Setup, setup},
-    summary::{Certificates, PartitionQuality},
+    summary::PartitionQuality,
     time_loop::steps_between,
 };
 use crate::{
     body::Body,
+    certificate::Certificates,
     error::{Error, Exit, Result},
     job::{Job, Loaded},
     mesh::check::Quality,
@@ -70,7 +71,7 @@ pub(super) fn check<const D: usize, const S: usize>(
     let quality = scene.as_ref().map(|s| s.mesh.quality_summary());
     let ready = setup::<D, S>(session, loaded, scene)?;
     session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
-    let lines = header::lines(session, loaded, &ready.body, &ready.scheme)?;
+    let lines = header::lines(session, loaded, &ready)?;
     let report = report(session, loaded, &ready, quality)?;
     let printed = if session.is_first() { print(&report, lines, json) } else { Ok(()) };
     session.agree(printed)?;
@@ -122,7 +123,7 @@ fn report<const D: usize, const S: usize>(
         newton: inventory.newton,
         preconditioner: preconditioner.name(),
         preconditioner_reason: asked.reason(D, mesh.total_nodes * D),
-        certificates: Certificates::of(job, body),
+        certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: CellQuality {
             smallest: quality.smallest,
@@ -163,7 +164,6 @@ impl Report {
         }
         lines.push(format!("steps      {}", self.steps));
         lines.push(format!("solver     {}: {}", self.preconditioner, self.preconditioner_reason));
-        lines.push(format!("certified  {}", self.certificates.words()));
         let memory = &self.estimate.memory_bytes;
         let parts = [
             ("program", memory.program),

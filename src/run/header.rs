@@ -1,18 +1,16 @@
 //! What the log says before the first and after the last step.
 
-use super::Summary;
-use crate::{
-    body::Body, error::Result, job::Loaded, output::log::Log, session::Session, stepping::LaggedEuler,
-};
+use super::{Summary, setup::Setup};
+use crate::{error::Result, job::Loaded, output::log::Log, session::Session};
 use std::path::Path;
 
 /// Versions, title, mesh, partition, effects, solver, output folder, warnings: a line each. Collective.
 pub(super) fn lines<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
-    body: &Body<D, S>,
-    scheme: &LaggedEuler,
+    ready: &Setup<D, S>,
 ) -> Result<Vec<String>> {
+    let Setup { body, scheme, verdict, .. } = ready;
     let (job, mesh) = (&loaded.job, &body.mesh);
     let ranks = if session.ranks() == 1 { "1 rank".into() } else { format!("{} ranks", session.ranks()) };
     let mut lines = vec![format!("Clarke {}, PETSc {}, {ranks}", super::VERSION, session.petsc().version()?)];
@@ -36,8 +34,10 @@ pub(super) fn lines<const D: usize, const S: usize>(
         scheme.preconditioner().name(),
         job.solver.tolerance
     ));
+    lines.extend(verdict.words.iter().map(|words| format!("certified  {words}")));
     lines.push(format!("output     {}", job.output_folder().display()));
-    lines.extend(loaded.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines
+        .extend(loaded.warnings.iter().chain(&verdict.warnings).map(|warning| format!("warning: {warning}")));
     Ok(lines)
 }
 

@@ -3,8 +3,9 @@
 use super::{Scene, build, scene::refuse_empty_matrix};
 use crate::{
     body::Body,
+    certificate::{Accepted, Certificates, Verdict},
     error::{Error, Result},
-    job::{Job, Loaded},
+    job::{Accept, Job, Loaded},
     mesh::{Mesh, distribute},
     output::probes::Probes,
     petsc::set_option,
@@ -20,6 +21,8 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub state: State,
     pub scheme: LaggedEuler,
     pub probes: Probes<D>,
+    pub certificates: Certificates,
+    pub verdict: Verdict,
 }
 
 /// Sets the problem of a job up, whose whole mesh is on rank 0. Collective.
@@ -45,8 +48,33 @@ pub(super) fn setup<const D: usize, const S: usize>(
             ),
             other => other,
         });
-    let scheme = session.agree(scheme)?;
-    Ok(Setup { body, state, scheme, probes })
+    let mut scheme = session.agree(scheme)?;
+    scheme.prepare_length(session, &body, job.time.step)?;
+    let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme))?;
+    let unique_step = if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
+        session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
+    } else {
+        None
+    };
+    let verdict = certificates.verdict(job.time.step, unique_step, accepted(job));
+    session.agree(refuse(loaded, &verdict))?;
+    Ok(Setup { body, state, scheme, probes, certificates, verdict })
+}
+
+fn accepted(job: &Job) -> Accepted {
+    Accepted {
+        uniqueness: job.solver.accept.contains(&Accept::Uniqueness),
+        explicit_stability: job.solver.accept.contains(&Accept::ExplicitStability),
+    }
+}
+
+fn refuse(loaded: &Loaded, verdict: &Verdict) -> Result<()> {
+    if verdict.refusals.is_empty() {
+        return Ok(());
+    }
+    let (found, remedies): (Vec<&str>, Vec<&str>) =
+        verdict.refusals.iter().map(|(found, remedy)| (found.as_str(), remedy.as_str())).unzip();
+    Err(loaded.fault("time.step", found.join("; "), remedies.join("; ")))
 }
 
 fn probes<const D: usize>(session: &Session, mesh: &Mesh<D>, job: &Job) -> Result<Probes<D>> {

@@ -2,10 +2,8 @@
 
 use super::{Inventory, VERSION};
 use crate::{
-    body::Body,
+    certificate::Certificates,
     error::{Error, Result},
-    job::{Job, Viscosity},
-    material::Isotropic,
 };
 use serde::Serialize;
 use std::path::Path;
@@ -65,57 +63,6 @@ pub struct Summary {
     pub partition: PartitionQuality,
     /// What was allocated for the effects.
     pub inventory: Inventory,
-}
-
-/// Constants of the problem; null where they are not available.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Certificates {
-    /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
-    pub theta: Option<f64>,
-    /// The same with the matrix of a step.
-    pub theta_step: Option<f64>,
-    /// `m_A` in Pa s.
-    pub viscosity_modulus: Option<f64>,
-    /// `m_j` in Pa s/m.
-    pub monotonicity_constant: Option<f64>,
-    /// `|gamma|^2` of the normal trace.
-    pub trace_norm_squared: Option<f64>,
-    /// Largest stable step in s.
-    pub explicit_step_bound: Option<f64>,
-}
-
-impl Certificates {
-    /// What the material and the contact laws say by themselves.
-    pub(super) fn of<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> Self {
-        let modulus =
-            |v: &Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear }.smallest_modulus::<S>();
-        Self {
-            viscosity_modulus: job.material.viscosity.as_ref().map(modulus),
-            monotonicity_constant: body
-                .contacts
-                .iter()
-                .map(|c| c.graph.monotonicity_constant())
-                .reduce(f64::max),
-            ..Self::default()
-        }
-    }
-
-    /// What is known, in words.
-    pub(super) fn words(&self) -> String {
-        let all = [
-            ("theta", self.theta, ""),
-            ("theta of a step", self.theta_step, ""),
-            ("viscosity modulus", self.viscosity_modulus, " Pa s"),
-            ("monotonicity constant", self.monotonicity_constant, " Pa s/m"),
-            ("squared trace norm", self.trace_norm_squared, ""),
-            ("largest stable step", self.explicit_step_bound, " s"),
-        ];
-        let known: Vec<String> = all
-            .iter()
-            .filter_map(|(name, value, unit)| value.map(|value| format!("{name} {value:.6}{unit}")))
-            .collect();
-        if known.is_empty() { "nothing".into() } else { known.join(", ") }
-    }
 }
 
 /// How the mesh was split.

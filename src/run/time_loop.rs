@@ -4,10 +4,11 @@ use super::{
     Clock, Inventory, Scene, Start,
     outputs::{Outputs, prepare_folder},
     setup::{Setup, setup},
-    summary::{Certificates, PartitionQuality, Summary, peak_memory},
+    summary::{PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     body::Body,
+    certificate::Certificates,
     effect::Step,
     error::{Error, Exit, Result},
     job::{Job, Loaded},
@@ -40,11 +41,11 @@ pub(super) fn run<const D: usize, const S: usize>(
     clock: Clock,
 ) -> Result<Exit> {
     let job = &loaded.job;
-    let Setup { mut body, mut state, mut scheme, probes } = setup::<D, S>(session, loaded, scene)?;
+    let mut ready = setup::<D, S>(session, loaded, scene)?;
     let folder = job.output_folder();
     let goes_on = *start != Start::Anew;
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
-    let restored = restore(session, start, folder, &identity, &mut body, &mut state);
+    let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
     let restored = session.agree(restored)?;
     let mut log = Log::new(session.is_first());
     let prepared = if session.is_first() {
@@ -56,7 +57,8 @@ pub(super) fn run<const D: usize, const S: usize>(
     if let Some(restored) = &restored {
         restored.words.iter().for_each(|words| log.line(words));
     }
-    super::header::lines(session, loaded, &body, &scheme)?.iter().for_each(|line| log.line(line));
+    super::header::lines(session, loaded, &ready)?.iter().for_each(|line| log.line(line));
+    let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let energy = {
         let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
         let mine = session.agree(body.energy(&state, rest))?;
@@ -67,10 +69,10 @@ pub(super) fn run<const D: usize, const S: usize>(
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
     }
-    scheme.prepare_length(session, &body, job.time.step)?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
-    let mut run = Run { session, job, body, state, scheme, totals, outputs, log, clock, setup, stepping };
+    let mut run =
+        Run { session, job, body, state, scheme, certificates, totals, outputs, log, clock, setup, stepping };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -134,6 +136,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     body: Body<D, S>,
     state: State,
     scheme: LaggedEuler,
+    certificates: Certificates,
     totals: Totals,
     outputs: Outputs<D>,
     log: Log,
@@ -312,7 +315,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             max_von_mises: self.session.largest([von_mises])[0],
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
-            certificates: Certificates::of(self.job, &self.body),
+            certificates: self.certificates.clone(),
             wall_seconds: self.seconds(),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },

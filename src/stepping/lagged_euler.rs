@@ -184,6 +184,22 @@ impl LaggedEuler {
         Ok(())
     }
 
+    /// `y = K x` with the matrix in use, which must be assembled. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let Some((_, matrix)) = &self.matrix else {
+            return Err(Error::Internal("a product was asked for before the matrix was assembled".into()));
+        };
+        matrix.multiply(x, y)
+    }
+
+    /// Applies the preconditioner of the matrix in use. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        match &mut self.solver {
+            Solver::Linear(ksp) => ksp.precondition(r, z),
+            Solver::Newton { snes, .. } => snes.linear_solver()?.precondition(r, z),
+        }
+    }
+
     /// Takes a step and commits it; on failure the state stays as it was. Collective.
     pub fn advance<const D: usize, const S: usize>(
         &mut self,

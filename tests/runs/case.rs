@@ -29,13 +29,17 @@ impl Case {
     pub fn square(n: usize) -> Self {
         let probes = "[{name = 'tip', point = [1, 0]}, {name = 'middle', point = [0.5, 0]}, \
                       {name = 'inside', point = [0.37, 0.61]}]";
-        Self::from(&paper_job()).set("mesh.rectangle.cells", &format!("[{n}, {n}]")).set("output.probe", probes)
+        Self::from(&paper_job())
+            .set("mesh.rectangle.cells", &format!("[{n}, {n}]"))
+            .set("output.probe", probes)
     }
 
     /// The cube with n x n x n cells, 16 steps.
     pub fn cube(n: usize) -> Self {
         let probes = "[{name = 'tip', point = [1, 0.5, 0]}, {name = 'inside', point = [0.37, 0.61, 0.29]}]";
-        Self::from(&paper_cube()).set("mesh.box.cells", &format!("[{n}, {n}, {n}]")).set("output.probe", probes)
+        Self::from(&paper_cube())
+            .set("mesh.box.cells", &format!("[{n}, {n}, {n}]"))
+            .set("output.probe", probes)
     }
 
     fn from(file: &Path) -> Self {

@@ -213,7 +213,8 @@ impl Drop for Running {
 }
 
 fn send(signal: &str, process: u32) -> bool {
-    let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {process}")]).stderr(Stdio::null()).status();
+    let sent =
+        Command::new("sh").args(["-c", &format!("kill -{signal} {process}")]).stderr(Stdio::null()).status();
     sent.is_ok_and(|status| status.success())
 }
 

@@ -38,7 +38,17 @@ fn assert_same_effort(alone: &Results, results: &Results, what: &str) {
 /// Counts of the whole problem do not depend on how it is split, and the split is reported.
 fn assert_same_problem(alone: &Results, results: &Results, ranks: usize) {
     let (one, other) = (alone.summary(), results.summary());
-    for key in ["dimension", "cells", "nodes", "unknowns", "effects", "scheme", "preconditioner", "steps", "inventory"] {
+    for key in [
+        "dimension",
+        "cells",
+        "nodes",
+        "unknowns",
+        "effects",
+        "scheme",
+        "preconditioner",
+        "steps",
+        "inventory",
+    ] {
         assert_eq!(one[key], other[key], "{key}");
     }
     assert_eq!(other["ranks"], ranks);

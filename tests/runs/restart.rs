@@ -22,7 +22,10 @@ fn interrupt(case: &Case, ranks: usize) {
 
 #[track_caller]
 fn go_on(case: &Case, ranks: usize) -> Results {
-    case.run_with(ranks, &["--restart"]).expect(0).says("going on from").says("checkpoint-8.h5 (step 8, t = 0.5 s)");
+    case.run_with(ranks, &["--restart"])
+        .expect(0)
+        .says("going on from")
+        .says("checkpoint-8.h5 (step 8, t = 0.5 s)");
     let results = case.results();
     let from = results.summary()["restarted_from"].as_str().map(str::to_owned);
     assert!(from.is_some_and(|file| file.ends_with("out/checkpoint-8.h5")));
@@ -44,7 +47,10 @@ fn assert_identical(straight: &Results, results: &Results, what: &str) {
     assert_eq!(other.times(), [0.0, 0.5, 1.0]);
     assert_eq!(one.names("Fields"), other.names("Fields"));
     for name in one.names("Fields") {
-        assert!((0..3).all(|step| one.field(&name, step) == other.field(&name, step)), "{what}: field {name}");
+        assert!(
+            (0..3).all(|step| one.field(&name, step) == other.field(&name, step)),
+            "{what}: field {name}"
+        );
     }
     let (one, other) = (straight.summary(), results.summary());
     let same = ["steps", "newton_iterations", "linear_iterations", "max_von_mises", "max_energy_imbalance"];
@@ -89,9 +95,7 @@ fn a_restarted_run_with_fewer_effects_is_the_straight_run_to_the_last_bit() {
 
 #[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
-    let make = || {
-        Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]")
-    };
+    let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");
 }
 

@@ -82,7 +82,10 @@ impl Table {
     }
 
     pub fn numbers(&self, column: &str) -> Vec<f64> {
-        self.words(column).iter().map(|word| word.parse().unwrap_or_else(|_| panic!("{word} in {column}"))).collect()
+        self.words(column)
+            .iter()
+            .map(|word| word.parse().unwrap_or_else(|_| panic!("{word} in {column}")))
+            .collect()
     }
 
     /// The rows with this word in this column.

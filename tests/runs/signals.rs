@@ -11,7 +11,10 @@ use crate::{
 
 /// Far more steps than any test waits for.
 fn endless() -> Case {
-    Case::square(6).set("time.step", "0.0009765625").set("time.end", "8").set("output.fields", "{every = 1000000}")
+    Case::square(6)
+        .set("time.step", "0.0009765625")
+        .set("time.end", "8")
+        .set("output.fields", "{every = 1000000}")
 }
 
 /// Sends a signal after some steps.
@@ -83,5 +86,6 @@ fn a_run_stops_before_its_wall_time_is_over_and_goes_on() {
     case.run_with(2, &[]).expect(3).says("stopping on the wall-time limit of 1.5 s; go on with --restart");
     let steps = case.results().checkpoints()[0];
     assert!(steps < 8192);
-    case.run_with(2, &["--restart", "--set", "checkpoint.wall_limit=1000", "--set", "time.end=0.001"]).expect(0);
+    case.run_with(2, &["--restart", "--set", "checkpoint.wall_limit=1000", "--set", "time.end=0.001"])
+        .expect(0);
 }

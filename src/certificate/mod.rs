@@ -1,0 +1,215 @@
+//! Certificates: what is known of a problem before its first step.
+//!
+//! | name | definition | meaning |
+//! |---|---|---|
+//! | `theta` | sup of `sum m_j int w_nu^2` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
+//! | `theta_step` | the same over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
+//! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
+//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or `4 lambda` over the largest eigenvalue of `E` if that is less | steps beyond it grow without bound |
+//!
+//! `m_j` is the steepest fall of a contact graph, `m_A` the smallest eigenvalue of the viscosity. Suprema run over
+//! velocities that the supports allow. Numerically they are approached from below.
+
+mod ascent;
+mod forms;
+mod small_eigen;
+mod verdict;
+
+pub use verdict::{Accepted, Verdict};
+
+use crate::{
+    body::Body, effect::Form, error::Result, petsc::DistributedVector, session::Session, state::State,
+    stepping::LaggedEuler,
+};
+use ascent::{Quotient, climb};
+use serde::Serialize;
+
+/// Relative change at which a supremum counts as found.
+const TOLERANCE: f64 = 1e-5;
+/// Iterations after which it is taken as it is.
+const ITERATIONS: usize = 60;
+
+/// Constants of the problem; null where they have no meaning.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Certificates {
+    /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
+    pub theta: Option<f64>,
+    /// The same with the matrix of a step.
+    pub theta_step: Option<f64>,
+    /// `m_A` in Pa s.
+    pub viscosity_modulus: Option<f64>,
+    /// `m_j` in Pa s/m.
+    pub monotonicity_constant: Option<f64>,
+    /// `|gamma|^2` of the normal trace in m.
+    pub trace_norm_squared: Option<f64>,
+    /// Largest stable step in s.
+    pub explicit_step_bound: Option<f64>,
+}
+
+impl Certificates {
+    /// Computes what the body and the scheme, prepared for its step, call for. Collective.
+    pub fn of<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        scheme: &mut LaggedEuler,
+    ) -> Result<Self> {
+        let falls = body.contacts.iter().map(|c| c.graph.monotonicity_constant());
+        let viscous = body.has_form(Form::Viscosity);
+        let mut known = Self {
+            viscosity_modulus: body.smallest_viscosity(),
+            monotonicity_constant: falls.reduce(f64::max),
+            ..Self::default()
+        };
+        let mut find = |kind: Kind| find(session, body, state, scheme, kind);
+        if !body.contacts.is_empty() {
+            let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
+            known.trace_norm_squared = Some(find(Kind::TraceNorm)?);
+            known.theta_step = Some(if falling { find(Kind::ThetaStep)? } else { 0.0 });
+            if viscous {
+                known.theta = Some(if falling { find(Kind::Theta)? } else { 0.0 });
+            }
+        }
+        if body.has_form(Form::Elasticity) {
+            let waves = 1.0 / find(Kind::ExplicitStep)?;
+            known.explicit_step_bound = Some(body.flow_step_bound().map_or(waves, |flow| waves.min(flow)));
+        }
+        Ok(known)
+    }
+
+    /// The largest step below which each step has one solution; `None` where no step is small enough. Collective.
+    pub fn unique_step<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        scheme: &mut LaggedEuler,
+    ) -> Result<Option<f64>> {
+        if !body.has_form(Form::Mass) {
+            return Ok(None);
+        }
+        Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep)?))
+    }
+}
+
+fn find<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+    scheme: &mut LaggedEuler,
+    kind: Kind,
+) -> Result<f64> {
+    let mut pencil = Pencil { body, scheme, kind };
+    let start = if kind == Kind::ExplicitStep {
+        rough(body, state)?
+    } else {
+        let pull = pull(body, state)?;
+        let mut start = pull.like()?;
+        pencil.precondition(&pull, &mut start)?;
+        start
+    };
+    Ok(climb(session, &mut pencil, start, TOLERANCE, ITERATIONS)?.value)
+}
+
+/// Which supremum is sought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Theta,
+    ThetaStep,
+    TraceNorm,
+    ExplicitStep,
+    /// `1/k` for the step `k` at which `theta_step` reaches 1: the largest of `(W - A) / M`.
+    UniqueStep,
+}
+
+struct Pencil<'a, const D: usize, const S: usize> {
+    body: &'a Body<D, S>,
+    scheme: &'a mut LaggedEuler,
+    kind: Kind,
+}
+
+impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
+    fn forms(&self) -> usize {
+        if matches!(self.kind, Kind::ExplicitStep | Kind::UniqueStep) { 3 } else { 2 }
+    }
+
+    fn apply(&mut self, form: usize, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let body = self.body;
+        let interior = match (self.kind, form) {
+            (Kind::ExplicitStep, 0) => Form::Elasticity,
+            (Kind::ExplicitStep, 1) | (Kind::UniqueStep, 2) => Form::Mass,
+            (Kind::ExplicitStep, _) | (Kind::Theta | Kind::UniqueStep, 1) => Form::Viscosity,
+            (Kind::TraceNorm, 1) => Form::Strain,
+            (Kind::ThetaStep, 1) => return self.scheme.multiply(x, y),
+            (kind, _) => {
+                return forms::apply(body, x, y, |x, y| {
+                    for contact in &body.contacts {
+                        let fall = contact.graph.monotonicity_constant();
+                        let factor = if kind == Kind::TraceNorm { 1.0 } else { fall };
+                        forms::add_trace(&body.mesh, contact, factor, x, y);
+                    }
+                });
+            }
+        };
+        forms::apply(body, x, y, |x, y| body.add_form(interior, x, y))
+    }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.scheme.precondition(r, z)?;
+        forms::hold(self.body, z)
+    }
+
+    fn weights(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        match self.kind {
+            Kind::ExplicitStep => {
+                let k = bound_of(values);
+                (vec![k * k, 0.0, 0.0], vec![0.0, 4.0, 2.0 * k])
+            }
+            Kind::UniqueStep => (vec![1.0, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
+            Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => (vec![1.0, 0.0], vec![0.0, 1.0]),
+        }
+    }
+
+    fn value(&self, values: &[f64]) -> f64 {
+        match self.kind {
+            Kind::ExplicitStep => 1.0 / bound_of(values),
+            Kind::UniqueStep => (values[0] - values[1]) / values[2],
+            Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => values[0] / values[1],
+        }
+    }
+}
+
+/// The `k` with `k^2 e = 4 m + 2 k a`.
+fn bound_of(values: &[f64]) -> f64 {
+    let [e, m, a] = [values[0], values[1], values[2]];
+    (a + (a * a + 4.0 * e * m).sqrt()) / e
+}
+
+/// A start that pulls the whole contact boundary outward.
+fn pull<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
+    let mut out = rough(body, state)?;
+    let mut values = out.owned_mut()?;
+    values.iter_mut().for_each(|value| *value *= 1e-2);
+    for contact in &body.contacts {
+        contact.add_normals(&mut values);
+    }
+    values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+    drop(values);
+    Ok(out)
+}
+
+/// A start with a share of every mode: numbers between -1 and 1 that depend on the node's id alone.
+fn rough<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
+    let mut out = state.velocity.like()?;
+    {
+        let mut values = out.owned_mut()?;
+        for (node, target) in values.chunks_exact_mut(D).enumerate() {
+            for (i, value) in target.iter_mut().enumerate() {
+                let key = [body.mesh.node_ids[node].to_le_bytes(), (i as u32).to_le_bytes()].concat();
+                let bits = xxhash_rust::xxh3::xxh3_64(&key) >> 11;
+                *value = bits as f64 / (1u64 << 52) as f64 - 1.0;
+            }
+        }
+    }
+    forms::hold(body, &mut out)?;
+    Ok(out)
+}

@@ -1,0 +1,149 @@
+//! What the certificates mean for a run.
+
+use super::Certificates;
+
+/// What a job accepts although a certificate speaks against it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Accepted {
+    /// Steps with more than one solution.
+    pub uniqueness: bool,
+    /// Steps beyond the explicit bound.
+    pub explicit_stability: bool,
+}
+
+/// The outcome.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Verdict {
+    /// One line for each certificate: the number, what it means, what to change.
+    pub words: Vec<String>,
+    /// What the user should not overlook.
+    pub warnings: Vec<String>,
+    /// Why the run is refused: what is wrong, and what to do.
+    pub refusals: Vec<(String, String)>,
+}
+
+impl Certificates {
+    /// Holds the certificates against a fixed step of this length. `unique_step` is the largest step below which
+    /// `theta_step` is below 1, where it is known.
+    pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: Accepted) -> Verdict {
+        let mut verdict = Verdict::default();
+        if let Some(theta) = self.theta {
+            let meaning = if theta < 1.0 {
+                "below 1: the continuous problem has one solution"
+            } else {
+                verdict.warnings.push(format!(
+                    "theta = {theta:.4} is not below 1: the continuous problem may have several solutions; more \
+                     viscosity or a contact law that falls less steeply would exclude that"
+                ));
+                "not below 1: the continuous problem may have several solutions"
+            };
+            verdict.words.push(format!("theta = {theta:.4}, {meaning}"));
+        }
+        if let (Some(modulus), Some(fall), Some(trace)) =
+            (self.viscosity_modulus, self.monotonicity_constant, self.trace_norm_squared)
+        {
+            let (sign, meaning) =
+                if modulus > fall * trace { (">", "holds") } else { ("<=", "does not hold") };
+            verdict.words.push(format!(
+                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {:.4} Pa s: condition (13) {meaning}",
+                fall * trace
+            ));
+        }
+        if let Some(theta) = self.theta_step {
+            verdict.uniqueness(theta, step, unique_step, accepted.uniqueness);
+        }
+        if let Some(bound) = self.explicit_step_bound {
+            verdict.stability(bound, step, accepted.explicit_stability);
+        }
+        verdict
+    }
+}
+
+impl Verdict {
+    fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
+        if theta < 1.0 {
+            self.words.push(format!("theta of a step = {theta:.4}, below 1: each step has one solution"));
+            return;
+        }
+        let found = format!(
+            "theta of a step = {theta:.4} is not below 1: a step of {step} s may have several solutions"
+        );
+        self.words.push(found.clone());
+        let largest = unique_step.map_or_else(
+            || "no step is small enough without [material] density".to_owned(),
+            |largest| format!("the largest step with one solution is {largest:.4e} s"),
+        );
+        self.judge(
+            found,
+            format!("{largest}; or accept it with [solver] accept = [\"uniqueness\"]"),
+            accepted,
+        );
+    }
+
+    fn stability(&mut self, bound: f64, step: f64, accepted: bool) {
+        if step < bound {
+            self.words.push(format!(
+                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress"
+            ));
+            return;
+        }
+        let found =
+            format!("the step of {step} s is beyond {bound:.4e} s, where explicit stress makes errors grow");
+        self.words.push(found.clone());
+        let remedy = format!(
+            "take a step below {bound:.4e} s, or accept it with [solver] accept = [\"explicit_stability\"]"
+        );
+        self.judge(found, remedy, accepted);
+    }
+
+    fn judge(&mut self, found: String, remedy: String, accepted: bool) {
+        if accepted {
+            self.warnings.push(format!("{found}; accepted by the job"));
+        } else {
+            self.refusals.push((found, remedy));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paper() -> Certificates {
+        Certificates {
+            theta: Some(0.3855),
+            theta_step: Some(0.2),
+            viscosity_modulus: Some(50.0),
+            monotonicity_constant: Some(10.0),
+            trace_norm_squared: Some(2.24),
+            explicit_step_bound: Some(0.12),
+        }
+    }
+
+    #[test]
+    fn a_sound_problem_is_neither_refused_nor_warned_of() {
+        let verdict = paper().verdict(1.0 / 64.0, None, Accepted::default());
+        assert!(verdict.refusals.is_empty() && verdict.warnings.is_empty());
+        assert!(verdict.words[1].contains("> m_j |gamma|^2 = 22.4"));
+    }
+
+    #[test]
+    fn theta_beyond_one_alone_warns() {
+        let known = Certificates { theta: Some(1.5), ..paper() };
+        let verdict = known.verdict(1.0 / 64.0, None, Accepted::default());
+        assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
+    }
+
+    #[test]
+    fn a_step_beyond_a_bound_is_refused_unless_accepted_and_the_largest_step_is_named() {
+        let known = Certificates { theta_step: Some(1.2), ..paper() };
+        let refused = known.verdict(0.125, Some(0.05), Accepted::default());
+        assert_eq!(refused.refusals.len(), 2);
+        assert!(
+            refused.refusals[0].1.contains("5.0000e-2 s") && refused.refusals[1].1.contains("1.2000e-1 s")
+        );
+        let all = Accepted { uniqueness: true, explicit_stability: true };
+        let accepted = known.verdict(0.125, Some(0.05), all);
+        assert!(accepted.refusals.is_empty() && accepted.warnings.len() == 2);
+    }
+}
