@@ -102,14 +102,15 @@ impl<const D: usize> Outputs<D> {
         }
     }
 
-    /// Writes the initial state, where fields are wanted along the way. Collective.
+    /// Writes the initial state, where fields are wanted along the way and it is not there yet. Collective.
     pub fn at_start<const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
     ) -> Result<()> {
-        if self.every.is_some() { self.write_fields(session, body, state) } else { Ok(()) }
+        let missing = self.every.is_some() && self.fields.last_time().is_none();
+        if missing { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
     /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
