@@ -4,7 +4,7 @@
 #   scripts/install-deps.sh [--build | --test | --runtime]
 #
 #   --build     to compile the solver and run it from the source tree (default)
-#   --test      to run the tests and the checks; today the same packages as --build
+#   --test      to run the tests and the checks as well: Python for the readers of result files
 #   --runtime   to run a compiled solver: libraries and mpirun, no compiler, no headers
 #
 # Nothing is touched, and no network asked, when everything is already there.
@@ -13,6 +13,8 @@ set -euf
 
 build_packages="libpetsc-real-dev libhdf5-openmpi-dev libopenmpi-dev openmpi-bin libmetis-dev libopenblas0-pthread
 libclang-dev pkg-config gcc libc6-dev make git ca-certificates"
+# The tests read result files with VTK and meshio, which pip puts into a virtual environment.
+test_packages="python3 python3-venv"
 # The runtime libraries carry their version in their name, so they are named by pattern.
 runtime_libraries="libpetsc-real[0-9.]+(t64)? libhdf5-openmpi-[0-9]+(-[0-9]+)?(t64)? libmetis[0-9]+(t64)?"
 runtime_packages="openmpi-bin libopenblas0-pthread"
@@ -82,8 +84,8 @@ require_petsc() {
 }
 
 install_development() {
-    # shellcheck disable=SC2086 # a list of package names
-    missing=$(missing_of $build_packages)
+    # shellcheck disable=SC2086 # lists of package names
+    missing=$(missing_of "$@")
     if [ -z "$missing" ]; then
         say "every package is there"
         return
@@ -143,6 +145,8 @@ fi
 if [ "$what" = --runtime ]; then
     install_runtime
 else
-    install_development
+    [ "$what" = --build ] && test_packages=
+    # shellcheck disable=SC2086 # lists of package names
+    install_development $build_packages $test_packages
     require_rust
 fi

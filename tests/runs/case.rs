@@ -85,9 +85,9 @@ impl Case {
         Results::of(self.folder().join("out"))
     }
 
-    /// Starts the job; `options` are for `mpirun`.
-    pub fn start(&self, ranks: usize, options: &[&str]) -> Running {
-        Running::start(ranks, options, &self.arguments(&[]))
+    /// Starts the job.
+    pub fn start(&self, ranks: usize) -> Running {
+        Running::start(ranks, &self.arguments(&[]))
     }
 
     /// Runs the job with these arguments behind its name.

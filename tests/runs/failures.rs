@@ -1,0 +1,105 @@
+//! Runs that can't end well: each ends on all ranks, soon, with the right code and words that help.
+
+use crate::case::Case;
+
+/// A load that has no value any more after 0.4 s.
+fn failing_load() -> Case {
+    Case::square(6).set("traction.0.value", "[0, '-10*sqrt(0.4 - t)']")
+}
+
+#[test]
+fn a_load_without_a_value_fails_the_run_and_says_where_and_when() {
+    for ranks in [1, 2, 4] {
+        let case = failing_load();
+        let outcome = case.run_with(ranks, &[]).expect(1);
+        outcome.says("traction").says("component y is NaN at t = 0.4375 s").says("m; correct the expression in the job");
+        let results = case.results();
+        let summary = results.summary();
+        assert_eq!(summary["status"], "failed");
+        assert!(summary["error"].as_str().is_some_and(|words| words.contains("t = 0.4375 s")), "{summary}");
+        assert_eq!(summary["steps"], 6);
+        assert_eq!(results.checkpoints(), [6]);
+        assert_eq!(results.table("history.csv").rows.len(), 6);
+    }
+}
+
+#[test]
+fn a_load_that_is_infinite_at_one_time_fails_the_run() {
+    let case = Case::square(4).set("traction.0.value", "[0, '1/(0.5 - t)']");
+    case.run_with(2, &[]).expect(1).says("is inf at t = 0.5 s");
+    assert_eq!(case.results().checkpoints(), [7]);
+}
+
+#[test]
+fn a_load_that_fails_on_one_rank_only_ends_all_of_them() {
+    let case = Case::square(8).set("traction.0.value", "[0, 'sqrt(1.2 - t - x)']");
+    case.run_with(4, &[]).expect(1).says("component y is NaN");
+    assert_eq!(case.results().summary()["status"], "failed");
+}
+
+#[test]
+fn a_failed_run_can_be_repeated_from_where_it_failed() {
+    let case = failing_load();
+    case.run_with(2, &[]).expect(1);
+    case.run_with(2, &["--restart"]).expect(1).says("checkpoint-6.h5 (step 6, t = 0.375 s)");
+    assert_eq!(case.results().table("history.csv").rows.len(), 6);
+    let outcome = case.run_with(2, &["--restart", "--set", "time.end=0.375"]).expect(0);
+    outcome.says("completed");
+}
+
+#[test]
+fn a_step_that_newtons_method_does_not_solve_fails_with_a_remedy() {
+    let case = Case::square(8).set("solver.max_newton_iterations", "1").set("solver.tolerance", "1e-13");
+    let outcome = case.run_with(2, &[]).expect(1);
+    outcome.says("step to t = 6.25").says("try a smaller [time] step");
+    assert_eq!(case.results().summary()["status"], "failed");
+    // What the iteration was held to is no part of the problem: the run goes on with more of it.
+    case.run_with(2, &["--restart", "--set", "solver.max_newton_iterations=50"]).expect(0);
+    assert_eq!(case.results().summary()["status"], "completed");
+}
+
+#[test]
+fn more_ranks_than_cells_are_refused() {
+    let case = Case::square(1);
+    case.run_with(4, &[]).expect(2).says("4 ranks");
+    assert!(!case.results().path("history.csv").exists());
+}
+
+#[test]
+fn a_missing_job_is_refused_by_name() {
+    for ranks in [1, 3] {
+        crate::launch::run(ranks, &["nowhere.toml"]).expect(2).says("nowhere.toml").says("cannot read");
+    }
+}
+
+#[test]
+fn a_faulty_job_is_refused_once_and_not_by_every_rank() {
+    let case = Case::square(4).set("time.stepp", "0.1");
+    let outcome = case.run_with(3, &[]).expect(2).says("did you mean `step`?");
+    assert_eq!(outcome.stderr.matches("unknown key `stepp`").count(), 1, "{}", outcome.stderr);
+}
+
+#[test]
+fn a_missing_mesh_file_is_refused_by_name() {
+    let case = Case::square(4).without("mesh.rectangle").set("mesh.file", "'nowhere.msh'");
+    case.run_with(2, &[]).expect(2).says("nowhere.msh");
+}
+
+#[test]
+fn a_boundary_that_the_mesh_does_not_have_is_refused() {
+    let case = Case::square(4).set("traction.0.on", "['topp']");
+    case.run_with(2, &[]).expect(2).says("topp").says("top");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let case = Case::square(4);
+    std::fs::write(case.folder().join("file"), "no folder").expect("written");
+    let outcome = case.run_with(2, &["--set", "output.folder='file/out'"]);
+    assert_ne!(outcome.code, 0);
+    outcome.says("cannot write").says("file/out");
+    std::fs::create_dir_all(case.folder().join("taken/history.csv")).expect("folder");
+    let outcome = case.run_with(3, &["--set", "output.folder='taken'"]);
+    assert_ne!(outcome.code, 0);
+    outcome.says("cannot write").says("taken/history.csv");
+}

@@ -48,7 +48,7 @@ impl Outcome {
 
 /// Runs the solver on this many ranks to its end.
 pub fn run<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Outcome {
-    Running::start(ranks, &[], arguments).wait()
+    Running::start(ranks, arguments).wait()
 }
 
 /// Runs the solver without `mpirun`.
@@ -108,10 +108,9 @@ pub struct Running {
 }
 
 impl Running {
-    /// Starts the solver; `options` are for `mpirun`.
-    pub fn start<A: AsRef<std::ffi::OsStr>>(ranks: usize, options: &[&str], arguments: &[A]) -> Self {
+    pub fn start<A: AsRef<std::ffi::OsStr>>(ranks: usize, arguments: &[A]) -> Self {
         let mut command = Command::new("mpirun");
-        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]).args(options);
+        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]);
         command.arg(env!("CARGO_BIN_EXE_solver")).args(arguments);
         Self::spawn(command)
     }

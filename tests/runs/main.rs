@@ -2,13 +2,13 @@
 
 mod case;
 mod check_values;
-// mod effects;
-// mod failures;
+mod effects;
+mod failures;
 mod hdf5_file;
 mod launch;
-// mod outputs;
+mod outputs;
 mod ranks;
-// mod readers;
+mod readers;
 mod restart;
 mod results;
 mod signals;

@@ -1,0 +1,215 @@
+//! The files of a run, as its contract with users says.
+
+use crate::{
+    case::{Case, paper_job},
+    hdf5_file::NumberFile,
+    launch,
+    results::Results,
+};
+
+const HISTORY: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
+kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
+energy_imbalance";
+
+fn header(results: &Results, name: &str) -> String {
+    results.text(name).lines().next().expect("a header").to_owned()
+}
+
+#[test]
+fn a_run_leaves_the_files_of_the_contract() {
+    let case = Case::square(6).set("checkpoint.every", "4");
+    let results = case.run(2);
+    assert_eq!(
+        results.files(),
+        [
+            "checkpoint-12.h5",
+            "checkpoint-16.h5",
+            "fields.vtkhdf",
+            "fields.xdmf",
+            "history.csv",
+            "job.toml",
+            "probes.csv",
+            "profiles.csv",
+            "run.log",
+            "summary.json"
+        ]
+    );
+    assert!(header(&results, "history.csv").starts_with(HISTORY));
+    assert_eq!(
+        header(&results, "probes.csv"),
+        "step,time,probe,displacement_x,displacement_y,velocity_x,velocity_y"
+    );
+    assert_eq!(
+        header(&results, "profiles.csv"),
+        "time,profile,x,y,normal_displacement,normal_velocity,contact_pressure"
+    );
+    let history = results.table("history.csv");
+    let steps: Vec<f64> = (1..=16).map(f64::from).collect();
+    assert_eq!(history.numbers("step"), steps);
+    assert_eq!(history.numbers("time"), steps.iter().map(|step| step / 16.0).collect::<Vec<_>>());
+    assert_eq!(history.numbers("dt"), [0.0625; 16]);
+    let probes = results.table("probes.csv");
+    assert_eq!(probes.rows.len(), 3 * 16);
+    assert_eq!(&probes.words("probe")[..3], ["tip", "middle", "inside"]);
+}
+
+#[test]
+fn tables_of_a_cube_have_three_components() {
+    let case = Case::cube(3).set("time.end", "0.125").set("output.profile", "[{on = 'bottom'}, {on = 'right'}]");
+    let results = case.run(2);
+    assert_eq!(
+        header(&results, "probes.csv"),
+        "step,time,probe,displacement_x,displacement_y,displacement_z,velocity_x,velocity_y,velocity_z"
+    );
+    assert_eq!(
+        header(&results, "profiles.csv"),
+        "time,profile,x,y,z,normal_displacement,normal_velocity,contact_pressure"
+    );
+    let profiles = results.table("profiles.csv");
+    for name in ["bottom", "right"] {
+        let at_end = profiles.only("profile", name).only("time", "0.125");
+        assert_eq!(at_end.rows.len(), 16, "{name}");
+    }
+}
+
+#[test]
+fn the_summary_has_the_keys_of_the_contract() {
+    let case = Case::square(6).set("checkpoint.every", "4");
+    let summary = case.run(3).summary();
+    for (key, value) in [
+        ("status", "completed".into()),
+        ("error", serde_json::Value::Null),
+        ("ranks", 3.into()),
+        ("dimension", 2.into()),
+        ("cells", 72.into()),
+        ("nodes", 49.into()),
+        ("unknowns", 84.into()),
+        ("scheme", "lagged_euler".into()),
+        ("steps", 16.into()),
+        ("rejected_steps", 0.into()),
+        ("restarted_from", serde_json::Value::Null),
+    ] {
+        assert_eq!(summary.get(key), Some(&value), "{key}");
+    }
+    assert!(summary["version"].as_str().is_some_and(|version| version.starts_with(env!("CARGO_PKG_VERSION"))));
+    assert!(summary["petsc_version"].as_str().is_some_and(|version| version.starts_with("3.")));
+    let positive = |value: &serde_json::Value| value.as_f64().is_some_and(|number| number > 0.0);
+    for key in ["newton_iterations", "linear_iterations", "max_von_mises", "peak_memory_bytes"] {
+        assert!(positive(&summary[key]), "{key}");
+    }
+    for key in ["max_inclusion_residual", "max_energy_imbalance"] {
+        assert!(summary[key].as_f64().is_some_and(|number| number < 1e-6), "{key}");
+    }
+    let certificates = summary["certificates"].as_object().expect("certificates");
+    for key in
+        ["theta", "theta_step", "viscosity_modulus", "monotonicity_constant", "trace_norm_squared", "explicit_step_bound"]
+    {
+        assert!(certificates.contains_key(key), "{key}");
+    }
+    assert_eq!(certificates["viscosity_modulus"], 50.0);
+    assert_eq!(certificates["monotonicity_constant"], 10.0);
+    let seconds = summary["wall_seconds"].as_object().expect("wall_seconds");
+    for key in ["total", "setup", "assembly", "history", "solve", "output"] {
+        assert!(seconds.get(key).is_some_and(positive), "{key}");
+    }
+    let total = seconds["total"].as_f64().expect("a number");
+    assert!(seconds.values().all(|value| value.as_f64().is_some_and(|part| part <= total)));
+}
+
+fn field_times(case: &Case) -> Vec<f64> {
+    NumberFile::open(&case.run(1).path("fields.vtkhdf")).times()
+}
+
+#[test]
+fn fields_are_written_when_the_job_says() {
+    let case = || Case::square(4).set("time.end", "0.6875");
+    assert_eq!(field_times(&case().set("output.fields", "{every = 4}")), [0.0, 0.25, 0.5, 0.6875]);
+    assert_eq!(field_times(&case().set("output.fields", "{interval = 0.25}")), [0.0, 0.25, 0.5, 0.6875]);
+    assert_eq!(field_times(&case().set("output.fields", "{interval = 0.3}")), [0.0, 0.3125, 0.625, 0.6875]);
+    assert_eq!(field_times(&case().without("output.fields")), [0.6875]);
+}
+
+/// The paper's law (72).
+fn pressure(velocity: f64) -> f64 {
+    let v = velocity.abs();
+    match v {
+        ..0.003 => 10.0 * v,
+        0.003..0.005 => 0.03 - 10.0 * (v - 0.003),
+        _ => 0.01 + 10.0 * (v - 0.005),
+    }
+}
+
+#[test]
+fn profiles_run_along_the_boundary_and_hold_the_law() {
+    let case = Case::square(8).set("output.fields", "{every = 4}");
+    let profiles = case.run(3).table("profiles.csv");
+    let times: Vec<String> = ["0", "0.25", "0.5", "0.75", "1"].map(str::to_owned).to_vec();
+    let mut found: Vec<String> = profiles.words("time").iter().map(|time| (*time).to_owned()).collect();
+    found.dedup();
+    assert_eq!(found, times);
+    for time in &times {
+        let profile = profiles.only("time", time);
+        let places: Vec<f64> = (0..=8).map(|node| f64::from(node) / 8.0).collect();
+        assert_eq!(profile.numbers("x"), places);
+        assert_eq!(profile.numbers("y"), [0.0; 9]);
+        let held = profile.numbers("normal_velocity").into_iter().zip(profile.numbers("contact_pressure"));
+        for (velocity, found) in held {
+            assert!((found - pressure(velocity)).abs() < 1e-14, "p({velocity}) = {found}");
+        }
+    }
+}
+
+#[test]
+fn the_effective_job_gives_the_same_run_again() {
+    let case = Case::square(6);
+    let first = case.run(2);
+    let copy = case.folder().join("again");
+    std::fs::create_dir(&copy).expect("folder");
+    std::fs::copy(first.path("job.toml"), copy.join("job.toml")).expect("copied");
+    launch::run(2, &[copy.join("job.toml")]).expect(0);
+    let again = Results::of(copy);
+    for name in ["probes.csv", "history.csv", "profiles.csv", "job.toml"] {
+        assert_eq!(first.text(name), again.text(name), "{name}");
+    }
+}
+
+#[test]
+fn the_log_is_plain_text_and_says_what_the_terminal_said() {
+    let case = Case::square(4);
+    let outcome = case.run_with(2, &[]).expect(0);
+    let log = case.results().text("run.log");
+    assert!(!log.chars().any(|c| c.is_control() && c != '\n'), "{log:?}");
+    assert_eq!(log.trim_end(), outcome.stdout.trim_end());
+    for words in ["Clarke ", "2 ranks", "32 triangles", "effects    inertia, elasticity", "step     16/16", "completed"] {
+        assert!(log.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn the_bare_form_runs_without_mpirun_and_without_a_subcommand() {
+    let case = Case::square(4);
+    let by_mpirun = case.run(1).text("probes.csv");
+    let job = case.folder().join("job.toml");
+    launch::run_alone(&[job]).expect(0);
+    assert_eq!(case.results().text("probes.csv"), by_mpirun);
+}
+
+#[test]
+fn the_papers_job_shows_what_the_paper_claims() {
+    let folder = tempfile::tempdir().expect("folder");
+    let output = format!("output.folder={:?}", folder.path());
+    let job = paper_job().display().to_string();
+    launch::run(2, &["run", &job, "--set", &output]).expect(0);
+    let profile = Results::of(folder.path().to_owned()).table("profiles.csv").only("time", "1");
+    let velocity = profile.numbers("normal_velocity");
+    let pressure = profile.numbers("contact_pressure");
+    assert_eq!(velocity.len(), 33);
+    assert!(velocity.is_sorted_by(|a, b| a < b), "the normal velocity rises along the bottom: {velocity:?}");
+    // The states S4, S5 and S6 follow one another: the law rises, falls and rises.
+    let first_falling = velocity.iter().position(|v| *v >= 0.003).expect("S5 is reached");
+    let first_rising = velocity.iter().position(|v| *v > 0.005).expect("S6 is reached");
+    assert!(first_falling > 1 && first_rising > first_falling + 1 && first_rising < velocity.len() - 2);
+    assert!(pressure[..first_falling].is_sorted_by(|a, b| a < b));
+    assert!(pressure[first_falling..first_rising].is_sorted_by(|a, b| a > b));
+    assert!(pressure[first_rising..].is_sorted_by(|a, b| a < b));
+}

@@ -19,7 +19,7 @@ fn endless() -> Case {
 
 /// Sends a signal after some steps.
 fn stop(case: &Case, ranks: usize, signal: &str, target: Target) -> Outcome {
-    let mut running = case.start(ranks, &[]);
+    let mut running = case.start(ranks);
     running.wait_for("step     27/");
     running.signal(signal, target);
     running.wait()
@@ -68,15 +68,14 @@ fn a_signal_to_one_rank_stops_all_of_them() {
 }
 
 #[test]
-fn a_run_whose_launcher_is_told_to_end_saves_its_state() {
-    let case = endless();
-    let patient = ["--mca", "odls_base_sigkill_timeout", "20"];
-    for signal in ["TERM", "INT"] {
-        let mut running = case.start(2, &patient);
-        running.wait_for("step     27/");
-        running.signal(signal, Target::Launcher);
-        assert_ne!(running.wait().code, 0);
-        assert_saved(&case.results(), "SIGTERM");
+fn a_run_that_is_killed_goes_on_from_its_last_checkpoint() {
+    for (signal, target) in [("TERM", Target::Launcher), ("INT", Target::Launcher), ("KILL", Target::OneRank)] {
+        let case = endless().set("checkpoint.every", "8");
+        let outcome = stop(&case, 2, signal, target);
+        assert_ne!(outcome.code, 0);
+        let steps = case.results().checkpoints()[0];
+        assert!((24..8192).contains(&steps), "{steps}");
+        assert_goes_on(&case, 2, steps);
     }
 }
 
