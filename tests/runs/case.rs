@@ -49,6 +49,7 @@ impl Case {
             .set("time.step", "0.0625")
             .set("output.folder", "'out'")
             .without("checkpoint")
+            .without("check")
     }
 
     /// Sets a key, given by names and positions joined by dots, to a TOML value.

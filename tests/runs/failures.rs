@@ -12,7 +12,10 @@ fn a_load_without_a_value_fails_the_run_and_says_where_and_when() {
     for ranks in [1, 2, 4] {
         let case = failing_load();
         let outcome = case.run_with(ranks, &[]).expect(1);
-        outcome.says("traction").says("component y is NaN at t = 0.4375 s").says("m; correct the expression in the job");
+        outcome
+            .says("traction")
+            .says("component y is NaN at t = 0.4375 s")
+            .says("m; correct the expression in the job");
         let results = case.results();
         let summary = results.summary();
         assert_eq!(summary["status"], "failed");

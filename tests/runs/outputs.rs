@@ -55,7 +55,8 @@ fn a_run_leaves_the_files_of_the_contract() {
 
 #[test]
 fn tables_of_a_cube_have_three_components() {
-    let case = Case::cube(3).set("time.end", "0.125").set("output.profile", "[{on = 'bottom'}, {on = 'right'}]");
+    let case =
+        Case::cube(3).set("time.end", "0.125").set("output.profile", "[{on = 'bottom'}, {on = 'right'}]");
     let results = case.run(2);
     assert_eq!(
         header(&results, "probes.csv"),
@@ -91,7 +92,9 @@ fn the_summary_has_the_keys_of_the_contract() {
     ] {
         assert_eq!(summary.get(key), Some(&value), "{key}");
     }
-    assert!(summary["version"].as_str().is_some_and(|version| version.starts_with(env!("CARGO_PKG_VERSION"))));
+    assert!(
+        summary["version"].as_str().is_some_and(|version| version.starts_with(env!("CARGO_PKG_VERSION")))
+    );
     assert!(summary["petsc_version"].as_str().is_some_and(|version| version.starts_with("3.")));
     let positive = |value: &serde_json::Value| value.as_f64().is_some_and(|number| number > 0.0);
     for key in ["newton_iterations", "linear_iterations", "max_von_mises", "peak_memory_bytes"] {
@@ -101,9 +104,14 @@ fn the_summary_has_the_keys_of_the_contract() {
         assert!(summary[key].as_f64().is_some_and(|number| number < 1e-6), "{key}");
     }
     let certificates = summary["certificates"].as_object().expect("certificates");
-    for key in
-        ["theta", "theta_step", "viscosity_modulus", "monotonicity_constant", "trace_norm_squared", "explicit_step_bound"]
-    {
+    for key in [
+        "theta",
+        "theta_step",
+        "viscosity_modulus",
+        "monotonicity_constant",
+        "trace_norm_squared",
+        "explicit_step_bound",
+    ] {
         assert!(certificates.contains_key(key), "{key}");
     }
     assert_eq!(certificates["viscosity_modulus"], 50.0);
@@ -180,7 +188,14 @@ fn the_log_is_plain_text_and_says_what_the_terminal_said() {
     let log = case.results().text("run.log");
     assert!(!log.chars().any(|c| c.is_control() && c != '\n'), "{log:?}");
     assert_eq!(log.trim_end(), outcome.stdout.trim_end());
-    for words in ["Clarke ", "2 ranks", "32 triangles", "effects    inertia, elasticity", "step     16/16", "completed"] {
+    for words in [
+        "Clarke ",
+        "2 ranks",
+        "32 triangles",
+        "effects    inertia, elasticity",
+        "step     16/16",
+        "completed",
+    ] {
         assert!(log.contains(words), "{words}");
     }
 }

@@ -15,7 +15,9 @@ use std::{
 fn output(command: &mut Command, remedy: &str) -> String {
     match command.output() {
         Ok(output) if output.status.success() => String::from_utf8(output.stdout).expect("text"),
-        Ok(output) => panic!("{command:?}: {}\n{}\n{remedy}", output.status, String::from_utf8_lossy(&output.stderr)),
+        Ok(output) => {
+            panic!("{command:?}: {}\n{}\n{remedy}", output.status, String::from_utf8_lossy(&output.stderr))
+        }
         Err(error) => panic!("{command:?}: {error}\n{remedy}"),
     }
 }
@@ -34,9 +36,14 @@ fn python() -> &'static Path {
         }
         let mut venv = Command::new("python3");
         venv.args(["-m", "venv", "--clear"]).arg(&folder);
-        output(&mut venv, "run scripts/install-deps.sh --test, or leave these tests out: -- --skip readers::");
+        output(
+            &mut venv,
+            "run scripts/install-deps.sh --test, or leave these tests out: -- --skip readers::",
+        );
         let mut install = Command::new(&python);
-        install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]).arg(&requirements);
+        install
+            .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"])
+            .arg(&requirements);
         output(&mut install, "pip needs a package index; or leave these tests out: -- --skip readers::");
         std::fs::write(&stamp, wanted).expect("stamp");
         python

@@ -186,7 +186,11 @@ fn a_damaged_checkpoint_is_passed_over_with_a_warning() {
         assert_eq!(case.results().checkpoints(), [16, 12]);
         damage(&case.results().path("checkpoint-16.h5"));
         let outcome = case.run_with(2, &["--restart"]).expect(0);
-        outcome.says("warning: ").says("checkpoint-16.h5").says("going on from").says("(step 12, t = 0.75 s)");
+        outcome
+            .says("warning: ")
+            .says("checkpoint-16.h5")
+            .says("going on from")
+            .says("(step 12, t = 0.75 s)");
         assert_identical(&straight.0, &case.results(), "behind a damaged checkpoint");
     }
 }
@@ -250,7 +254,8 @@ fn what_is_written_and_how_it_is_solved_may_change_on_the_way() {
 fn a_completed_run_that_is_restarted_has_nothing_left_to_do() {
     let case = saving();
     let first = case.run(2);
-    let before = ["probes.csv", "history.csv", "profiles.csv", "fields.xdmf"].map(|name| (name, first.text(name)));
+    let before =
+        ["probes.csv", "history.csv", "profiles.csv", "fields.xdmf"].map(|name| (name, first.text(name)));
     case.run_with(2, &["--restart"]).expect(0).says("(step 16, t = 1 s)").says("completed");
     for (name, text) in before {
         assert_eq!(case.results().text(name), text, "{name}");

@@ -69,7 +69,8 @@ fn a_signal_to_one_rank_stops_all_of_them() {
 
 #[test]
 fn a_run_that_is_killed_goes_on_from_its_last_checkpoint() {
-    for (signal, target) in [("TERM", Target::Launcher), ("INT", Target::Launcher), ("KILL", Target::OneRank)] {
+    for (signal, target) in [("TERM", Target::Launcher), ("INT", Target::Launcher), ("KILL", Target::OneRank)]
+    {
         let case = endless().set("checkpoint.every", "8");
         let outcome = stop(&case, 2, signal, target);
         assert_ne!(outcome.code, 0);
