@@ -225,7 +225,7 @@ pub fn plane(session: &Session) {
 pub fn space(session: &Session) {
     let end = 0.25;
     let [coarse, fine] = [5, 10].map(|n: usize| {
-        let mesh = stir(box_mesh([1.0; 3], [n; 3], [1.0; 3]).expect("mesh"), 0.08 / n as f64);
+        let mesh = box_mesh([1.0; 3], [n; 3], [1.0; 3]).expect("mesh");
         let job = job::<3>("", "nodal", "", end, 0.5 / (n * n) as f64);
         measured::<3, 6>(session, &job, &mesh, end)
     });
