@@ -131,7 +131,7 @@ impl Snes {
     /// Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
-    /// other ranks get an outcome that is not converged: agree on the result afterwards.
+    /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.
     pub fn solve(
         &mut self,
         problem: &mut dyn NonlinearProblem,
@@ -209,10 +209,15 @@ impl Drop for Snes {
 /// What a callback returns to make PETSc stop.
 const USER_ERROR: sys::PetscErrorCode = sys::PETSC_ERR_USER as sys::PetscErrorCode;
 
-/// Runs a callback; an error is kept and `spoil` marks the output, so that all ranks see the same failure.
+/// Runs a callback; an error is kept and from then on `spoil` marks every output, so that all ranks see the same failure.
 fn guard(context: &Context, body: impl FnOnce() -> Result<()>, spoil: impl FnOnce()) -> sys::PetscErrorCode {
     match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(())) => 0,
+        Ok(Ok(())) => {
+            if context.error.borrow().is_some() {
+                spoil();
+            }
+            0
+        }
         Ok(Err(error)) => {
             context.error.borrow_mut().get_or_insert(error);
             spoil();

@@ -171,6 +171,7 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
 pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
         tolerance: job.solver.tolerance,
+        inclusion_tolerance: job.solver.inclusion_tolerance,
         preconditioner: match job.solver.preconditioner {
             job::Preconditioner::Auto => Preconditioner::Auto,
             job::Preconditioner::Cholesky => Preconditioner::Cholesky,

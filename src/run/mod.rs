@@ -8,11 +8,13 @@ mod inventory;
 mod outputs;
 mod scene;
 mod setup;
+mod simulation;
 mod summary;
 mod time_loop;
 
 pub use inventory::Inventory;
 pub use scene::{Scene, whole_mesh};
+pub use simulation::Simulation;
 pub use summary::Summary;
 
 use crate::{

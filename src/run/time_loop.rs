@@ -4,12 +4,12 @@ use super::{
     Clock, Inventory, Scene, Start,
     outputs::{Outputs, prepare_folder},
     setup::{Setup, setup},
+    simulation::{SNAP, next_step, totals_at_start},
     summary::{PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     body::Body,
     certificate::Certificates,
-    effect::Step,
     error::{Error, Exit, Result},
     job::{Job, Loaded},
     output::{
@@ -27,8 +27,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A step that ends within this share of a step of the end ends there.
-const SNAP: f64 = 1e-9;
 /// Runs of more steps than this log only every so many, to keep logs readable.
 const LOGGED_STEPS: u64 = 1000;
 
@@ -59,12 +57,10 @@ pub(super) fn run<const D: usize, const S: usize>(
     }
     super::header::lines(session, loaded, &ready)?.iter().for_each(|line| log.line(line));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
-    let energy = {
-        let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
-        let mine = session.agree(body.energy(&state, rest))?;
-        crate::effect::Energy::from_array(session.sum(mine.to_array()))
+    let totals = match &restored {
+        Some(restored) => restored.totals,
+        None => totals_at_start(session, &body, &state)?,
     };
-    let totals = restored.as_ref().map_or_else(|| Totals::at_start(energy), |r| r.totals);
     let mut outputs = Outputs::open(session, job, identity, probes, &body, &state, goes_on, &mut log)?;
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
@@ -155,7 +151,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let step = self.next_step(length, end);
+            let step = next_step(&self.state, length, end);
             let outcome = self.scheme.advance(self.session, &mut self.body, &mut self.state, step)?;
             self.totals.add(&outcome);
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
@@ -172,18 +168,6 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             }
         }
         Ok(Ended::Completed)
-    }
-
-    fn next_step(&self, length: f64, end: f64) -> Step {
-        let previous_length = self.state.step_length;
-        let time = self.state.time + length;
-        if (end - time).abs() <= SNAP * length {
-            Step { time: end, length, previous_length }
-        } else if time > end {
-            Step { time: end, length: end - self.state.time, previous_length }
-        } else {
-            Step { time, length, previous_length }
-        }
     }
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {

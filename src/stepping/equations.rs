@@ -7,9 +7,12 @@ use crate::{
 };
 
 /// `R(v) = K v + C(v) - b` with the generalised Jacobian `K + C'(v)`.
-pub(super) struct ContactEquations<'a, const D: usize> {
+pub struct ContactEquations<'a, const D: usize> {
+    /// `K`.
     pub matrix: &'a Matrix,
+    /// What makes up `C`.
     pub contacts: &'a mut [Contact<D>],
+    /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
     /// Ghosted scratch space, where some contact reads ghost nodes.
     pub ghosted: Option<&'a mut [DistributedVector; 2]>,

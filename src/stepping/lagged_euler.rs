@@ -340,11 +340,16 @@ impl LaggedEuler {
                     let each = body.contacts.iter().map(|c| c.inclusion_residual(&velocity, &residual));
                     each.fold(0.0, f64::max)
                 };
+                let inclusion = session.largest([inclusion])[0];
+                if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
+                    let found = format!("velocity and pressure are {inclusion:.1e} off the contact graph");
+                    return Err(failed(step, &found, INCLUSION_REMEDY));
+                }
                 Ok(StepOutcome {
                     newton_iterations: outcome.iterations,
                     linear_iterations: outcome.linear_iterations,
                     active_changes: session.total(changes),
-                    inclusion_residual: session.largest([inclusion])[0],
+                    inclusion_residual: inclusion,
                     energy: Energy::default(),
                 })
             }
@@ -354,6 +359,9 @@ impl LaggedEuler {
 
 const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
+
+const INCLUSION_REMEDY: &str =
+    "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
 
 fn failed(step: Step, what: &str, remedy: &str) -> Error {
     Error::Failed(format!(

@@ -23,6 +23,8 @@ pub enum Preconditioner {
 pub struct SolverSettings {
     /// Residual norm relative to the norm of the right-hand side.
     pub tolerance: f64,
+    /// Largest scaled distance to a contact graph.
+    pub inclusion_tolerance: f64,
     /// The preconditioner.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step has failed.

@@ -4,5 +4,6 @@ mod equations;
 mod lagged_euler;
 mod linear_solver;
 
+pub use equations::ContactEquations;
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
 pub use linear_solver::{Preconditioner, SolverSettings};

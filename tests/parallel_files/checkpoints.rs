@@ -1,6 +1,7 @@
 //! Checkpoints, and what becomes of damaged ones.
 
-use crate::mpirun::{self, owner, scramble};
+use crate::mpirun::{self, scramble};
+use crate::owner;
 use clarke::error::Result;
 use clarke::output::checkpoint_file::{self, Checkpoint, RowSet, Table};
 use clarke::output::inspect::inspect;

@@ -1,6 +1,6 @@
 //! Field files, read back serially the way other programs do.
 
-use crate::mpirun::{self, owner};
+use crate::{mpirun, owner};
 use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
 use clarke::output::inspect::inspect;
 use mpi::traits::{Communicator, CommunicatorCollectives};

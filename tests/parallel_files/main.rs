@@ -3,6 +3,7 @@
 
 mod checkpoints;
 mod fields;
+#[path = "../mpirun/mod.rs"]
 mod mpirun;
 mod rows;
 
@@ -37,4 +38,10 @@ fn scenario() {
         "fields_resume" => fields::resume(&world, &folder),
         other => panic!("no scenario {other}"),
     }
+}
+
+/// The rank that owns a row, as if by a partitioner; of more than two ranks one owns nothing.
+pub fn owner(id: u64, size: usize) -> usize {
+    let working = if size > 2 { size - 1 } else { size };
+    (mpirun::scramble(id) % working as u64) as usize
 }

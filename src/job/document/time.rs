@@ -63,6 +63,10 @@ pub struct Solver {
     /// Residual at which a step counts as solved, relative to the forces that act.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
+    /// Largest distance of velocity and pressure to a contact graph, each scaled by the graph's own range, at which a
+    /// step counts as solved whatever its residual is.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub inclusion_tolerance: f64,
     /// How linear systems are preconditioned.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step counts as failed.
@@ -79,6 +83,7 @@ impl Default for Solver {
     fn default() -> Self {
         Self {
             tolerance: 1e-10,
+            inclusion_tolerance: 1e-6,
             preconditioner: Preconditioner::Auto,
             max_newton_iterations: 50,
             accept: Vec::new(),

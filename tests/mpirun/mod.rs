@@ -33,9 +33,3 @@ pub fn scramble(seed: u64) -> u64 {
     let mixed = (seed.wrapping_add(0x9e37_79b9_7f4a_7c15) ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb) ^ (mixed >> 31)
 }
-
-/// The rank that owns a row, as if by a partitioner; of more than two ranks one owns nothing.
-pub fn owner(id: u64, size: usize) -> usize {
-    let working = if size > 2 { size - 1 } else { size };
-    (scramble(id) % working as u64) as usize
-}

@@ -1,0 +1,190 @@
+//! Rung 1, second part: Newton's method, whose callbacks may fail on one rank.
+
+use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, vector};
+use crate::{mpirun, run_on};
+use clarke::{
+    error::{Error, Exit, Result},
+    petsc::{DistributedVector, Matrix, NonlinearProblem, Snes},
+    session::Session,
+};
+use std::path::Path;
+
+/// Which callback goes wrong, on one rank, at which call.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    None,
+    Residual(usize),
+    Linearise(usize),
+    Jacobian(usize),
+    Panic(usize),
+}
+
+/// `K x + x^3 = b`.
+struct Cubic<'a> {
+    matrix: &'a Matrix,
+    right_hand_side: DistributedVector,
+    slopes: Vec<f64>,
+    fault: Fault,
+    calls: [usize; 3],
+}
+
+impl Cubic<'_> {
+    fn called(&mut self, callback: usize) -> Result<()> {
+        self.calls[callback] += 1;
+        let call = self.calls[callback];
+        let now = match (self.fault, callback) {
+            (Fault::Residual(at), 0) | (Fault::Linearise(at), 1) | (Fault::Jacobian(at), 2) => at == call,
+            (Fault::Panic(at), 0) => {
+                assert_ne!(at, call, "a callback panicked");
+                false
+            }
+            _ => false,
+        };
+        if now { Err(Error::Failed("this rank gave up".into())) } else { Ok(()) }
+    }
+}
+
+impl NonlinearProblem for Cubic<'_> {
+    fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, residual)?;
+        residual.add_scaled(-1.0, &self.right_hand_side)?;
+        {
+            let (x, mut residual) = (x.owned()?, residual.owned_mut()?);
+            residual.iter_mut().zip(x.iter()).for_each(|(r, x)| *r += x * x * x);
+        }
+        self.called(0)
+    }
+
+    fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
+        self.slopes = x.owned()?.iter().map(|x| 3.0 * x * x).collect();
+        self.called(1)
+    }
+
+    fn apply_jacobian(
+        &mut self,
+        direction: &DistributedVector,
+        result: &mut DistributedVector,
+    ) -> Result<()> {
+        self.matrix.multiply(direction, result)?;
+        {
+            let (direction, mut result) = (direction.owned()?, result.owned_mut()?);
+            let terms = direction.iter().zip(&self.slopes);
+            result.iter_mut().zip(terms).for_each(|(r, (d, slope))| *r += slope * d);
+        }
+        self.called(2)
+    }
+}
+
+fn solution(unknown: usize) -> f64 {
+    1.0 + 0.5 * (unknown as f64).sin()
+}
+
+fn solver(session: &Session, matrix: &Matrix) -> Snes {
+    let mut snes = Snes::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver");
+    let mut ksp = snes.linear_solver().expect("linear solver");
+    ksp.set_method("cg").expect("cg");
+    ksp.set_preconditioner("jacobi", None).expect("jacobi");
+    ksp.set_tolerances(1e-12, 1e-14, 100).expect("tolerances");
+    ksp.set_matrix(matrix).expect("matrix");
+    snes
+}
+
+fn problem<'a>(session: &Session, matrix: &'a Matrix, fault: Fault) -> Cubic<'a> {
+    let all = share(session).2;
+    let mut right_hand_side = vector(session);
+    set(session, &mut right_hand_side, |row| product(all, row, solution) + solution(row).powi(3));
+    let last = session.rank() == session.ranks() - 1;
+    let fault = if last { fault } else { Fault::None };
+    Cubic { matrix, right_hand_side, slopes: Vec::new(), fault, calls: [0; 3] }
+}
+
+pub fn solve_nonlinear(session: &Session) {
+    let matrix = matrix(session);
+    let mut snes = solver(session, &matrix);
+    let mut problem = problem(session, &matrix, Fault::None);
+    let mut x = vector(session);
+    let outcome = snes.solve(&mut problem, &matrix, &mut x, 1e-11, 30).expect("solve");
+    assert!(outcome.converged() && outcome.residual <= 1e-11, "{outcome:?}");
+    assert!((3..=10).contains(&outcome.iterations), "Newton's method converges fast: {outcome:?}");
+    assert!(outcome.linear_iterations > outcome.iterations);
+    assert_owned(session, &x, solution);
+    assert!(snes.residual().norm().expect("norm") <= 1e-11);
+
+    let again = snes.solve(&mut problem, &matrix, &mut x, 1e-9, 30).expect("again");
+    assert_eq!((again.iterations, again.linear_iterations), (0, 0), "it started from the solution");
+    x.fill(0.0).expect("fill");
+    let short = snes.solve(&mut problem, &matrix, &mut x, 1e-11, 1).expect("an outcome, not an error");
+    assert!(!short.converged());
+    assert_eq!(short.words(), "too many Newton iterations");
+}
+
+pub fn fail_on_the_last_rank(session: &Session) {
+    let last = session.ranks() - 1;
+    let matrix = matrix(session);
+    let mut snes = solver(session, &matrix);
+    for fault in
+        [Fault::Residual(1), Fault::Residual(3), Fault::Jacobian(1), Fault::Jacobian(7), Fault::Linearise(2)]
+    {
+        let mut x = vector(session);
+        let mut faulty = problem(session, &matrix, fault);
+        let result = snes.solve(&mut faulty, &matrix, &mut x, 1e-11, 30);
+        match (&result, session.rank() == last) {
+            (Err(error), true) => assert_eq!(error.to_string(), "this rank gave up"),
+            (Ok(outcome), false) => {
+                let silent = shares(session.ranks())[last] == 0;
+                assert!(silent || !outcome.converged(), "{fault:?}: {outcome:?}");
+            }
+            _ => panic!("rank {}: {result:?}", session.rank()),
+        }
+        let agreed = session.agree(result).expect_err("all fail");
+        assert_eq!(agreed.exit(), Exit::Failed);
+        if session.rank() < last {
+            let (rank, message) = match agreed {
+                Error::Elsewhere { rank, message, .. } => (rank, message),
+                other => panic!("{other:?}"),
+            };
+            assert_eq!((rank, message.as_str()), (last, "this rank gave up"));
+        }
+        let mut sound = problem(session, &matrix, Fault::None);
+        x.fill(0.0).expect("fill");
+        let outcome = session.agree(snes.solve(&mut sound, &matrix, &mut x, 1e-11, 30)).expect("solve");
+        assert!(outcome.converged(), "the solver works again after a failure: {outcome:?}");
+        assert_owned(session, &x, solution);
+    }
+}
+
+pub fn panic_on_the_last_rank(session: &Session, folder: &Path) {
+    let pid = std::process::id().to_string();
+    std::fs::write(folder.join(format!("rank-{}", session.rank())), pid).expect("written");
+    let matrix = matrix(session);
+    let mut snes = solver(session, &matrix);
+    let mut faulty = problem(session, &matrix, Fault::Panic(2));
+    let result = snes.solve(&mut faulty, &matrix, &mut vector(session), 1e-11, 30);
+    println!("a rank went on: {:?}", result.is_ok());
+}
+
+#[test]
+fn newtons_method_solves_a_nonlinear_system() {
+    run_on(&[1, 2, 3], "newton");
+}
+
+#[test]
+fn an_error_in_a_callback_of_one_rank_fails_the_solve_on_all() {
+    run_on(&[1, 2, 3], "callback_error");
+}
+
+#[test]
+fn a_panic_in_a_callback_ends_all_ranks_with_exit_code_4() {
+    let folder = tempfile::tempdir().expect("folder");
+    let output = mpirun::start(2, "callback_panic", folder.path());
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(4), "{words}");
+    assert!(words.contains("a callback panicked"), "{words}");
+    assert!(!String::from_utf8_lossy(&output.stdout).contains("a rank went on"));
+    for rank in 0..2 {
+        let pid =
+            std::fs::read_to_string(folder.path().join(format!("rank-{rank}"))).expect("both ranks ran");
+        let command = std::fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        assert!(!command.contains("verification"), "rank {rank} is left behind");
+    }
+}

@@ -1,0 +1,176 @@
+//! Rung 4: an effect is called in its own phases only, and nothing is gathered that nobody needs.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, body, brick, crossed, simulation};
+use clarke::{
+    effect::{Effect, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
+    job::Job,
+    material::Isotropic,
+    run::{Inventory, Simulation},
+    session::Session,
+    space::{Batch, CellMatrix, Simplex},
+};
+use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
+
+/// Calls by phase, and the fields that any of them found gathered.
+#[derive(Debug, Default, PartialEq)]
+struct Seen {
+    calls: BTreeMap<&'static str, usize>,
+    gathered: BTreeMap<&'static str, Vec<&'static str>>,
+}
+
+/// An effect that notes how it is called.
+struct Watched<E> {
+    inner: E,
+    seen: Rc<RefCell<Seen>>,
+}
+
+impl<E> Watched<E> {
+    fn note(&self, phase: &'static str) {
+        *self.seen.borrow_mut().calls.entry(phase).or_default() += 1;
+    }
+
+    fn note_batch<const D: usize, const S: usize>(&self, phase: &'static str, batch: &Batch<D, S>) {
+        self.note(phase);
+        let fields = [
+            ("strain", batch.strain.is_empty()),
+            ("strain_rate", batch.strain_rate.is_empty()),
+            ("velocity", batch.velocity.is_empty()),
+            ("velocity_change", batch.velocity_change.is_empty()),
+        ];
+        let present = fields.into_iter().filter(|(_, empty)| !empty).map(|(name, _)| name).collect();
+        self.seen.borrow_mut().gathered.insert(phase, present);
+    }
+}
+
+impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E> {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn phases(&self) -> Phases {
+        self.inner.phases()
+    }
+
+    fn add_matrix(&self, cell: usize, geometry: &Simplex<D>, step_length: f64, matrix: &mut CellMatrix<D>) {
+        self.note("matrix");
+        self.inner.add_matrix(cell, geometry, step_length, matrix);
+    }
+
+    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        self.note_batch("explicit", batch);
+        self.inner.add_explicit(step, batch, energy);
+    }
+
+    fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        self.note_batch("energy", batch);
+        self.inner.add_energy(step, batch, energy);
+    }
+
+    fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
+        self.note_batch("stress", batch);
+        self.inner.add_stress(step, batch);
+    }
+}
+
+/// What a body that feels these effects sees in all phases of a step; its cells fit in one batch.
+fn seen_by<const D: usize, const S: usize>(
+    session: &Session,
+    whole: &clarke::mesh::GlobalMesh<D>,
+    watch: impl Fn(&Rc<RefCell<Seen>>) -> Vec<Box<dyn Effect<D, S>>>,
+) -> (Seen, usize) {
+    let seen = Rc::default();
+    let (mut body, state) = body::<D, S>(session, whole, &[], watch(&seen));
+    let step = Step { time: 0.1, length: 0.1, previous_length: 0.1 };
+    body.matrix(session, step.length).expect("matrix");
+    let mut forces = vec![0.0; body.mesh.nodes.len() * D];
+    body.add_explicit_forces(&state, step, &mut forces).expect("forces");
+    body.energy(&state, step).expect("energy");
+    body.stress(&state).expect("stress");
+    let cells = body.mesh.cell_count();
+    assert!(cells <= clarke::space::BATCH);
+    drop(body);
+    (Rc::try_unwrap(seen).expect("the only one").into_inner(), cells)
+}
+
+fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
+    let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
+        vec![Box::new(Watched { inner: Inertia { density: 1.0 }, seen: seen.clone() })]
+    });
+    assert_eq!(
+        seen.calls,
+        BTreeMap::from([("matrix", cells), ("explicit", 1), ("energy", 1)]),
+        "inertia alone"
+    );
+    assert_eq!(seen.gathered["explicit"], ["velocity"]);
+    assert_eq!(seen.gathered["energy"], ["velocity", "velocity_change"]);
+
+    let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
+    let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
+        vec![Box::new(Watched { inner: ViscousStress { tensor }, seen: seen.clone() })]
+    });
+    assert_eq!(
+        seen.calls,
+        BTreeMap::from([("matrix", cells), ("energy", 1), ("stress", 1)]),
+        "viscosity alone"
+    );
+    assert!(seen.gathered.values().all(|fields| *fields == ["strain_rate"]), "{:?}", seen.gathered);
+
+    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+        vec![
+            Box::new(Watched { inner: ElasticStress { tensor, with_history: false }, seen: seen.clone() }),
+            Box::new(ViscousStress { tensor }),
+        ]
+    });
+    assert_eq!(seen.calls, BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]), "elasticity");
+    assert_eq!(seen.gathered["explicit"], ["strain"], "viscosity has no part in the explicit pass");
+    assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"]);
+}
+
+fn inventory<const D: usize, const S: usize>(session: &Session, simulation: &Simulation<D, S>) -> Inventory {
+    Inventory::of(session, &simulation.body, &simulation.scheme)
+}
+
+fn allocations(session: &Session) {
+    let mesh = crossed([3, 2]);
+    let head = format!(
+        "{}[time]\nend = 1\nstep = 0.1\n[material]\ndensity = 1\nhypothesis = \"plane_stress\"\n",
+        any_mesh::<2>()
+    );
+    let bare = simulation::<2, 3>(session, &head, &mesh);
+    assert_eq!(inventory(session, &bare), Inventory::default(), "a body with inertia alone");
+    assert_eq!(bare.body.effect_names(), ["inertia"]);
+
+    let elastic = format!("{head}elasticity = {{ youngs_modulus = 1, poisson_ratio = 0.3 }}\n");
+    assert_eq!(inventory(session, &simulation::<2, 3>(session, &elastic, &mesh)), Inventory::default());
+
+    let flowing = format!(
+        "{elastic}viscoplasticity.perzyna = {{ relaxation = 1, yield_stress = 1 }}\n[[body_force]]\nvalue = [0, 1]\n"
+    );
+    let found = inventory(session, &simulation::<2, 3>(session, &flowing, &mesh));
+    let histories = BTreeMap::from([("viscoplastic_history".to_owned(), (24 * 3 * 8 * 2) as u64)]);
+    assert_eq!(found, Inventory { history_bytes: histories, load_vector: true, ..Inventory::default() });
+
+    let touching = format!(
+        "{head}[[contact]]\non = [\"bottom\"]\nnormal.damped_response = {{ breakpoints = [], slopes = [1] }}\n"
+    );
+    let found = inventory(session, &simulation::<2, 3>(session, &touching, &mesh));
+    assert_eq!(found, Inventory { contact_points: 4, newton: true, ..Inventory::default() });
+
+    let nothing = elastic.replace("density = 1\n", "");
+    let mut loaded = Job::from_text(&nothing, "job.toml", Path::new("."), &[]).expect("a job");
+    let refused = Simulation::<2, 3>::new(session, &mut loaded, session.is_first().then_some(mesh));
+    assert!(refused.is_err(), "nothing determines the velocity");
+}
+
+pub fn count(session: &Session) {
+    phases::<2, 3>(session, &crossed([3, 2]));
+    phases::<2, 4>(session, &crossed([3, 2]));
+    phases::<3, 6>(session, &brick([2, 2, 2]));
+    allocations(session);
+}
+
+#[test]
+fn absent_effects_are_not_called_gather_nothing_and_hold_no_memory() {
+    run_on(&[1, 2], "effects");
+}

@@ -1,0 +1,162 @@
+//! Rung 6: in every step of any job energy balances, and contact lies on its graph.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
+use clarke::{mesh::GlobalMesh, output::history::Totals, session::Session};
+
+const JOBS: u64 = 40;
+const STEPS: usize = 15;
+
+/// Parameters of one job.
+struct Draw(u64, u64);
+
+impl Draw {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.1 += 1;
+        low + (high - low) * 0.5 * (1.0 + noise(self.0 * 1000 + self.1))
+    }
+
+    fn one_of<'a>(&mut self, words: &[&'a str]) -> &'a str {
+        words[(self.between(0.0, words.len() as f64) as usize).min(words.len() - 1)]
+    }
+
+    fn flip(&mut self) -> bool {
+        self.between(0.0, 1.0) < 0.5
+    }
+
+    fn vector<const D: usize>(&mut self, size: f64) -> Vec<f64> {
+        (0..D).map(|_| self.between(-size, size)).collect()
+    }
+}
+
+fn material(draw: &mut Draw, dynamic: bool) -> String {
+    let mut text = String::new();
+    if dynamic {
+        text += &format!("density = {}\n", draw.between(0.5, 5.0));
+    }
+    let elastic = draw.between(0.0, 1.0) < 0.8;
+    if elastic {
+        let (modulus, ratio) = (draw.between(5.0, 100.0), draw.between(0.0, 0.45));
+        text += &format!("elasticity = {{ youngs_modulus = {modulus}, poisson_ratio = {ratio} }}\n");
+    }
+    if !dynamic || draw.flip() {
+        let (volumetric, shear) = (draw.between(-0.3, 5.0), draw.between(2.0, 20.0));
+        text += &format!("viscosity = {{ volumetric = {volumetric}, shear = {shear} }}\n");
+    }
+    if elastic && draw.flip() {
+        let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.0, 0.5));
+        let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
+        text += &format!(
+            "viscoplasticity.perzyna = {{ relaxation = {relaxation}, yield_stress = {bound}, metric = \"{metric}\" }}\n"
+        );
+    }
+    text
+}
+
+fn contact(draw: &mut Draw) -> String {
+    let quadrature = draw.one_of(&["nodal", "gauss"]);
+    let mut text = format!("[[contact]]\non = [\"bottom\"]\nquadrature = \"{quadrature}\"\n");
+    let first = draw.between(0.01, 0.1);
+    let fall = -draw.between(0.02, 0.2);
+    if draw.flip() {
+        let symmetry = draw.one_of(&["even", "odd", "one_sided"]);
+        // Mirrored, a rise falls.
+        let rise = if symmetry == "even" { -fall } else { draw.between(0.1, 3.0) };
+        text += &format!(
+            "[contact.normal.damped_response]\nbreakpoints = [{first}, {}]\nslopes = [{rise}, {fall}, {rise}]\n\
+             symmetry = \"{symmetry}\"\n",
+            2.0 * first
+        );
+    } else {
+        let high = draw.between(0.1, 0.5);
+        text += &format!(
+            "[contact.normal.graph]\npoints = [[-{first}, 0], [{first}, {high}], [{}, {}]]\nslope_after = 1\n",
+            3.0 * first,
+            high + 2.0 * first * fall
+        );
+    }
+    text
+}
+
+fn job<const D: usize>(number: u64, hypothesis: &str) -> String {
+    let draw = &mut Draw(number, 0);
+    let dynamic = draw.between(0.0, 1.0) < 0.7;
+    let mut job = format!("{}[time]\nend = {}\nstep = 0.01\n", any_mesh::<D>(), 0.01 * STEPS as f64);
+    job += "[solver]\ntolerance = 1e-13\n[material]\n";
+    if D == 2 {
+        job += &format!("hypothesis = \"{hypothesis}\"\n");
+    }
+    job += &material(draw, dynamic);
+    if !dynamic || draw.flip() {
+        job += "[[support]]\non = [\"left\"]\nfix = \"all\"\n";
+    }
+    if draw.flip() {
+        job += &format!("[[traction]]\non = [\"top\", \"right\"]\nvalue = {:?}\n", draw.vector::<D>(5.0));
+    }
+    if !dynamic || draw.flip() {
+        let size = draw.between(0.5, 5.0);
+        let along: Vec<String> = (0..D).map(|i| format!("{size}*sin(7*t+{i})*x")).collect();
+        job += &format!("[[body_force]]\nvalue = {along:?}\n");
+    }
+    if draw.between(0.0, 1.0) < 0.7 {
+        job += &contact(draw);
+    }
+    let (speed, stretch) = (draw.between(0.1, 1.0), draw.between(-0.02, 0.02));
+    let velocity: Vec<String> = (0..D).map(|i| format!("{speed}*cos(2*x+3*y+{i})")).collect();
+    let displacement: Vec<String> = (0..D).map(|i| format!("{stretch}*{}", ["x", "y*x", "z"][i])).collect();
+    job + &format!("[initial]\nvelocity = {velocity:?}\ndisplacement = {displacement:?}\n")
+}
+
+fn balanced<const D: usize, const S: usize>(
+    session: &Session,
+    number: u64,
+    hypothesis: &str,
+    mesh: &GlobalMesh<D>,
+) -> Totals {
+    let text = job::<D>(number, hypothesis);
+    let mut run = simulation::<D, S>(session, &text, mesh);
+    let mut steps = 0;
+    while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")) {
+        steps += 1;
+        let (imbalance, inclusion) = (run.totals.energy_imbalance, outcome.inclusion_residual);
+        assert!(
+            imbalance < 1e-9,
+            "step {steps}: energy imbalance {imbalance:e}\n{:?}\n{text}",
+            outcome.energy
+        );
+        assert!(inclusion < 1e-6, "step {steps}: inclusion residual {inclusion:e}\n{text}");
+        assert!(outcome.energy.viscous >= 0.0 && outcome.energy.viscoplastic >= 0.0);
+    }
+    assert_eq!(steps, STEPS);
+    assert!(run.totals.turnover > 1e-6, "something happens\n{text}");
+    run.totals
+}
+
+pub fn random_jobs(session: &Session) {
+    let (plane, space) = (crossed([4, 3]), brick([3, 2, 2]));
+    let mut active = [0; 5];
+    for number in 0..JOBS {
+        let totals = match number % 3 {
+            0 => balanced::<2, 3>(session, number, "plane_stress", &plane),
+            1 => balanced::<2, 4>(session, number, "plane_strain", &plane),
+            _ => balanced::<3, 6>(session, number, "", &space),
+        };
+        let present = [
+            totals.elastic_energy,
+            totals.viscous_dissipation,
+            totals.viscoplastic_dissipation,
+            totals.contact_dissipation,
+            totals.external_work,
+        ];
+        active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
+    }
+    for (count, what) in active.into_iter().zip(["elastic", "viscous", "viscoplastic", "contact", "external"])
+    {
+        assert!((JOBS / 5..JOBS).contains(&count), "{what} energy in {count} of {JOBS} jobs");
+    }
+}
+
+#[test]
+fn energy_balances_and_contact_lies_on_its_graph_in_every_step_of_random_jobs() {
+    run_on(&[1, 2], "energy");
+}

@@ -1,0 +1,59 @@
+//! The low rungs of verification, each standing on those before it: PETSc's handles, assembly, the Jacobian, which
+//! effects are called, uniform fields, energy and closed forms, manufactured solutions.
+//!
+//! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
+
+mod assembly;
+mod callbacks;
+mod closed_forms;
+mod creep;
+mod effects;
+mod energy;
+mod jacobian;
+mod manufactured;
+#[path = "../mpirun/mod.rs"]
+mod mpirun;
+mod patch;
+mod petsc_boundary;
+mod scenes;
+mod wave;
+
+use clarke::session::Mpi;
+use std::path::PathBuf;
+
+/// The side of the tests that runs under `mpirun`.
+#[test]
+#[ignore = "started by the other tests, under mpirun"]
+fn scenario() {
+    let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
+    let folder = PathBuf::from(std::env::var(mpirun::FOLDER).expect("a folder"));
+    let mpi = Mpi::start().expect("MPI");
+    let session = mpi.session().expect("PETSc");
+    match name.as_str() {
+        "vectors" => petsc_boundary::exchange_vectors(&session),
+        "matrices" => petsc_boundary::multiply_matrices(&session),
+        "linear" => petsc_boundary::solve_linear(&session),
+        "options" => petsc_boundary::set_options(&session),
+        "newton" => callbacks::solve_nonlinear(&session),
+        "callback_error" => callbacks::fail_on_the_last_rank(&session),
+        "callback_panic" => callbacks::panic_on_the_last_rank(&session, &folder),
+        "assembly" => assembly::compare(&session),
+        "jacobian" => jacobian::compare(&session),
+        "effects" => effects::count(&session),
+        "patch" => patch::uniform_fields(&session),
+        "energy" => energy::random_jobs(&session),
+        "closed_forms" => closed_forms::all(&session),
+        "creep" => creep::all(&session),
+        "manufactured_plane" => manufactured::plane(&session),
+        "manufactured_space" => manufactured::space(&session),
+        "manufactured_time" => manufactured::time(&session),
+        other => panic!("no scenario {other}"),
+    }
+}
+
+fn run_on(ranks: &[usize], scenario: &str) {
+    let folder = tempfile::tempdir().expect("folder");
+    for &ranks in ranks {
+        mpirun::run(ranks, scenario, folder.path());
+    }
+}

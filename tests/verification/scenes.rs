@@ -1,0 +1,122 @@
+//! Small meshes, bodies and jobs in memory.
+
+use crate::mpirun::scramble;
+use clarke::{
+    body::Body,
+    effect::{Effect, Held, Load, Support, fixed_components},
+    job::Job,
+    mesh::{
+        GlobalMesh, Mesh, Tags, distribute,
+        generate::{Diagonal, box_mesh, rectangle},
+        partition::partition,
+        surface::Topology,
+    },
+    run::Simulation,
+    session::Session,
+    space::Geometry,
+    state::State,
+};
+use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
+use std::path::Path;
+
+/// A number in [-1, 1) that looks random.
+pub fn noise(seed: u64) -> f64 {
+    (scramble(scramble(seed)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// A graded rectangle of crossed cells.
+pub fn crossed(cells: [usize; 2]) -> GlobalMesh<2> {
+    rectangle([1.2, 0.9], cells, Diagonal::Crossed, [1.3, 0.8]).expect("mesh")
+}
+
+/// A graded brick whose inner nodes were moved about.
+pub fn brick(cells: [usize; 3]) -> GlobalMesh<3> {
+    stir(box_mesh([1.0, 0.8, 1.1], cells, [1.2, 1.0, 0.9]).expect("mesh"), 0.12 / cells[0] as f64)
+}
+
+/// Moves every node that is not on the surface by up to `reach` along each axis.
+pub fn stir<const D: usize>(mut mesh: GlobalMesh<D>, reach: f64) -> GlobalMesh<D> {
+    let mut outside = vec![false; mesh.nodes.len()];
+    mesh.facets.iter().flatten().for_each(|&node| outside[node as usize] = true);
+    for (node, place) in mesh.nodes.iter_mut().enumerate().filter(|(node, _)| !outside[*node]) {
+        for (axis, x) in place.iter_mut().enumerate() {
+            *x += reach * noise((node * D + axis) as u64);
+        }
+    }
+    mesh
+}
+
+/// This rank's part of a mesh that every rank has made.
+pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D> {
+    let parts = session.is_first().then(|| {
+        let topology = Topology::<D>::new(&whole.cells, whole.nodes.len(), &Tags::default());
+        let dual = topology.expect("topology").dual_graph();
+        (whole.clone(), partition(whole, &dual, session.ranks()).expect("partition"))
+    });
+    distribute(session, parts).expect("distributed")
+}
+
+/// A body at rest that is held on some boundaries and feels these effects.
+pub fn body<const D: usize, const S: usize>(
+    session: &Session,
+    whole: &GlobalMesh<D>,
+    held: &[(&str, Held)],
+    effects: Vec<Box<dyn Effect<D, S>>>,
+) -> (Body<D, S>, State) {
+    let mesh = part(session, whole);
+    let state = State::at_rest(&mesh).expect("state");
+    let supports: Vec<Support> = held
+        .iter()
+        .map(|(name, held)| Support {
+            name: (*name).to_owned(),
+            facets: mesh.boundary(name).expect("a boundary").facets.clone(),
+            held: held.clone(),
+        })
+        .collect();
+    let fixed = fixed_components(&mesh, &supports, &state.velocity).expect("flags");
+    let geometry = Geometry::new(&mesh);
+    (Body { mesh, geometry, effects, contacts: Vec::new(), load: Load::default(), fixed }, state)
+}
+
+/// The job of this text on a mesh that every rank has made.
+pub fn simulation<const D: usize, const S: usize>(
+    session: &Session,
+    job: &str,
+    whole: &GlobalMesh<D>,
+) -> Simulation<D, S> {
+    let mut loaded =
+        Job::from_text(job, "job.toml", Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}\n{job}"));
+    let mesh = session.is_first().then(|| whole.clone());
+    Simulation::new(session, &mut loaded, mesh).unwrap_or_else(|e| panic!("{e}\n{job}"))
+}
+
+/// The `[mesh]` table of a mesh that is handed over in memory: any of the right dimension.
+pub fn any_mesh<const D: usize>() -> &'static str {
+    if D == 2 {
+        "[mesh.rectangle]\nsize = [1, 1]\ncells = [1, 1]\n"
+    } else {
+        "[mesh.box]\nsize = [1, 1, 1]\ncells = [1, 1, 1]\n"
+    }
+}
+
+/// The sum over all ranks of each entry.
+pub fn sum(session: &Session, mine: &[f64]) -> Vec<f64> {
+    let mut all = vec![0.0; mine.len()];
+    session.world().all_reduce_into(mine, &mut all[..], SystemOperation::sum());
+    all
+}
+
+/// Writes the values of a field given by the original id and the place of each node, ghosts included.
+pub fn set_nodal<const D: usize>(
+    mesh: &Mesh<D>,
+    vector: &mut clarke::petsc::DistributedVector,
+    value: impl Fn(usize, &[f64; D]) -> [f64; D],
+) {
+    {
+        let mut owned = vector.owned_mut().expect("values");
+        for (node, target) in owned.chunks_exact_mut(D).enumerate() {
+            target.copy_from_slice(&value(mesh.node_ids[node] as usize, &mesh.nodes[node]));
+        }
+    }
+    vector.update_ghosts().expect("ghosts");
+}
