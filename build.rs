@@ -10,7 +10,7 @@ use std::{
 const FUNCTIONS: &[&str] = &[
     "Petsc(InitializeNoPointers|Finalize|PushErrorHandler|ErrorMessage|GetVersionNumber)",
     "PetscOptions(SetValue|HasName|ClearValue)",
-    "PetscLog(DefaultBegin|StageRegister|StagePush|StagePop)",
+    "PetscLog(DefaultBegin|StageGetId|StageRegister|StagePush|StagePop)",
     "Vec(CreateGhostBlock|Duplicate|Destroy|GetLocalSize|GetArray|RestoreArray|GetArrayRead|RestoreArrayRead)",
     "VecGhost(GetLocalForm|RestoreLocalForm|UpdateBegin|UpdateEnd)",
     "Vec(Copy|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize)",

@@ -84,12 +84,17 @@ pub fn set_default_option(name: &str, value: &str) -> Result<()> {
 pub struct Stage(i32);
 
 impl Stage {
-    /// Registers a stage.
+    /// The stage of this name, registered if it isn't yet.
     pub fn register(name: &str) -> Result<Self> {
         let name = c_string(name)?;
         let mut stage = 0;
-        // SAFETY: PETSc copies the name and fills the integer.
-        check(unsafe { sys::PetscLogStageRegister(name.as_ptr(), &mut stage) })?;
+        // SAFETY: PETSc copies the name and fills the integer, with a negative number for an unknown stage.
+        unsafe {
+            check(sys::PetscLogStageGetId(name.as_ptr(), &mut stage))?;
+            if stage < 0 {
+                check(sys::PetscLogStageRegister(name.as_ptr(), &mut stage))?;
+            }
+        }
         Ok(Self(stage))
     }
 
