@@ -167,7 +167,7 @@ fn job_behind_restart(job: &str) -> String {
 /// What to say if this is no file but much like a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
-    let near = job::nearest(word, COMMANDS.into_iter())?;
+    let near = job::nearest(word, COMMANDS)?;
     (!path.exists() && path.extension().is_none())
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
 }

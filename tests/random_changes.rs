@@ -3,7 +3,7 @@
 use clarke::{error::Error, job::Job, run, session::Mpi};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use std::path::Path;
+use std::{cell::Cell, path::Path};
 
 const JOB: &str = r#"
 [mesh]
@@ -117,19 +117,22 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
     write(SQUARE);
     check(JOB).expect("unchanged, the job can be run");
 
+    let (ready, refused) = (Cell::new(0), Cell::new(0));
     let config = ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() };
     let result = TestRunner::new(config).run(&(changes(3), changes(4)), |(of_job, of_mesh)| {
         write(&changed(SQUARE, &of_mesh));
         match check(&changed(JOB, &of_job)) {
-            Ok(()) => {}
+            Ok(()) => ready.set(ready.get() + 1),
             Err(Error::Refused(words)) => {
-                prop_assert!(names_its_place(&words, &mesh), "{}", words);
+                refused.set(refused.get() + 1);
+                prop_assert!(names_its_place(&words, folder.path()), "{}", words);
             }
             Err(other) => prop_assert!(false, "{:?}", other),
         }
         Ok(())
     });
     result.unwrap_or_else(|fault| panic!("{fault}"));
+    assert!(ready.get() > 20 && refused.get() > 100, "{ready:?} ready, {refused:?} refused");
     write(SQUARE);
     check(JOB).expect("what was refused leaves nothing behind in the process");
     let left = std::fs::read_dir(folder.path()).expect("folder").count();
@@ -137,7 +140,7 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
 }
 
 /// Whether a refusal names the file and place in the job or the mesh, the probe, or the field.
-fn names_its_place(words: &str, mesh: &Path) -> bool {
+fn names_its_place(words: &str, folder: &Path) -> bool {
     let names = ["job.toml:", "probe \"", "traction: ", "initial.", "cells, fewer than", "support"];
-    words.contains(&mesh.display().to_string()) || names.iter().any(|name| words.contains(name))
+    words.contains(&folder.display().to_string()) || names.iter().any(|name| words.contains(name))
 }
