@@ -2,7 +2,7 @@
 
 use super::{
     Clock, Inventory, Scene, Start,
-    outputs::{Outputs, prepare_folder},
+    outputs::{Outputs, Wanted, prepare_folder},
     setup::{Setup, setup},
     summary::{PartitionQuality, Summary, peak_memory},
 };
@@ -65,7 +65,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         crate::effect::Energy::from_array(session.sum(mine.to_array()))
     };
     let totals = restored.as_ref().map_or_else(|| Totals::at_start(energy), |r| r.totals);
-    let mut outputs = Outputs::open(session, job, identity, probes, &body, &state, goes_on, &mut log)?;
+    let wanted = Wanted { identity, probes, goes_on };
+    let mut outputs = Outputs::open(session, job, wanted, &body, &state, &mut log)?;
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
     }

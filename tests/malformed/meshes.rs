@@ -144,7 +144,7 @@ fn what_is_no_readable_file_is_refused_as_a_mesh() {
         vec![(missing, &["nowhere.msh", "No such file"]), (folder.path().to_owned(), &["Is a directory"])];
     let locked = folder.path().join("locked.msh");
     std::fs::copy(meshes().join("square_ascii.msh"), &locked).expect("copied");
-    let nobody: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0);
+    let nobody: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o000);
     std::fs::set_permissions(&locked, nobody).expect("locked");
     // The superuser reads every file.
     if std::fs::File::open(&locked).is_err() {
