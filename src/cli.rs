@@ -2,10 +2,10 @@
 
 use crate::{
     error::{Error, Exit, Result},
-    job::{self, Job},
+    job::{self, Job, Loaded},
     output::inspect::inspect,
-    run::{self, Clock, Purpose, Start},
-    session::Mpi,
+    run::{self, Clock, Start},
+    session::{Mpi, Session},
 };
 use clap::{Args, Parser, Subcommand};
 use std::{
@@ -105,20 +105,17 @@ pub fn main() -> ExitCode {
         Ok(cli) => dispatch(cli),
         Err(error) => match remedy(&arguments) {
             Some(words) if error.use_stderr() => Err(Error::Refused(words)),
-            _ => {
-                if is_first_process() {
-                    let _ = error.print();
-                }
-                return ExitCode::from(if error.use_stderr() { Exit::Refused } else { Exit::Done } as u8);
+            _ if error.use_stderr() => {
+                speak_alone(|| drop(error.print()));
+                return ExitCode::from(Exit::Refused as u8);
             }
+            _ => say(&error.render().to_string()),
         },
     };
     match result {
         Ok(exit) => ExitCode::from(exit as u8),
         Err(error) => {
-            if is_first_process() {
-                print_error(&error);
-            }
+            speak_alone(|| print_error(&error));
             ExitCode::from(error.exit() as u8)
         }
     }
@@ -127,7 +124,7 @@ pub fn main() -> ExitCode {
 fn dispatch(cli: Cli) -> Result<Exit> {
     match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
-        Some(Command::Check { job, overrides, json }) => start(&job, &overrides, &Purpose::Check { json }),
+        Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json }) => {
             say(&if json { job::describe_json() } else { job::describe(table.as_deref())? })
         }
@@ -170,17 +167,27 @@ fn job_behind_restart(job: &str) -> String {
 /// What to say if this is no file but much like a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
-    let near = job::nearest(word, COMMANDS.into_iter())?;
+    let near = job::nearest(word, COMMANDS)?;
     (!path.exists() && path.extension().is_none())
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
 }
 
-/// Whether this process is the one that speaks before MPI has started, going by what launchers tell their processes.
-fn is_first_process() -> bool {
-    ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"]
-        .iter()
-        .find_map(|name| std::env::var(name).ok()?.parse::<u64>().ok())
-        .is_none_or(|rank| rank == 0)
+/// This process's number where MPI has not started, if a launcher tells it.
+fn launched_rank() -> Option<u64> {
+    let names = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
+    names.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
+}
+
+/// Lets the first of the launched processes say why all of them end; they end together, because launchers kill the
+/// others, and what they still have to say, as soon as one has failed.
+fn speak_alone(words: impl FnOnce()) {
+    let rank = launched_rank();
+    if rank.is_none_or(|rank| rank == 0) {
+        words();
+    }
+    if rank.is_some() {
+        drop(Mpi::start());
+    }
 }
 
 fn print_error(error: &Error) {
@@ -189,12 +196,17 @@ fn print_error(error: &Error) {
     let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
 }
 
-/// Prints on one process; a closed pipe is no fault.
+/// Prints on one process, before MPI has started.
 fn say(text: &str) -> Result<Exit> {
-    if is_first_process() {
-        let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+    if launched_rank().is_none_or(|rank| rank == 0) {
+        print(text);
     }
     Ok(Exit::Done)
+}
+
+/// Prints; a closed pipe is no fault.
+fn print(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
 }
 
 fn run_job(arguments: &RunArguments) -> Result<Exit> {
@@ -209,18 +221,34 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
     if let Some(words) = misspelt_command(&arguments.job) {
         return Err(Error::Refused(words));
     }
-    start(&arguments.job, &arguments.overrides, &Purpose::Run(from))
+    on_all_ranks(&arguments.job, &arguments.overrides, |session, loaded, clock| {
+        run::run(session, loaded, &from, clock)
+    })
 }
 
-/// Loads a job on all ranks and runs or checks it; the rank with the fault of its own speaks.
-fn start(job: &Path, overrides: &[String], purpose: &Purpose) -> Result<Exit> {
+fn check(job: &Path, overrides: &[String], json: bool) -> Result<Exit> {
+    on_all_ranks(job, overrides, |session, loaded, _| {
+        let report = run::check(session, loaded)?;
+        if session.is_first() {
+            print(&if json { report.json()? } else { report.text() });
+        }
+        Ok(Exit::Done)
+    })
+}
+
+/// Starts MPI and PETSc, loads a job on all ranks and works on it; the rank with the fault of its own speaks.
+fn on_all_ranks(
+    job: &Path,
+    overrides: &[String],
+    work: impl FnOnce(&Session, Loaded, Clock) -> Result<Exit>,
+) -> Result<Exit> {
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let clock = Clock { began, launched: began.elapsed() };
     let colour = std::io::stderr().is_terminal();
     let loaded = session.agree(Job::load_coloured(job, overrides, colour));
-    let result = loaded.and_then(|loaded| run::run(&session, loaded, purpose, clock));
+    let result = loaded.and_then(|loaded| work(&session, loaded, clock));
     Ok(result.unwrap_or_else(|error| {
         if !matches!(error, Error::Elsewhere { .. }) {
             print_error(&error);

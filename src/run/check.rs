@@ -11,18 +11,19 @@ use super::{
 use crate::{
     body::Body,
     certificate::Certificates,
-    error::{Error, Exit, Result},
+    error::{Error, Result},
     job::{Job, Loaded},
     mesh::check::Quality,
     session::Session,
     state::State,
 };
 use serde::Serialize;
-use std::io::Write;
 
-/// The object that `solver check --json` prints; names are part of the contract.
+/// What a job would be; on rank 0 complete, with warnings and the quality of the mesh.
+///
+/// The fields are the object that `solver check --json` prints; their names are part of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-struct Report {
+pub struct Report {
     version: &'static str,
     petsc_version: String,
     ranks: usize,
@@ -44,6 +45,8 @@ struct Report {
     estimate: Estimate,
     warnings: Vec<String>,
     output_folder: String,
+    #[serde(skip)]
+    header: Vec<String>,
 }
 
 /// A probe, which lies inside the body.
@@ -61,21 +64,16 @@ struct CellQuality {
     poor_cells: usize,
 }
 
-/// Sets the problem up as a run does, then prints what it found on rank 0. Collective.
+/// Sets the problem up as a run does, and tells what it found. Collective.
 pub(super) fn check<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     scene: Option<Scene<D>>,
-    json: bool,
-) -> Result<Exit> {
+) -> Result<Report> {
     let quality = scene.as_ref().map(|s| s.mesh.quality_summary());
     let ready = setup::<D, S>(session, loaded, scene)?;
     session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
-    let lines = header::lines(session, loaded, &ready)?;
-    let report = report(session, loaded, &ready, quality)?;
-    let printed = if session.is_first() { print(&report, lines, json) } else { Ok(()) };
-    session.agree(printed)?;
-    Ok(Exit::Done)
+    report(session, loaded, &ready, quality)
 }
 
 /// Evaluates the loads at the first and the last step: what is not finite there would end the run.
@@ -133,22 +131,22 @@ fn report<const D: usize, const S: usize>(
         estimate: Estimate::new(session, body, &inventory, preconditioner, steps),
         warnings: loaded.warnings.clone(),
         output_folder: job.output_folder().display().to_string(),
+        header: header::lines(session, loaded, ready)?,
     })
 }
 
-fn print(report: &Report, lines: Vec<String>, json: bool) -> Result<()> {
-    let text = if json {
-        serde_json::to_string_pretty(report)
-            .map_err(|e| Error::Internal(format!("the report can't be written: {e}")))?
-    } else {
-        lines.into_iter().chain(report.lines()).collect::<Vec<_>>().join("\n")
-    };
-    // A closed pipe is no fault of the job.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(())
-}
-
 impl Report {
+    /// One JSON object.
+    pub fn json(&self) -> Result<String> {
+        serde_json::to_string_pretty(self)
+            .map_err(|e| Error::Internal(format!("the report can't be written: {e}")))
+    }
+
+    /// Lines for a reader.
+    pub fn text(&self) -> String {
+        self.header.iter().cloned().chain(self.lines()).collect::<Vec<_>>().join("\n")
+    }
+
     /// What the log of a run doesn't say.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 /// What a run will cost; an estimate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Estimate {
+pub struct Estimate {
     /// Bytes by part, over all ranks.
     pub memory_bytes: MemoryEstimate,
     /// Seconds.
@@ -20,7 +20,7 @@ pub(super) struct Estimate {
 
 /// Bytes by part, over all ranks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct MemoryEstimate {
+pub struct MemoryEstimate {
     /// The program itself with MPI, PETSc and HDF5.
     pub program: u64,
     /// Mesh and geometry.
@@ -41,7 +41,7 @@ pub(super) struct MemoryEstimate {
 
 /// Seconds, without output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct TimeEstimate {
+pub struct TimeEstimate {
     /// Assembly and preconditioner.
     pub set_up: f64,
     /// A step.

@@ -12,6 +12,7 @@ mod simulation;
 mod summary;
 mod time_loop;
 
+pub use check::Report;
 pub use inventory::Inventory;
 pub use scene::{Scene, whole_mesh};
 pub use simulation::Simulation;
@@ -53,43 +54,30 @@ pub struct Clock {
     pub launched: Duration,
 }
 
-/// What is to be done with a job.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Purpose {
-    /// Run it to its end or to a request to stop.
-    Run(Start),
-    /// Print what a run would be, as text or as a JSON object; no file is written.
-    Check {
-        /// Print one JSON object.
-        json: bool,
-    },
-}
-
-/// Runs or checks a job. Collective.
-pub fn run(session: &Session, loaded: Loaded, purpose: &Purpose, clock: Clock) -> Result<Exit> {
-    let mut loaded = loaded;
-    let scene = session.agree(scene::AnyScene::of(session, &mut loaded))?;
-    match (dimension(session, &scene), loaded.job.material.hypothesis) {
-        (2, Some(job::Hypothesis::PlaneStrain)) => {
-            go_on::<2, 4>(session, &loaded, scene.and_then(AnyScene::two), purpose, clock)
+/// Calls a function of a submodule on a job's mesh, for its dimension and hypothesis.
+macro_rules! on_the_mesh {
+    ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{
+        let mut loaded = $loaded;
+        let scene = $session.agree(AnyScene::of($session, &mut loaded))?;
+        match (dimension($session, &scene), loaded.job.material.hypothesis) {
+            (2, Some(job::Hypothesis::PlaneStrain)) => {
+                $module::$function::<2, 4>($session, &loaded, scene.and_then(AnyScene::two) $(, $more)*)
+            }
+            (2, _) => $module::$function::<2, 3>($session, &loaded, scene.and_then(AnyScene::two) $(, $more)*),
+            (3, _) => $module::$function::<3, 6>($session, &loaded, scene.and_then(AnyScene::three) $(, $more)*),
+            (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
         }
-        (2, _) => go_on::<2, 3>(session, &loaded, scene.and_then(AnyScene::two), purpose, clock),
-        (3, _) => go_on::<3, 6>(session, &loaded, scene.and_then(AnyScene::three), purpose, clock),
-        (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
-    }
+    }};
 }
 
-fn go_on<const D: usize, const S: usize>(
-    session: &Session,
-    loaded: &Loaded,
-    scene: Option<Scene<D>>,
-    purpose: &Purpose,
-    clock: Clock,
-) -> Result<Exit> {
-    match purpose {
-        Purpose::Run(start) => time_loop::run::<D, S>(session, loaded, scene, start, clock),
-        Purpose::Check { json } => check::check::<D, S>(session, loaded, scene, *json),
-    }
+/// Runs a job to its end or to a request to stop. Collective.
+pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit> {
+    on_the_mesh!(session, loaded, time_loop::run, start, clock)
+}
+
+/// Everything but the run: sets a job up as a run does and tells what it would be; writes no file. Collective.
+pub fn check(session: &Session, loaded: Loaded) -> Result<Report> {
+    on_the_mesh!(session, loaded, check::check)
 }
 
 /// The dimension of the mesh, which rank 0 knows. Collective.

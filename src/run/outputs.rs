@@ -36,19 +36,28 @@ pub(super) struct Outputs<const D: usize> {
     pub spent: Duration,
 }
 
+/// What files are to say and hold.
+pub(super) struct Wanted<const D: usize> {
+    /// Whose checkpoints they are.
+    pub identity: Identity,
+    /// Where to look.
+    pub probes: Probes<D>,
+    /// Whether files of an earlier run are gone on with.
+    pub goes_on: bool,
+}
+
 impl<const D: usize> Outputs<D> {
     /// Finds profiles and opens the files; behind the state's step if the run goes on. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         job: &Job,
-        identity: Identity,
-        mut probes: Probes<D>,
+        wanted: Wanted<D>,
         body: &Body<D, S>,
         state: &State,
-        goes_on: bool,
         log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
+        let Wanted { identity, mut probes, goes_on } = wanted;
         let folder = job.output_folder().to_owned();
         let mut profiles = profiles(session, body, job);
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));

@@ -2,7 +2,7 @@
 
 use super::{
     Clock, Inventory, Scene, Start,
-    outputs::{Outputs, prepare_folder},
+    outputs::{Outputs, Wanted, prepare_folder},
     setup::{Setup, setup},
     simulation::{SNAP, next_step, totals_at_start},
     summary::{PartitionQuality, Summary, peak_memory},
@@ -61,7 +61,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         Some(restored) => restored.totals,
         None => totals_at_start(session, &body, &state)?,
     };
-    let mut outputs = Outputs::open(session, job, identity, probes, &body, &state, goes_on, &mut log)?;
+    let wanted = Wanted { identity, probes, goes_on };
+    let mut outputs = Outputs::open(session, job, wanted, &body, &state, &mut log)?;
     if state.step == 0 {
         outputs.at_start(session, &body, &state)?;
     }

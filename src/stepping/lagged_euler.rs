@@ -360,8 +360,7 @@ impl LaggedEuler {
 const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
 
-const INCLUSION_REMEDY: &str =
-    "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
+const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
 
 fn failed(step: Step, what: &str, remedy: &str) -> Error {
     Error::Failed(format!(
