@@ -134,7 +134,7 @@ fn inventory<const D: usize, const S: usize>(session: &Session, simulation: &Sim
 fn allocations(session: &Session) {
     let mesh = crossed([3, 2]);
     let head = format!(
-        "{}[time]\nend = 1\nstep = 0.1\n[material]\ndensity = 1\nhypothesis = \"plane_stress\"\n",
+        "{}[time]\nend = 1\nstep = 0.01\n[material]\ndensity = 1\nhypothesis = \"plane_stress\"\n",
         any_mesh::<2>()
     );
     let bare = simulation::<2, 3>(session, &head, &mesh);

@@ -6,6 +6,8 @@ use clarke::{mesh::GlobalMesh, output::history::Totals, session::Session};
 
 const JOBS: u64 = 40;
 const STEPS: usize = 15;
+/// Within the bound of the explicit parts of every job.
+const STEP: f64 = 0.002;
 
 /// Parameters of one job.
 struct Draw(u64, u64);
@@ -81,7 +83,7 @@ fn contact(draw: &mut Draw) -> String {
 fn job<const D: usize>(number: u64, hypothesis: &str) -> String {
     let draw = &mut Draw(number, 0);
     let dynamic = draw.between(0.0, 1.0) < 0.7;
-    let mut job = format!("{}[time]\nend = {}\nstep = 0.01\n", any_mesh::<D>(), 0.01 * STEPS as f64);
+    let mut job = format!("{}[time]\nend = {}\nstep = {STEP}\n", any_mesh::<D>(), STEP * STEPS as f64);
     job += "[solver]\ntolerance = 1e-13\n[material]\n";
     if D == 2 {
         job += &format!("hypothesis = \"{hypothesis}\"\n");
