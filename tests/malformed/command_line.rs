@@ -122,6 +122,8 @@ fn a_check_says_what_a_run_would_be_and_writes_nothing() {
         "material.hypothesis=plane_strain",
         "--set",
         "material.elasticity.poisson_ratio=0.49",
+        "--set",
+        "time.step=0.001",
     ];
     run_alone(&wide).expect(0).says("poisson_ratio = 0.49");
     assert_eq!(std::fs::read_dir(folder.path()).expect("folder").count(), 0);
