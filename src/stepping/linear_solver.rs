@@ -87,6 +87,7 @@ impl Preconditioner {
     ///
     /// Cholesky of a small matrix is done by CHOLMOD on every rank at once: MUMPS on several ranks sums in the order in
     /// which messages arrive, so that no two runs agree to the last bit. It serves where the matrix is too large for that.
+    /// So does the faster way to GAMG's coarse matrices as soon as a rank has two neighbours.
     pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
         ksp.set_method("cg")?;
         match self {
@@ -100,6 +101,9 @@ impl Preconditioner {
             Self::Auto | Self::Cholesky => ksp.set_preconditioner("cholesky", Some("mumps")),
             Self::Gamg => {
                 ksp.set_preconditioner("gamg", None)?;
+                if ranks > 2 {
+                    set_default_option("matptap_via", "allatonce")?;
+                }
                 set_default_option("pc_gamg_threshold", "0.01")?;
                 set_default_option("pc_gamg_agg_nsmooths", "1")?;
                 set_default_option("mg_levels_ksp_type", "chebyshev")?;
