@@ -2,7 +2,6 @@
 
 use super::boundary::check_name;
 use super::{Fault, Findings, MeshNames, items};
-use crate::job::nearest::nearest;
 use crate::job::source::Value;
 
 /// Whatever the mesh.
