@@ -13,7 +13,7 @@
 # the build stage gets fewer packages than the real one has.
 #
 # Needs root, debootstrap, git and a Rust toolchain. From the environment:
-#   MIRROR         Debian mirror (default http://deb.debian.org/debian)
+#   MIRROR         Debian mirror, required
 #   APT_CONFIG     folder of apt.conf.d fragments to copy into the chroots, where the network needs special settings
 #   RUST_SYSROOT   the toolchain (default: what `rustc --print sysroot` says)
 #   CRATES         folder with a cargo registry (default $CARGO_HOME/registry); a copy is used, so crates already
@@ -39,7 +39,7 @@ mkdir -p "$1"
 work=$(cd "$1" && pwd)
 job=${2:-/opt/clarke/jobs/papers/wang_cheng_2022.toml}
 source=$(git -C "$(dirname "$0")" rev-parse --show-toplevel)
-mirror=${MIRROR:-http://deb.debian.org/debian}
+mirror=${MIRROR:?set MIRROR to a Debian mirror}
 sysroot=${RUST_SYSROOT:-$(cd "$source" && rustc --print sysroot)}
 crates=${CRATES:-${CARGO_HOME:-$HOME/.cargo}/registry}
 
