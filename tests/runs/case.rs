@@ -103,10 +103,15 @@ impl Case {
         self.results()
     }
 
-    fn arguments(&self, more: &[&str]) -> Vec<String> {
+    /// Writes the job file and says where it is.
+    pub fn written(&self) -> PathBuf {
         let file = self.folder().join("job.toml");
         std::fs::write(&file, toml::to_string(&self.job).expect("TOML")).expect("written");
-        let first = ["run".to_owned(), file.display().to_string()];
+        file
+    }
+
+    fn arguments(&self, more: &[&str]) -> Vec<String> {
+        let first = ["run".to_owned(), self.written().display().to_string()];
         first.into_iter().chain(more.iter().map(|a| (*a).to_owned())).collect()
     }
 }

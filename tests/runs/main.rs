@@ -1,6 +1,7 @@
 //! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
 
 mod case;
+mod certificates;
 mod check_values;
 mod effects;
 mod failures;

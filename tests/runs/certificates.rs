@@ -1,0 +1,97 @@
+//! Certificates: known numbers, and what a run does with them.
+
+use crate::{case::Case, launch, results::Results};
+use serde_json::Value;
+
+/// What `solver check --json` says of a case.
+fn check(case: &Case, ranks: usize) -> Value {
+    let job = case.written();
+    let printed = launch::run(ranks, &["check", job.to_str().expect("path"), "--json"]).expect(0).stdout;
+    serde_json::from_str(&printed).expect("JSON")
+}
+
+fn certificate(checked: &Value, name: &str) -> f64 {
+    checked["certificates"][name].as_f64().expect(name)
+}
+
+fn close(found: f64, expected: f64, digit: f64, what: &str) {
+    assert!((found - expected).abs() <= 0.6 * digit, "{what}: {found} instead of {expected}");
+}
+
+#[test]
+fn the_papers_square_has_the_known_constants_on_one_and_three_ranks() {
+    for ranks in [1, 3] {
+        let coarse = check(&Case::square(8), ranks);
+        close(certificate(&coarse, "explicit_step_bound"), 0.1208, 1e-4, "largest stable step at 1/8");
+        let middle = check(&Case::square(16), ranks);
+        close(certificate(&middle, "theta"), 0.3805, 1e-4, "theta at 1/16");
+        close(10.0 * certificate(&middle, "trace_norm_squared"), 22.1, 0.1, "m_j |gamma|^2 at 1/16");
+    }
+    let fine = check(&Case::square(64), 2);
+    close(certificate(&fine, "theta"), 0.3855, 1e-4, "theta at 1/64");
+    close(10.0 * certificate(&fine, "trace_norm_squared"), 22.4, 0.1, "m_j |gamma|^2 at 1/64");
+    close(certificate(&fine, "explicit_step_bound"), 0.1201, 1e-4, "largest stable step at 1/64");
+    assert_eq!(certificate(&fine, "viscosity_modulus"), 50.0);
+    assert_eq!(certificate(&fine, "monotonicity_constant"), 10.0);
+}
+
+#[test]
+fn a_run_keeps_the_certificates_that_check_prints() {
+    let case = Case::square(8);
+    let checked = check(&case, 1);
+    let kept = case.run(1).summary();
+    assert_eq!(kept["certificates"], checked["certificates"]);
+}
+
+#[test]
+fn effects_that_are_absent_leave_their_certificates_null() {
+    let checked = check(&Case::square(8).without("contact"), 1);
+    for name in ["theta", "theta_step", "trace_norm_squared", "monotonicity_constant"] {
+        assert!(checked["certificates"][name].is_null(), "{name}");
+    }
+    let inviscid = Case::square(8).without("material.viscosity").set("time.step", "0.001");
+    assert!(check(&inviscid, 1)["certificates"]["theta"].is_null());
+}
+
+/// Kinetic energy at the last step of a run of 40 steps that accepts whatever stability says.
+fn kinetic_energy_after(step: f64) -> f64 {
+    let case = Case::square(8)
+        .without("contact")
+        .without("material.viscoplasticity")
+        .without("traction")
+        .set("initial.velocity", "['0', '1e-3*sin(50*x)*cos(40*y)']")
+        .set("solver.accept", "['explicit_stability']")
+        .set("time.step", &format!("{step:?}"))
+        .set("time.end", &format!("{:?}", 40.0 * step));
+    case.run(1).table("history.csv").last("kinetic_energy")
+}
+
+#[test]
+fn steps_grow_without_bound_exactly_beyond_the_certified_one() {
+    let bound = certificate(&check(&Case::square(8), 1), "explicit_step_bound");
+    assert!(kinetic_energy_after(0.95 * bound) < 1e-6);
+    assert!(kinetic_energy_after(1.3 * bound) > 1.0);
+}
+
+#[test]
+fn a_step_beyond_a_bound_is_refused_with_the_largest_one_and_runs_if_accepted() {
+    let unstable = Case::square(8).set("time.step", "0.125");
+    unstable.run_with(2, &[]).expect(2).says("is beyond 1.208").says("explicit_stability");
+    let several = Case::square(8).set("contact.0.normal.damped_response.slopes", "[10.0, -90.0, 10.0]");
+    let refused =
+        several.run_with(2, &[]).expect(2).says("may have several solutions").says("\"uniqueness\"");
+    let words = refused.stderr.split("the largest step with one solution is ").nth(1).expect("a step");
+    let largest: f64 = words.split_whitespace().next().expect("a number").parse().expect("a number");
+    let at = |step: f64| {
+        let case = Case::square(8)
+            .set("contact.0.normal.damped_response.slopes", "[10.0, -90.0, 10.0]")
+            .set("solver.accept", "['uniqueness']")
+            .set("time.step", &format!("{step:?}"));
+        certificate(&check(&case, 1), "theta_step")
+    };
+    close(at(largest), 1.0, 2e-4, "theta of the largest step");
+    let accepted =
+        several.set("solver.accept", "['uniqueness', 'explicit_stability']").set("time.step", "0.01");
+    let results: Results = accepted.run(1);
+    assert!(results.text("run.log").contains("accepted by the job"));
+}
