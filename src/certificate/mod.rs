@@ -8,7 +8,8 @@
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or `4 lambda` over the largest eigenvalue of `E` if that is less | steps beyond it grow without bound |
 //!
 //! `m_j` is the steepest fall of a contact graph, `m_A` the smallest eigenvalue of the viscosity. Suprema run over
-//! velocities that the supports allow. Numerically they are approached from below.
+//! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
+//! viscosity, `m_A` is 0 and `theta` has no meaning.
 
 mod ascent;
 mod forms;
@@ -55,7 +56,7 @@ impl Certificates {
         scheme: &mut LaggedEuler,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.graph.monotonicity_constant());
-        let viscous = body.has_form(Form::Viscosity);
+        let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
             viscosity_modulus: body.smallest_viscosity(),
             monotonicity_constant: falls.reduce(f64::max),
@@ -84,7 +85,7 @@ impl Certificates {
         state: &State,
         scheme: &mut LaggedEuler,
     ) -> Result<Option<f64>> {
-        if !body.has_form(Form::Mass) {
+        if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
         }
         Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep)?))

@@ -42,7 +42,8 @@ impl Case {
             .set("output.probe", probes)
     }
 
-    fn from(file: &Path) -> Self {
+    /// A job of the repository with 16 steps a second.
+    pub fn from(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).expect("job");
         let job = Value::Table(text.parse::<Table>().expect("TOML"));
         Self { folder: tempfile::tempdir().expect("folder"), job }

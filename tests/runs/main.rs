@@ -9,6 +9,7 @@ mod launch;
 mod outputs;
 mod ranks;
 mod readers;
+mod regions;
 mod restart;
 mod results;
 mod signals;

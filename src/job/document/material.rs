@@ -95,7 +95,8 @@ pub enum Metric {
     Frobenius,
 }
 
-/// A part of the body, named by a physical group of the mesh, with its own material.
+/// A part of the body, named by a physical group of the mesh, with its own material: all its effects stand here, none is
+/// taken over from the main material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {

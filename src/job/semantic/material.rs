@@ -1,6 +1,6 @@
 //! Materials: effects that need each other, and what depends on the dimension.
 
-use super::{Findings, items};
+use super::{Findings, MeshNames, items};
 use crate::job::document::{Elasticity, Hypothesis, Viscosity};
 
 /// Poisson's ratio above which P1 elements lock.
@@ -17,7 +17,8 @@ pub fn check(findings: &mut Findings<'_>) {
     for path in materials(findings) {
         let Some(material) = root.find(&path) else { continue };
         let present = |key: &str| material.child(key).is_some();
-        if !["density", "elasticity", "viscosity"].into_iter().any(present) {
+        let may_be_empty = path == "material" && root.count("region") > 0;
+        if !may_be_empty && !["density", "elasticity", "viscosity"].into_iter().any(present) {
             let message =
                 format!("[{path}] resists nothing: it has neither density, elasticity nor viscosity");
             findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
@@ -39,6 +40,20 @@ pub fn check(findings: &mut Findings<'_>) {
             findings.fault(&key, format!("two regions are called \"{name}\""), "give each its own name");
         }
         seen.push(name);
+    }
+}
+
+/// Cells that no region names are of the main material, which may be empty where there are none.
+pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    let root = findings.root;
+    let names: Vec<String> =
+        items(root, "region").into_iter().filter_map(|r| root.read(&format!("{r}.name"))).collect();
+    let Some(material) = root.find("material") else { return };
+    let resists = ["density", "elasticity", "viscosity"].into_iter().any(|key| material.child(key).is_some());
+    let other = mesh.regions.iter().find(|region| !names.iter().any(|name| name == *region));
+    if let (Some(other), false, false) = (other, resists, names.is_empty()) {
+        let message = format!("the region \"{other}\" of the mesh is of [material], which resists nothing");
+        findings.fault("material", message, "add density, elasticity or viscosity, or a [[region]] for it");
     }
 }
 
