@@ -72,7 +72,10 @@ impl Case {
     pub fn without(mut self, key: &str) -> Self {
         let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
         let parts = parent.split('.').filter(|part| !part.is_empty());
-        let table = parts.fold(&mut self.job, |node, part| &mut node[part]);
+        let table = parts.fold(&mut self.job, |node, part| match part.parse::<usize>() {
+            Ok(position) => &mut node[position],
+            Err(_) => &mut node[part],
+        });
         table.as_table_mut().expect(key).remove(name);
         self
     }

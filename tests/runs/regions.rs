@@ -30,9 +30,11 @@ fn regions_of_the_same_material_are_the_body_of_one_material_to_the_last_bit() {
     let results = one.run(2);
     for (case, what) in [(two, "tread"), (named, "tread and core")] {
         let other = case.run(2);
-        for name in ["probes.csv", "history.csv", "profiles.csv"] {
+        for name in ["probes.csv", "profiles.csv"] {
             assert_eq!(results.text(name), other.text(name), "{what}: {name}");
         }
+        // Energies are summed batch by batch, and batches end where the region does.
+        assert_same_answer(&results, &other, 1e-12, what);
         assert_eq!(results.summary()["certificates"], other.summary()["certificates"], "{what}");
         assert_eq!(results.summary()["inventory"], other.summary()["inventory"], "{what}");
     }
@@ -61,7 +63,8 @@ fn an_effect_may_be_in_one_region_only() {
             if lacking != "viscoplasticity" {
                 case = case.without(&format!("{place}.{lacking}"));
             }
-            let results = case.set("solver.accept", "['explicit_stability']").run(2);
+            let case = case.set("solver.accept", "['explicit_stability']");
+            let results = case.run(2);
             let what = format!("{place} without {lacking}");
             assert!(results.number("max_energy_imbalance") < 1e-9, "{what}");
             let certificates = &results.summary()["certificates"];
@@ -76,8 +79,8 @@ fn a_run_with_regions_goes_on_on_another_number_of_ranks() {
     let straight = (straight.run(1), straight);
     for (writers, readers) in [(1, 2), (2, 3), (3, 1)] {
         let case = wheel().set("solver.tolerance", "1e-13");
-        case.run_with(writers, &["--set", "time.end=0.0225"]).expect(0);
-        case.run_with(readers, &["--restart"]).expect(0).says("(step 4, t = 0.02 s)");
+        case.run_with(writers, &["--set", "time.end=0.025"]).expect(0);
+        case.run_with(readers, &["--restart"]).expect(0).says("going on from");
         let what = format!("saved on {writers} ranks, gone on on {readers}");
         assert_same_answer(&straight.0, &case.results(), 1e-8, &what);
     }
