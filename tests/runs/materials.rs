@@ -36,7 +36,8 @@ fn energy_balances_to_rounding_under_every_law() {
             cases.push(("plane stress", square("plane_stress")));
         }
         for (place, case) in cases {
-            let results = case.set(LAW, law).set("solver.tolerance", "1e-12").run(2);
+            let case = case.set(LAW, law).set("solver.tolerance", "1e-12");
+            let results = case.run(2);
             let imbalance = results.number("max_energy_imbalance");
             assert!(imbalance < 1e-10, "{name} in {place}: {imbalance:e}");
             let taken_up = results.table("history.csv").last("viscoplastic_dissipation");
