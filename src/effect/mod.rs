@@ -2,6 +2,7 @@
 //!
 //! Each effect takes part in the phases it names in [`Effect::phases`]; the others never call it.
 
+mod cell_history;
 mod contact;
 mod elastic_stress;
 mod energy;

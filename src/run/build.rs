@@ -8,8 +8,11 @@ use crate::{
         Traction, ViscoplasticHistory, ViscousStress, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw, Viscoplasticity},
-    material::{ByMaterial, Elasticity, Hypothesis, Isotropic, Metric, Perzyna},
+    job::{self, Fix, Job, Material, Named, NormalLaw},
+    material::{
+        ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
+        Viscoplasticity,
+    },
     mesh::Mesh,
     session::Session,
     space::Geometry,
@@ -99,30 +102,54 @@ fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>)
     ByMaterial::new(materials.iter().map(|m| law(m)).collect())
 }
 
-fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
-    let elasticity = material.elasticity.as_ref()?;
-    let law =
-        Elasticity { youngs_modulus: elasticity.youngs_modulus, poisson_ratio: elasticity.poisson_ratio };
-    Some(ElasticLaw { tensor: law.tensor(hypothesis(S)), with_history: material.viscoplasticity.is_some() })
+fn elasticity(e: &job::Elasticity) -> Elasticity {
+    Elasticity { youngs_modulus: e.youngs_modulus, poisson_ratio: e.poisson_ratio }
 }
 
-fn flow_law<const S: usize>(material: &Material) -> Result<Option<Perzyna>> {
+fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
+    let tensor = elasticity(material.elasticity.as_ref()?).tensor(hypothesis(S));
+    Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
+}
+
+fn flow_law<const S: usize>(material: &Material) -> Result<Option<Viscoplasticity>> {
     let Some(viscoplasticity) = &material.viscoplasticity else { return Ok(None) };
-    let Some(elastic) = elastic_law::<S>(material) else {
+    let Some(elasticity) = material.elasticity.as_ref().map(elasticity) else {
         return Err(Error::Refused("viscoplasticity needs elasticity in the same material".into()));
     };
-    let Viscoplasticity::Perzyna(p) = viscoplasticity;
+    let tensor = elasticity.tensor(hypothesis(S));
+    Ok(Some(match viscoplasticity {
+        job::Viscoplasticity::Perzyna(p) => perzyna(p, tensor),
+        job::Viscoplasticity::Maxwell(m) => {
+            let volumetric = m.volumetric_relaxation_time;
+            let law = Maxwell::new(elasticity, hypothesis(S), m.relaxation_time, volumetric);
+            Viscoplasticity::Maxwell(law)
+        }
+        job::Viscoplasticity::DruckerPrager(d) => Viscoplasticity::DruckerPrager(DruckerPrager {
+            relaxation: d.relaxation,
+            friction_coefficient: d.friction_coefficient,
+            cohesion: d.cohesion,
+            elasticity: tensor,
+        }),
+    }))
+}
+
+fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
     let metric = match p.metric {
         job::Metric::Elasticity => Metric::Elasticity,
         job::Metric::Compliance => Metric::Compliance,
         job::Metric::Frobenius => Metric::Frobenius,
     };
-    Ok(Some(Perzyna {
+    let law = Perzyna {
         relaxation: p.relaxation,
         yield_stress: p.yield_stress,
-        elasticity: elastic.tensor,
+        exponent: p.exponent,
+        elasticity,
         metric,
-    }))
+    };
+    match p.hardening_modulus {
+        Some(modulus) => Viscoplasticity::Hardening(Hardening { perzyna: law, modulus }),
+        None => Viscoplasticity::Perzyna(law),
+    }
 }
 
 /// The law of a contact as a graph.

@@ -6,6 +6,7 @@ mod effects;
 mod failures;
 mod hdf5_file;
 mod launch;
+mod materials;
 mod outputs;
 mod ranks;
 mod readers;

@@ -1,7 +1,7 @@
 //! Materials: effects that need each other, and what depends on the dimension.
 
 use super::{Findings, MeshNames, items};
-use crate::job::document::{Elasticity, Hypothesis, Viscosity};
+use crate::job::document::{Elasticity, Hypothesis, Perzyna, Viscosity};
 
 /// Poisson's ratio above which P1 elements lock.
 const LOCKING: f64 = 0.45;
@@ -26,6 +26,15 @@ pub fn check(findings: &mut Findings<'_>) {
         if present("viscoplasticity") && !present("elasticity") {
             let message = "viscoplasticity without elasticity has no stress to relax";
             findings.fault(&format!("{path}.viscoplasticity"), message, format!("add [{path}.elasticity]"));
+        }
+        if let Some(Perzyna { yield_stress, exponent, .. }) =
+            root.read(&format!("{path}.viscoplasticity.perzyna"))
+            && yield_stress == 0.0
+            && exponent != 1.0
+        {
+            let message = "a power of the overstress over the yield stress needs a positive yield stress";
+            let help = "give a positive yield_stress, or leave exponent out";
+            findings.fault(&format!("{path}.viscoplasticity.perzyna.exponent"), message, help);
         }
         if path != "material" && present("hypothesis") {
             let message = "the hypothesis holds for the whole body";
@@ -74,6 +83,11 @@ pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         findings.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
     }
     for path in materials(findings) {
+        let cone = format!("{path}.viscoplasticity.drucker_prager");
+        if hypothesis == Some(Hypothesis::PlaneStress) && root.find(&cone).is_some() {
+            let message = "Drucker and Prager's law is not for plane stress";
+            findings.fault(&cone, message, "take hypothesis = \"plane_strain\", a 3D body or another law");
+        }
         if let Some(Viscosity { volumetric, shear }) = root.read(&format!("{path}.viscosity")) {
             let modulus = dimension as f64 * volumetric + shear;
             if modulus <= 0.0 && shear > 0.0 {
