@@ -31,8 +31,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The constant matrix of a step of this length. Collective.
     pub fn matrix(&self, session: &Session, step_length: f64) -> Result<BlockRows> {
         let effects: Vec<_> = self.effects.iter().filter(|e| e.phases().matrix).collect();
+        let mut runs = self.geometry.runs.iter().copied().peekable();
         assemble(session, &self.mesh, &self.geometry, &self.fixed, |cell, geometry, matrix| {
-            effects.iter().for_each(|effect| effect.add_matrix(cell, geometry, step_length, matrix));
+            while runs.next_if(|run| run.first + run.count <= cell).is_some() {}
+            let Some(material) = runs.peek().map(|run| run.material) else { return };
+            effects.iter().for_each(|effect| effect.add_matrix(material, geometry, step_length, matrix));
         })
     }
 
@@ -71,6 +74,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().any(|e| e.form() == Some(form))
     }
 
+    /// Whether effects stand for this form in all of the body.
+    pub fn has_form_everywhere(&self, form: Form) -> bool {
+        self.effects.iter().any(|e| e.form() == Some(form) && e.is_everywhere())
+    }
+
     /// Adds `F x` of a form to `forces`; both with ghosts, held components not yet zeroed.
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         let needs =
@@ -87,7 +95,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         });
     }
 
-    /// The smallest eigenvalue of the viscosity in Pa s, if there is viscosity.
+    /// The smallest eigenvalue of the viscosity in Pa s, if there is viscosity; 0 where it is not everywhere.
     pub fn smallest_viscosity(&self) -> Option<f64> {
         self.effects.iter().filter_map(|e| e.viscosity_modulus()).reduce(f64::min)
     }

@@ -5,10 +5,11 @@
 //! | `theta` | sup of `sum m_j int w_nu^2` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
 //! | `theta_step` | the same over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
-//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or `4 lambda` over the largest eigenvalue of `E` if that is less | steps beyond it grow without bound |
+//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
 //!
 //! `m_j` is the steepest fall of a contact graph, `m_A` the smallest eigenvalue of the viscosity. Suprema run over
-//! velocities that the supports allow. Numerically they are approached from below.
+//! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
+//! viscosity, `m_A` is 0 and `theta` has no meaning.
 
 mod ascent;
 mod forms;
@@ -55,7 +56,7 @@ impl Certificates {
         scheme: &mut LaggedEuler,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.graph.monotonicity_constant());
-        let viscous = body.has_form(Form::Viscosity);
+        let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
             viscosity_modulus: body.smallest_viscosity(),
             monotonicity_constant: falls.reduce(f64::max),
@@ -84,7 +85,7 @@ impl Certificates {
         state: &State,
         scheme: &mut LaggedEuler,
     ) -> Result<Option<f64>> {
-        if !body.has_form(Form::Mass) {
+        if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
         }
         Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep)?))

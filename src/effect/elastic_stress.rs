@@ -1,6 +1,6 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
-    material::Isotropic,
+    material::{ByMaterial, Isotropic},
     space::{Batch, Needs},
     tensor::{add_scaled, dot},
 };
@@ -8,6 +8,13 @@ use crate::{
 /// Elastic stress of the displacement before the step: `E e(u_{n-1})` in (24).
 #[derive(Debug)]
 pub struct ElasticStress {
+    /// What the elastic materials are.
+    pub law: ByMaterial<ElasticLaw>,
+}
+
+/// An elastic material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticLaw {
     /// The elastic tensor `E` in Pa.
     pub tensor: Isotropic,
     /// Whether a history adds to the elastic stress, which then accounts for its energy.
@@ -25,19 +32,25 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
         Phases { matrix: false, explicit: Some(strain), energy: Some(both), stress: Some(both) }
     }
 
+    fn is_everywhere(&self) -> bool {
+        self.law.is_everywhere()
+    }
+
     fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material) else { return };
         for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &self.tensor.apply(strain));
+            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
         }
     }
 
     fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material) else { return };
         let strains = batch.strain.iter().zip(&batch.strain_rate);
         for (cell, (strain, rate)) in batch.cells.iter().zip(strains) {
-            if !self.with_history {
-                energy.elastic += 0.5 * cell.volume * dot(strain, &self.tensor.apply(strain));
+            if !law.with_history {
+                energy.elastic += 0.5 * cell.volume * dot(strain, &law.tensor.apply(strain));
             }
-            let lag = dot(rate, &self.tensor.apply(rate));
+            let lag = dot(rate, &law.tensor.apply(rate));
             energy.numerical += 0.5 * cell.volume * step.length * step.length * lag;
         }
     }
@@ -47,16 +60,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
     }
 
     fn add_form(&self, batch: &mut Batch<D, S>) {
+        let Some(law) = self.law.get(batch.material) else { return };
         for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, -1.0, &self.tensor.apply(rate));
+            *stress = add_scaled(stress, -1.0, &law.tensor.apply(rate));
         }
     }
 
     fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
+        let Some(law) = self.law.get(batch.material) else { return };
         let strains = batch.strain.iter().zip(&batch.strain_rate).take(batch.cells.len());
         for (stress, (strain, rate)) in batch.stress.iter_mut().zip(strains) {
             let before = add_scaled(strain, -step.length, rate);
-            *stress = add_scaled(stress, 1.0, &self.tensor.apply(&before));
+            *stress = add_scaled(stress, 1.0, &law.tensor.apply(&before));
         }
     }
 }

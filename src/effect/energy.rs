@@ -11,7 +11,8 @@ use std::ops::AddAssign;
 /// numerical = 1/2 |k E e(v_n)|^2 - 1/2 |v_n - v_{n-1}|^2_M - k (S_{n-1} - s_{n-1}):X + 1/2 |k E X|^2
 /// ```
 ///
-/// with `X = (s_{n-1} - P_K s_{n-1}) / (2 lambda)` and stresses measured by `E^-1`.
+/// with `X` the viscoplastic strain rate at `s_{n-1}`, `(s_{n-1} - P_K s_{n-1}) / (2 lambda)` in the paper, and stresses measured
+/// by `E^-1`. What hardening stores is part of the viscoplastic term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Kinetic energy at the end of the step.
@@ -20,7 +21,7 @@ pub struct Energy {
     pub elastic: f64,
     /// Dissipated by viscosity in the step.
     pub viscous: f64,
-    /// Dissipated by viscoplastic flow in the step.
+    /// Taken up by viscoplastic flow in the step: dissipated, or stored by hardening.
     pub viscoplastic: f64,
     /// Dissipated by contact in the step.
     pub contact: f64,

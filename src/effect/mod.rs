@@ -2,6 +2,7 @@
 //!
 //! Each effect takes part in the phases it names in [`Effect::phases`]; the others never call it.
 
+mod cell_history;
 mod contact;
 mod elastic_stress;
 mod energy;
@@ -12,7 +13,7 @@ mod viscoplastic_history;
 mod viscous_stress;
 
 pub use contact::{Contact, Quadrature};
-pub use elastic_stress::ElasticStress;
+pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
@@ -21,6 +22,7 @@ pub use viscoplastic_history::ViscoplasticHistory;
 pub use viscous_stress::ViscousStress;
 
 use crate::space::{Batch, CellMatrix, Needs, Simplex};
+use std::borrow::Cow;
 
 /// The step being taken, or the last one taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,10 +69,13 @@ pub trait Effect<const D: usize, const S: usize> {
     /// Where it takes part.
     fn phases(&self) -> Phases;
 
-    /// Adds its part of the matrix that multiplies the velocity in a step of this length.
+    /// Whether it is there in every material of the body.
+    fn is_everywhere(&self) -> bool;
+
+    /// Adds its part of the matrix that multiplies the velocity in a step of this length, for a cell of this material.
     fn add_matrix(
         &self,
-        _cell: usize,
+        _material: usize,
         _geometry: &Simplex<D>,
         _step_length: f64,
         _matrix: &mut CellMatrix<D>,
@@ -94,7 +99,7 @@ pub trait Effect<const D: usize, const S: usize> {
     /// Adds the force of its form to the batch: nodal force, or minus the stress; given velocity and strain rate.
     fn add_form(&self, _batch: &mut Batch<D, S>) {}
 
-    /// The smallest eigenvalue of its viscosity in Pa s, if it has one.
+    /// The smallest eigenvalue of its viscosity in Pa s over the whole body, if it is a viscosity.
     fn viscosity_modulus(&self) -> Option<f64> {
         None
     }
@@ -107,22 +112,24 @@ pub trait Effect<const D: usize, const S: usize> {
     /// Makes the trial history the converged one.
     fn commit(&mut self) {}
 
-    /// The converged history, if it keeps one: name and `width` values a cell.
-    fn history(&self) -> Option<History<'_>> {
-        None
+    /// The converged histories that it keeps.
+    fn histories(&self) -> Vec<History<'_>> {
+        Vec::new()
     }
 
-    /// Takes a saved history over, laid out as [`Effect::history`] gives it.
-    fn restore(&mut self, _values: &[f64]) {}
+    /// Takes a saved history of this name over, laid out as [`Effect::histories`] gives it.
+    fn restore(&mut self, _name: &str, _values: &[f64]) {}
 }
 
-/// Values that an effect keeps for every cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Values that an effect keeps for cells.
+#[derive(Debug, Clone, PartialEq)]
 pub struct History<'a> {
     /// Name in checkpoints and field files.
     pub name: &'static str,
     /// Values a cell.
     pub width: usize,
-    /// `width` values for each cell of this rank.
-    pub values: &'a [f64],
+    /// `width` values for each cell of this rank; zero for cells whose material keeps no such history.
+    pub values: Cow<'a, [f64]>,
+    /// Bytes that are kept in memory, trial values included.
+    pub bytes: usize,
 }

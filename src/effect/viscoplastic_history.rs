@@ -1,24 +1,58 @@
-use super::{Effect, Energy, History, Phases, Step};
+use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
 use crate::{
-    material::Perzyna,
-    space::{Batch, Needs},
+    material::{ByMaterial, Isotropic, Viscoplasticity},
+    space::{Batch, CellRun, Needs},
     tensor::{Mandel, add_scaled, dot},
 };
 
-/// The running sum `H_n = H_{n-1} + k G(s_{n-1})` of (24), one tensor a cell, converged and trial.
+/// The running sum `H_n = H_{n-1} + k G(s_{n-1})` of (24), one tensor for each cell that flows, and the viscoplastic strain
+/// that hardening cells accumulate.
 ///
 /// `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
 #[derive(Debug)]
 pub struct ViscoplasticHistory<const S: usize> {
-    law: Perzyna,
-    converged: Vec<Mandel<S>>,
-    trial: Vec<Mandel<S>>,
+    laws: ByMaterial<Viscoplasticity>,
+    stress: CellHistory<S>,
+    accumulated: Option<CellHistory<1>>,
 }
 
 impl<const S: usize> ViscoplasticHistory<S> {
-    /// No history yet, for this many cells.
-    pub fn new(law: Perzyna, cells: usize) -> Self {
-        Self { law, converged: vec![[0.0; S]; cells], trial: vec![[0.0; S]; cells] }
+    /// No history yet, for the cells of these runs whose material has a law.
+    pub fn new(laws: ByMaterial<Viscoplasticity>, runs: &[CellRun]) -> Self {
+        let flows = |material: usize| laws.get(material).is_some();
+        let hardens = |material: usize| laws.get(material).is_some_and(Viscoplasticity::hardens);
+        let stress = CellHistory::new("viscoplastic_history", runs, flows);
+        let accumulated = laws
+            .laws()
+            .any(Viscoplasticity::hardens)
+            .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
+        Self { laws, stress, accumulated }
+    }
+
+    /// Advances a batch by the strain rate that `flow` gives for a cell of the batch and its stress.
+    #[inline(always)]
+    fn advance<const D: usize>(
+        stress: &mut CellHistory<S>,
+        elasticity: &Isotropic,
+        step: Step,
+        batch: &mut Batch<D, S>,
+        energy: &mut Energy,
+        mut flow: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
+    ) {
+        let (converged, trial) = stress.both(batch.number);
+        for (at, (converged, trial)) in converged.iter().zip(trial).enumerate() {
+            let lag = elasticity.apply(&batch.strain_rate[at]);
+            let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, converged);
+            let lagged = add_scaled(&upper, -step.previous_length, &lag);
+            let flow = flow(at, &lagged);
+            let release = elasticity.apply(&flow);
+            *trial = add_scaled(converged, -step.length, &release);
+            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, trial);
+            let weight = batch.cells[at].volume * step.length;
+            energy.viscoplastic += weight * dot(&lagged, &flow);
+            energy.numerical +=
+                weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
+        }
     }
 }
 
@@ -33,52 +67,66 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         Phases { matrix: false, explicit: Some(both), energy: Some(strain), stress: Some(Needs::default()) }
     }
 
+    fn is_everywhere(&self) -> bool {
+        self.laws.is_everywhere()
+    }
+
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
-        let elasticity = &self.law.elasticity;
-        let range = batch.first..batch.first + batch.cells.len();
-        let histories = self.converged[range.clone()].iter().zip(&mut self.trial[range]);
-        for (at, (converged, trial)) in histories.enumerate() {
-            let lag = elasticity.apply(&batch.strain_rate[at]);
-            let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, converged);
-            let lagged = add_scaled(&upper, -step.previous_length, &lag);
-            let flow = self.law.strain_rate(&lagged);
-            let release = elasticity.apply(&flow);
-            *trial = add_scaled(converged, -step.length, &release);
-            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, trial);
-            let weight = batch.cells[at].volume * step.length;
-            energy.viscoplastic += weight * dot(&lagged, &flow);
-            energy.numerical +=
-                weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let (stress, elasticity) = (&mut self.stress, law.elasticity());
+        match law {
+            Viscoplasticity::Perzyna(law) => {
+                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+            }
+            Viscoplasticity::Maxwell(law) => {
+                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+            }
+            Viscoplasticity::DruckerPrager(law) => {
+                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+            }
+            Viscoplasticity::Hardening(law) => {
+                let Some(accumulated) = &mut self.accumulated else { return };
+                let (converged, trial) = accumulated.both(batch.number);
+                Self::advance(stress, elasticity, step, batch, energy, |at, s| {
+                    let (rate, growth) = law.strain_rate(s, converged[at][0]);
+                    trial[at][0] = converged[at][0] + step.length * growth;
+                    rate
+                });
+            }
         }
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
-        for (at, cell) in batch.cells.iter().enumerate() {
-            let history = &self.converged[batch.first + at];
-            let stress = add_scaled(&self.law.elasticity.apply(&batch.strain[at]), 1.0, history);
-            energy.elastic += 0.5 * cell.volume * self.law.elasticity.inverse_square(&stress);
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let elasticity = law.elasticity();
+        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
+            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
+            energy.elastic += 0.5 * batch.cells[at].volume * elasticity.inverse_square(&stress);
         }
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        for at in 0..batch.cells.len() {
-            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &self.converged[batch.first + at]);
+        for (stress, history) in batch.stress.iter_mut().zip(self.stress.converged(batch.number)) {
+            *stress = add_scaled(stress, 1.0, history);
         }
     }
 
     fn flow_step_bound(&self) -> Option<f64> {
-        Some(4.0 * self.law.relaxation / self.law.elasticity.largest_modulus::<S>())
+        self.laws.laws().map(|law| 2.0 / law.fastest_rate::<S>()).reduce(f64::min)
     }
 
     fn commit(&mut self) {
-        std::mem::swap(&mut self.converged, &mut self.trial);
+        self.stress.commit();
+        self.accumulated.iter_mut().for_each(CellHistory::commit);
     }
 
-    fn history(&self) -> Option<History<'_>> {
-        Some(History { name: "viscoplastic_history", width: S, values: self.converged.as_flattened() })
+    fn histories(&self) -> Vec<History<'_>> {
+        let accumulated = self.accumulated.as_ref().map(CellHistory::history);
+        std::iter::once(self.stress.history()).chain(accumulated).collect()
     }
 
-    fn restore(&mut self, values: &[f64]) {
-        self.converged.as_flattened_mut().copy_from_slice(values);
+    fn restore(&mut self, name: &str, values: &[f64]) {
+        self.stress.restore(name, values);
+        self.accumulated.iter_mut().for_each(|history| history.restore(name, values));
     }
 }

@@ -1,6 +1,6 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
-    material::Viscosity,
+    material::{ByMaterial, Viscosity},
     space::{Batch, CellMatrix, Needs, Simplex},
     tensor::{add_scaled, dot},
 };
@@ -9,7 +9,7 @@ use crate::{
 #[derive(Debug)]
 pub struct ViscousStress {
     /// The viscosity tensor `A` in Pa s.
-    pub tensor: Viscosity,
+    pub tensor: ByMaterial<Viscosity>,
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
@@ -22,13 +22,20 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         Phases { matrix: true, explicit: None, energy: Some(rate), stress: Some(rate) }
     }
 
-    fn add_matrix(&self, _cell: usize, geometry: &Simplex<D>, _step_length: f64, matrix: &mut CellMatrix<D>) {
-        matrix.add_isotropic(geometry, self.tensor.volumetric, self.tensor.shear);
+    fn is_everywhere(&self) -> bool {
+        self.tensor.is_everywhere()
+    }
+
+    fn add_matrix(&self, material: usize, cell: &Simplex<D>, _step_length: f64, matrix: &mut CellMatrix<D>) {
+        if let Some(tensor) = self.tensor.get(material) {
+            matrix.add_isotropic(cell, tensor.volumetric, tensor.shear);
+        }
     }
 
     fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(tensor) = self.tensor.get(batch.material) else { return };
         for (cell, rate) in batch.cells.iter().zip(&batch.strain_rate) {
-            energy.viscous += step.length * cell.volume * dot(rate, &self.tensor.apply(rate));
+            energy.viscous += step.length * cell.volume * dot(rate, &tensor.apply(rate));
         }
     }
 
@@ -37,18 +44,21 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
     }
 
     fn add_form(&self, batch: &mut Batch<D, S>) {
+        let Some(tensor) = self.tensor.get(batch.material) else { return };
         for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, -1.0, &self.tensor.apply(rate));
+            *stress = add_scaled(stress, -1.0, &tensor.apply(rate));
         }
     }
 
     fn viscosity_modulus(&self) -> Option<f64> {
-        Some(self.tensor.smallest_modulus::<S>())
+        let smallest = self.tensor.laws().map(Viscosity::smallest_modulus::<S>).reduce(f64::min);
+        if self.tensor.is_everywhere() { smallest } else { smallest.map(|modulus| modulus.min(0.0)) }
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
+        let Some(tensor) = self.tensor.get(batch.material) else { return };
         for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &self.tensor.apply(rate));
+            *stress = add_scaled(stress, 1.0, &tensor.apply(rate));
         }
     }
 }

@@ -5,7 +5,6 @@ use super::source::{Node, Value};
 
 /// Path (`*` is any position in a list), the word that is not available (or any), and what it is called.
 const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
-    ("region.*", None, "a region with its own material is"),
     ("contact.*.normal.compliance", None, "normal compliance is"),
     ("contact.*.normal.unilateral", None, "unilateral contact is"),
     ("contact.*.friction.tresca", None, "Tresca friction is"),

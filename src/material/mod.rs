@@ -1,7 +1,17 @@
 //! Material laws: pure functions at a point.
 
+mod by_material;
+mod drucker_prager;
+mod hardening;
 mod isotropic;
+mod maxwell;
 mod perzyna;
+mod viscoplasticity;
 
+pub use by_material::ByMaterial;
+pub use drucker_prager::DruckerPrager;
+pub use hardening::Hardening;
 pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};
+pub use maxwell::Maxwell;
 pub use perzyna::{Metric, Perzyna};
+pub use viscoplasticity::Viscoplasticity;

@@ -8,6 +8,12 @@
 //! squared norm is `p²/2 + 3 (q² + r²)/2` and every isotropic metric is diagonal, `a` on `p` and `b` on `q`, `r`. The
 //! stationary point is `p a/(a + m)`, `(q, r) b/(b + 3 m)` with the multiplier `m >= 0` that puts it on the surface: one
 //! scalar, monotone equation, solved by Newton's method on the reciprocal of the norm.
+//!
+//! Power law: with the overstress `f = von Mises norm - yield stress` the rate is
+//! `1/(2 lambda) (f / yield stress)^(n - 1) (s - P_K s)`, the paper's for `n = 1`. Where the projection is radial, this is
+//! Perzyna's `<f / yield stress>^n` along the deviator (P. Perzyna, Fundamental problems in viscoplasticity, Advances in
+//! Applied Mechanics 9 (1966), 243-377; E. de Souza Neto, D. Peric, D. Owen, Computational Methods for Plasticity, 2008,
+//! chapter 11), with a viscosity that does not depend on `n` at `f = yield stress`.
 
 use super::Isotropic;
 use crate::tensor::{Mandel, dot, normal_components, trace, von_mises};
@@ -31,6 +37,8 @@ pub struct Perzyna {
     pub relaxation: f64,
     /// Uniaxial yield stress in Pa, not negative.
     pub yield_stress: f64,
+    /// `n`, at least 1; 1 unless the yield stress is positive.
+    pub exponent: f64,
     /// The elastic tensor `E`.
     pub elasticity: Isotropic,
     /// Metric of the projection.
@@ -38,7 +46,7 @@ pub struct Perzyna {
 }
 
 impl Perzyna {
-    /// `(s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s: zero inside the yield surface.
+    /// `(f / yield stress)^(n - 1) (s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s: zero inside the yield surface.
     ///
     /// The stress rate is `G(s) = -E` of it, the dissipation `s :` it.
     #[inline]
@@ -48,12 +56,21 @@ impl Perzyna {
         if norm <= self.yield_stress {
             return out;
         }
-        let factor = 0.5 / self.relaxation;
+        let mut factor = 0.5 / self.relaxation;
+        if self.exponent != 1.0 {
+            factor *= (norm / self.yield_stress - 1.0).powf(self.exponent - 1.0);
+        }
         let projected = self.project_outside(s, norm);
         for c in 0..S {
             out[c] = factor * (s[c] - projected[c]);
         }
         out
+    }
+
+    /// The fastest relaxation in 1/s: largest eigenvalue of the derivative of `-G`, for `n > 1` at an overstress of the yield
+    /// stress.
+    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+        self.exponent * self.elasticity.largest_modulus::<S>() / (2.0 * self.relaxation)
     }
 
     /// `P_K s`, the closest stress with von Mises norm at most the yield stress.
@@ -137,7 +154,13 @@ mod tests {
     const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
 
     fn law(metric: Metric, hypothesis: Hypothesis) -> Perzyna {
-        Perzyna { relaxation: 100.0, yield_stress: 19.0, elasticity: PAPER.tensor(hypothesis), metric }
+        Perzyna {
+            relaxation: 100.0,
+            yield_stress: 19.0,
+            exponent: 1.0,
+            elasticity: PAPER.tensor(hypothesis),
+            metric,
+        }
     }
 
     #[test]
@@ -171,6 +194,33 @@ mod tests {
         let rate = law(Metric::Frobenius, Hypothesis::Space).strain_rate(&[31.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert!((rate[0] - 8.0 / 200.0).abs() < 1e-15, "{rate:?}");
         assert!((rate[1] + 4.0 / 200.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn power_law_rate_by_hand() {
+        // Overstress 12 of 19: the linear law's 8 / 200 is scaled by (12 / 19)^(n - 1).
+        let stress = [31.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut law = law(Metric::Frobenius, Hypothesis::Space);
+        for exponent in [1.0, 2.0, 3.5] {
+            law.exponent = exponent;
+            let expected = 8.0 / 200.0 * (12.0f64 / 19.0).powf(exponent - 1.0);
+            assert!((law.strain_rate(&stress)[0] - expected).abs() < 1e-15, "{exponent}");
+        }
+        assert_eq!(law.strain_rate(&[18.9, 0.0, 0.0, 0.0, 0.0, 0.0]), [0.0; 6]);
+    }
+
+    #[test]
+    fn no_rate_changes_faster_than_the_fastest() {
+        // Along the deviator: d/ds of the rate, times the elastic shear modulus, at twice the yield stress.
+        for exponent in [1.0, 3.0] {
+            let law = Perzyna { exponent, ..law(Metric::Compliance, Hypothesis::Space) };
+            let stress = |size: f64| [0.0, 0.0, 0.0, 0.0, 0.0, size * 38.0 / 1.5f64.sqrt()];
+            let change = (law.strain_rate(&stress(1.0 + 1e-6))[5] - law.strain_rate(&stress(1.0 - 1e-6))[5])
+                / (stress(1.0 + 1e-6)[5] - stress(1.0 - 1e-6)[5]);
+            let rate = law.elasticity.shear * change;
+            assert!((rate / (exponent * law.elasticity.shear / 200.0) - 1.0).abs() < 1e-6);
+            assert!(rate <= law.fastest_rate::<6>());
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     body::Body,
+    effect::History,
     error::{Error, Exit, Result},
     job::differing_keys,
     petsc::DistributedVector,
@@ -85,8 +86,13 @@ pub fn save<const D: usize, const S: usize>(
     let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
     let mut tables: Vec<Table> =
         nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
-    let histories = body.effects.iter().filter_map(|e| e.history());
-    tables.extend(histories.map(|h| Table { name: h.name, set: "cells", width: h.width, values: h.values }));
+    let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+    tables.extend(histories.iter().map(|h| Table {
+        name: h.name,
+        set: "cells",
+        width: h.width,
+        values: &h.values,
+    }));
     checkpoint_file::write(path, session.world(), &header, &sets, &tables)
 }
 
@@ -110,9 +116,11 @@ pub fn restore<const D: usize, const S: usize>(
     }
     let cells = cell_ids(body);
     for effect in &mut body.effects {
-        let Some((name, width)) = effect.history().map(|h| (h.name, h.width)) else { continue };
-        let values = checkpoint.read("cells", body.mesh.total_cells as u64, &[(name, width)], &cells)?;
-        effect.restore(&values[0]);
+        let kept: Vec<(&str, usize)> = effect.histories().iter().map(|h| (h.name, h.width)).collect();
+        let values = checkpoint.read("cells", body.mesh.total_cells as u64, &kept, &cells)?;
+        for ((name, _), values) in kept.iter().zip(&values) {
+            effect.restore(name, values);
+        }
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     body::Body,
+    effect::History,
     error::{Error, Result},
     session::Session,
     state::State,
@@ -73,9 +74,10 @@ impl<const D: usize> FieldOutput<D> {
             Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
             Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
         ];
-        for history in body.effects.iter().filter_map(|e| e.history()) {
+        let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+        for history in &histories {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
-            fields.push(Field { name: history.name, place: Place::Cell, shape, values: history.values });
+            fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
         }
         self.0.write_step(state.time, &fields)
     }

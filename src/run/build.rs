@@ -4,12 +4,15 @@ use crate::{
     body::Body,
     contact::{DampedResponse, Graph, Symmetry},
     effect::{
-        BodyForce, Contact, Effect, ElasticStress, Held, Inertia, Load, Quadrature, Support, Traction,
-        ViscoplasticHistory, ViscousStress, fixed_components,
+        BodyForce, Contact, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load, Quadrature, Support,
+        Traction, ViscoplasticHistory, ViscousStress, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Named, NormalLaw, Viscoplasticity},
-    material::{Elasticity, Hypothesis, Isotropic, Metric, Perzyna},
+    job::{self, Fix, Job, Material, Named, NormalLaw},
+    material::{
+        ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
+        Viscoplasticity,
+    },
     mesh::Mesh,
     session::Session,
     space::Geometry,
@@ -24,11 +27,12 @@ pub(super) fn body<const D: usize, const S: usize>(
     job: &Job,
     mesh: Mesh<D>,
 ) -> Result<(Body<D, S>, State)> {
-    let geometry = Geometry::new(&mesh);
+    let (materials, of_region) = materials(session, job, &mesh);
+    let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = supports(job, &mesh);
     let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
-    let effects = session.agree(effects(job, mesh.cell_count()))?;
+    let effects = session.agree(effects(&materials, &geometry))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {
@@ -55,36 +59,97 @@ fn hypothesis(components: usize) -> Hypothesis {
     }
 }
 
-fn effects<const D: usize, const S: usize>(job: &Job, cells: usize) -> Result<Vec<Box<dyn Effect<D, S>>>> {
-    let material = &job.material;
+/// The materials that cells of the body are of, and for each region of the mesh the position of its own. Collective.
+fn materials<'a, const D: usize>(
+    session: &Session,
+    job: &'a Job,
+    mesh: &Mesh<D>,
+) -> (Vec<&'a Material>, Vec<usize>) {
+    let given: Vec<&Material> =
+        std::iter::once(&job.material).chain(job.region.iter().map(|r| &r.material)).collect();
+    let of_name = |name: &String| job.region.iter().position(|r| r.name == *name).map_or(0, |at| at + 1);
+    let named: Vec<usize> = mesh.regions.iter().map(of_name).collect();
+    let mut counts = vec![0; given.len()];
+    mesh.cell_regions.iter().for_each(|&region| counts[named[usize::from(region)]] += 1);
+    let used: Vec<usize> = (0..given.len()).filter(|&at| session.total(counts[at]) > 0).collect();
+    let of_region = named.iter().map(|at| used.iter().position(|u| u == at).unwrap_or(0)).collect();
+    (used.into_iter().map(|at| given[at]).collect(), of_region)
+}
+
+fn effects<const D: usize, const S: usize>(
+    materials: &[&Material],
+    geometry: &Geometry<D>,
+) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
-    if let Some(density) = material.density {
+    if let Some(density) = by_material(materials, |m| m.density) {
         effects.push(Box::new(Inertia { density }));
     }
-    let elasticity = material.elasticity.as_ref().map(|e| {
-        let law = Elasticity { youngs_modulus: e.youngs_modulus, poisson_ratio: e.poisson_ratio };
-        law.tensor(hypothesis(S))
-    });
-    if let Some(tensor) = elasticity {
-        effects.push(Box::new(ElasticStress { tensor, with_history: material.viscoplasticity.is_some() }));
+    if let Some(law) = by_material(materials, elastic_law::<S>) {
+        effects.push(Box::new(ElasticStress { law }));
     }
-    if let Some(v) = &material.viscosity {
-        let tensor = Isotropic { volumetric: v.volumetric, shear: v.shear };
+    let viscosity = |v: &job::Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear };
+    if let Some(tensor) = by_material(materials, |m| m.viscosity.as_ref().map(viscosity)) {
         effects.push(Box::new(ViscousStress { tensor }));
     }
-    if let Some(Viscoplasticity::Perzyna(p)) = &material.viscoplasticity {
-        let Some(elasticity) = elasticity else {
-            return Err(Error::Refused("[material.viscoplasticity] needs [material.elasticity]".into()));
-        };
-        let metric = match p.metric {
-            job::Metric::Elasticity => Metric::Elasticity,
-            job::Metric::Compliance => Metric::Compliance,
-            job::Metric::Frobenius => Metric::Frobenius,
-        };
-        let law = Perzyna { relaxation: p.relaxation, yield_stress: p.yield_stress, elasticity, metric };
-        effects.push(Box::new(ViscoplasticHistory::<S>::new(law, cells)));
+    let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
+    if let Some(laws) = ByMaterial::new(flow) {
+        effects.push(Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs)));
     }
     Ok(effects)
+}
+
+fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
+    ByMaterial::new(materials.iter().map(|m| law(m)).collect())
+}
+
+fn elasticity(e: &job::Elasticity) -> Elasticity {
+    Elasticity { youngs_modulus: e.youngs_modulus, poisson_ratio: e.poisson_ratio }
+}
+
+fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
+    let tensor = elasticity(material.elasticity.as_ref()?).tensor(hypothesis(S));
+    Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
+}
+
+fn flow_law<const S: usize>(material: &Material) -> Result<Option<Viscoplasticity>> {
+    let Some(viscoplasticity) = &material.viscoplasticity else { return Ok(None) };
+    let Some(elasticity) = material.elasticity.as_ref().map(elasticity) else {
+        return Err(Error::Refused("viscoplasticity needs elasticity in the same material".into()));
+    };
+    let tensor = elasticity.tensor(hypothesis(S));
+    Ok(Some(match viscoplasticity {
+        job::Viscoplasticity::Perzyna(p) => perzyna(p, tensor),
+        job::Viscoplasticity::Maxwell(m) => {
+            let volumetric = m.volumetric_relaxation_time;
+            let law = Maxwell::new(elasticity, hypothesis(S), m.relaxation_time, volumetric);
+            Viscoplasticity::Maxwell(law)
+        }
+        job::Viscoplasticity::DruckerPrager(d) => Viscoplasticity::DruckerPrager(DruckerPrager {
+            relaxation: d.relaxation,
+            friction_coefficient: d.friction_coefficient,
+            cohesion: d.cohesion,
+            elasticity: tensor,
+        }),
+    }))
+}
+
+fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
+    let metric = match p.metric {
+        job::Metric::Elasticity => Metric::Elasticity,
+        job::Metric::Compliance => Metric::Compliance,
+        job::Metric::Frobenius => Metric::Frobenius,
+    };
+    let law = Perzyna {
+        relaxation: p.relaxation,
+        yield_stress: p.yield_stress,
+        exponent: p.exponent,
+        elasticity,
+        metric,
+    };
+    match p.hardening_modulus {
+        Some(modulus) => Viscoplasticity::Hardening(Hardening { perzyna: law, modulus }),
+        None => Viscoplasticity::Perzyna(law),
+    }
 }
 
 /// The law of a contact as a graph.

@@ -25,8 +25,8 @@ impl Inventory {
         scheme: &LaggedEuler,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        for history in body.effects.iter().filter_map(|e| e.history()) {
-            let bytes = session.total(2 * size_of_val(history.values));
+        for history in body.effects.iter().flat_map(|e| e.histories()) {
+            let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }
         let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();

@@ -2,7 +2,7 @@
 
 use crate::{
     error::Result,
-    job::{self, Fix, Job, Loaded, MeshNames, Named},
+    job::{self, Fix, Job, Loaded, Material, MeshNames, Named},
     mesh::{
         GlobalMesh, Tags,
         generate::{Diagonal, box_mesh, rectangle},
@@ -79,6 +79,7 @@ pub(super) fn scene<const D: usize>(
     let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
     let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
     loaded.check_mesh(MeshNames { dimension: D, boundaries: &boundaries, regions: &regions })?;
+    refuse_empty_matrix(&mesh, loaded)?;
     let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
     let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
     mesh.claimed_twice(&supports, &contacts)
@@ -92,7 +93,7 @@ pub(super) fn scene<const D: usize>(
         ));
     }
     let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
-    if loaded.job.material.density.is_none() {
+    if mesh.regions.iter().any(|region| material_of(&loaded.job, region).density.is_none()) {
         refuse_free_bodies(&mesh, &topology, loaded)?;
     }
     let dual = topology.dual_graph();
@@ -126,6 +127,12 @@ fn refuse_free_bodies<const D: usize>(
             }
         }
     }
+    // What has mass moves by its inertia: no motion of it is free.
+    for (cell, &region) in mesh.cell_regions.iter().enumerate() {
+        if material_of(&loaded.job, &mesh.regions[usize::from(region)]).density.is_some() {
+            mesh.cell(cell).iter().for_each(|&node| fixed[node as usize] = [true; D]);
+        }
+    }
     let free = free_motions(mesh, &topology.bodies(), &|node| fixed[node]);
     if free.is_empty() {
         return Ok(());
@@ -134,23 +141,33 @@ fn refuse_free_bodies<const D: usize>(
     Err(loaded.fault(
         key,
         format!(
-            "without [material] density the problem is quasistatic, and these motions are free: {}",
+            "without density the problem is quasistatic, and these motions are free: {}",
             free.join("; ")
         ),
         "add supports that hold them, or give a density",
     ))
 }
 
-/// A fault if the scheme can't move the body at all.
-pub(super) fn refuse_empty_matrix(loaded: &Loaded) -> Result<()> {
-    let material = &loaded.job.material;
-    if material.density.is_none() && material.viscosity.is_none() {
-        return Err(loaded.fault(
-            "time.scheme",
-            "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity nothing \
-             determines the velocity",
-            "give [material] density or [material.viscosity]",
-        ));
+/// The material of a region of the mesh.
+fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
+    job.region.iter().find(|r| r.name == region).map_or(&job.material, |r| &r.material)
+}
+
+/// A fault if the scheme can't move some material at all.
+fn refuse_empty_matrix<const D: usize>(mesh: &GlobalMesh<D>, loaded: &Loaded) -> Result<()> {
+    for region in &mesh.regions {
+        let material = material_of(&loaded.job, region);
+        if material.density.is_none() && material.viscosity.is_none() {
+            let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
+            return Err(loaded.fault(
+                "time.scheme",
+                format!(
+                    "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity \
+                     nothing determines the velocity{place}"
+                ),
+                "give [material] density or [material.viscosity]",
+            ));
+        }
     }
     Ok(())
 }

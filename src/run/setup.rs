@@ -1,6 +1,6 @@
 //! What a run starts from and a check describes: nothing of it touches the output folder.
 
-use super::{Scene, build, scene::refuse_empty_matrix};
+use super::{Scene, build};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},
@@ -32,7 +32,6 @@ pub(super) fn setup<const D: usize, const S: usize>(
     scene: Option<Scene<D>>,
 ) -> Result<Setup<D, S>> {
     let job = &loaded.job;
-    session.agree(refuse_empty_matrix(loaded))?;
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }

@@ -1,4 +1,6 @@
 //! Passes over cells in batches that stay in cache: gather nodal values, let the effects work, scatter forces.
+//!
+//! A batch is of one material, so that effects look their law up once a batch.
 
 use super::{Geometry, Simplex};
 use crate::{
@@ -6,7 +8,7 @@ use crate::{
     tensor::{Mandel, Vector, component, symmetric_part},
 };
 
-/// Cells of a batch.
+/// Most cells of a batch.
 pub const BATCH: usize = 128;
 
 /// What a pass gathers for its effects.
@@ -48,6 +50,10 @@ pub struct Nodal<'a> {
 /// A run of cells with their gathered inputs and the outputs that effects add to.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
+    /// Position among the runs of the geometry.
+    pub number: usize,
+    /// Position among the body's materials.
+    pub material: usize,
     /// Local number of the first cell.
     pub first: usize,
     /// Geometry of the cells of the batch.
@@ -76,6 +82,8 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         mut visit: impl FnMut(&mut Self),
     ) {
         let mut batch = Self {
+            number: 0,
+            material: 0,
             first: 0,
             cells: &[],
             strain: vec![[0.0; S]; if needs.strain { BATCH } else { 0 }],
@@ -85,11 +93,11 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             stress: vec![[0.0; S]; BATCH],
             force: vec![[0.0; D]; BATCH * (D + 1)],
         };
-        for (number, cells) in geometry.cells.chunks(BATCH).enumerate() {
-            batch.first = number * BATCH;
-            batch.cells = cells;
-            batch.stress.fill([0.0; S]);
-            batch.force.fill([0.0; D]);
+        for (number, run) in geometry.runs.iter().enumerate() {
+            (batch.number, batch.material, batch.first) = (number, run.material, run.first);
+            batch.cells = &geometry.cells[run.first..run.first + run.count];
+            batch.stress[..run.count].fill([0.0; S]);
+            batch.force[..run.count * (D + 1)].fill([0.0; D]);
             batch.gather(mesh, nodal, needs);
             visit(&mut batch);
         }

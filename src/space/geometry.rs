@@ -1,5 +1,6 @@
 //! Volumes and shape function gradients of cells, computed once.
 
+use super::BATCH;
 use crate::{
     mesh::{Mesh, shape},
     tensor::Vector,
@@ -79,17 +80,35 @@ fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     out
 }
 
+/// Cells of one material that follow each other, at most a batch of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellRun {
+    /// Local number of the first cell.
+    pub first: usize,
+    /// Number of cells.
+    pub count: usize,
+    /// Position among the body's materials.
+    pub material: usize,
+}
+
 /// The cells of a rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry<const D: usize> {
     /// One a cell, in the order of the mesh.
     pub cells: Vec<Simplex<D>>,
+    /// All cells in their order, cut where the material changes: the batches of every pass.
+    pub runs: Vec<CellRun>,
 }
 
 impl<const D: usize> Geometry<D> {
-    /// Measures every cell of the mesh.
+    /// Measures every cell of a body of one material.
     pub fn new(mesh: &Mesh<D>) -> Self {
-        let cells = mesh
+        Self::with_materials(mesh, |_| 0)
+    }
+
+    /// Measures every cell of the mesh; `material` tells that of a region of the mesh.
+    pub fn with_materials(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
+        let cells: Vec<Simplex<D>> = mesh
             .cells
             .chunks_exact(D + 1)
             .map(|nodes| {
@@ -100,7 +119,15 @@ impl<const D: usize> Geometry<D> {
                 Simplex::new(&corners[..=D])
             })
             .collect();
-        Self { cells }
+        let mut runs: Vec<CellRun> = Vec::new();
+        for cell in 0..cells.len() {
+            let material = mesh.cell_regions.get(cell).map_or(0, |&region| material(usize::from(region)));
+            match runs.last_mut() {
+                Some(run) if run.material == material && run.count < BATCH => run.count += 1,
+                _ => runs.push(CellRun { first: cell, count: 1, material }),
+            }
+        }
+        Self { cells, runs }
     }
 }
 
@@ -122,6 +149,23 @@ mod tests {
                 assert!((gradient[i][j] - matrix[i][j]).abs() < 1e-13);
             }
         }
+    }
+
+    #[test]
+    fn cells_are_visited_in_runs_of_one_material_and_of_at_most_a_batch() {
+        let cell_regions: Vec<u16> = (0..BATCH + 5).map(|cell| u16::from((3..5).contains(&cell))).collect();
+        let mesh = Mesh::<2> {
+            nodes: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+            cells: [0, 1, 2].repeat(cell_regions.len()),
+            cell_regions,
+            ..Mesh::default()
+        };
+        let runs = |geometry: Geometry<2>| -> Vec<(usize, usize, usize)> {
+            geometry.runs.iter().map(|run| (run.first, run.count, run.material)).collect()
+        };
+        let two = runs(Geometry::with_materials(&mesh, |region| 1 - region));
+        assert_eq!(two, [(0, 3, 1), (3, 2, 0), (5, BATCH, 1)]);
+        assert_eq!(runs(Geometry::new(&mesh)), [(0, BATCH, 0), (BATCH, 5, 0)]);
     }
 
     #[test]

@@ -42,7 +42,8 @@ impl Case {
             .set("output.probe", probes)
     }
 
-    fn from(file: &Path) -> Self {
+    /// A job of the repository with 16 steps a second.
+    pub fn from(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).expect("job");
         let job = Value::Table(text.parse::<Table>().expect("TOML"));
         Self { folder: tempfile::tempdir().expect("folder"), job }
@@ -71,7 +72,10 @@ impl Case {
     pub fn without(mut self, key: &str) -> Self {
         let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
         let parts = parent.split('.').filter(|part| !part.is_empty());
-        let table = parts.fold(&mut self.job, |node, part| &mut node[part]);
+        let table = parts.fold(&mut self.job, |node, part| match part.parse::<usize>() {
+            Ok(position) => &mut node[position],
+            Err(_) => &mut node[part],
+        });
         table.as_table_mut().expect(key).remove(name);
         self
     }

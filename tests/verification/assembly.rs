@@ -5,7 +5,7 @@ use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};
 use clarke::{
     body::Body,
     effect::{Effect, Held, Inertia, ViscousStress},
-    material::Isotropic,
+    material::{ByMaterial, Isotropic},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
@@ -152,7 +152,10 @@ fn held_components<const D: usize, const S: usize>(session: &Session, body: &Bod
 }
 
 fn effects<const D: usize, const S: usize>() -> Vec<Box<dyn Effect<D, S>>> {
-    vec![Box::new(Inertia { density: DENSITY }), Box::new(ViscousStress { tensor: VISCOSITY })]
+    vec![
+        Box::new(Inertia { density: ByMaterial::uniform(DENSITY) }),
+        Box::new(ViscousStress { tensor: ByMaterial::uniform(VISCOSITY) }),
+    ]
 }
 
 fn entries<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, held: &[(&str, Held)]) {
@@ -184,7 +187,8 @@ fn rigid<const D: usize>(number: usize, x: &[f64; D]) -> [f64; D] {
 }
 
 fn rigid_motions<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
-    let viscous: Vec<Box<dyn Effect<D, S>>> = vec![Box::new(ViscousStress { tensor: VISCOSITY })];
+    let viscous: Vec<Box<dyn Effect<D, S>>> =
+        vec![Box::new(ViscousStress { tensor: ByMaterial::uniform(VISCOSITY) })];
     let (body, state) = body::<D, S>(session, whole, &[], viscous);
     let rows = body.matrix(session, STEP).expect("assembled");
     let matrix = Matrix::symmetric(D, &rows).expect("matrix");
@@ -202,7 +206,8 @@ fn rigid_motions<const D: usize, const S: usize>(session: &Session, whole: &Glob
 }
 
 fn total_mass<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, volume: f64) {
-    let inertia: Vec<Box<dyn Effect<D, S>>> = vec![Box::new(Inertia { density: DENSITY })];
+    let inertia: Vec<Box<dyn Effect<D, S>>> =
+        vec![Box::new(Inertia { density: ByMaterial::uniform(DENSITY) })];
     let (body, state) = body::<D, S>(session, whole, &[], inertia);
     let rows = body.matrix(session, STEP).expect("assembled");
     let matrix = Matrix::symmetric(D, &rows).expect("matrix");

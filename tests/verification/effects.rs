@@ -3,9 +3,9 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, simulation};
 use clarke::{
-    effect::{Effect, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
+    effect::{Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
     job::Job,
-    material::Isotropic,
+    material::{ByMaterial, Isotropic},
     run::{Inventory, Simulation},
     session::Session,
     space::{Batch, CellMatrix, Simplex},
@@ -52,9 +52,19 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
         self.inner.phases()
     }
 
-    fn add_matrix(&self, cell: usize, geometry: &Simplex<D>, step_length: f64, matrix: &mut CellMatrix<D>) {
+    fn is_everywhere(&self) -> bool {
+        self.inner.is_everywhere()
+    }
+
+    fn add_matrix(
+        &self,
+        material: usize,
+        geometry: &Simplex<D>,
+        step_length: f64,
+        matrix: &mut CellMatrix<D>,
+    ) {
         self.note("matrix");
-        self.inner.add_matrix(cell, geometry, step_length, matrix);
+        self.inner.add_matrix(material, geometry, step_length, matrix);
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
@@ -95,7 +105,7 @@ fn seen_by<const D: usize, const S: usize>(
 
 fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
     let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
-        vec![Box::new(Watched { inner: Inertia { density: 1.0 }, seen: seen.clone() })]
+        vec![Box::new(Watched { inner: Inertia { density: ByMaterial::uniform(1.0) }, seen: seen.clone() })]
     });
     assert_eq!(
         seen.calls,
@@ -107,7 +117,10 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
 
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
     let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
-        vec![Box::new(Watched { inner: ViscousStress { tensor }, seen: seen.clone() })]
+        vec![Box::new(Watched {
+            inner: ViscousStress { tensor: ByMaterial::uniform(tensor) },
+            seen: seen.clone(),
+        })]
     });
     assert_eq!(
         seen.calls,
@@ -118,8 +131,11 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
 
     let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
         vec![
-            Box::new(Watched { inner: ElasticStress { tensor, with_history: false }, seen: seen.clone() }),
-            Box::new(ViscousStress { tensor }),
+            Box::new(Watched {
+                inner: ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) },
+                seen: seen.clone(),
+            }),
+            Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
         ]
     });
     assert_eq!(seen.calls, BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]), "elasticity");

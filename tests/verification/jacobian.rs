@@ -5,7 +5,7 @@ use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     contact::{DampedResponse, Graph, Symmetry},
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress},
-    material::Isotropic,
+    material::{ByMaterial, Isotropic},
     mesh::GlobalMesh,
     petsc::{Matrix, NonlinearProblem},
     session::Session,
@@ -28,8 +28,8 @@ fn laws() -> Vec<Graph> {
 
 fn differences<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let effects: Vec<Box<dyn Effect<D, S>>> = vec![
-        Box::new(Inertia { density: 2.0 }),
-        Box::new(ViscousStress { tensor: Isotropic { volumetric: 1.0, shear: 3.0 } }),
+        Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
+        Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
     ];
     let (body, state) = body::<D, S>(session, whole, &[("left", Held::All)], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");

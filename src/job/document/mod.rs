@@ -15,7 +15,10 @@ pub use contact::{
     Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Quadrature, SlipWeakening,
     Symmetry, Tresca, Unilateral,
 };
-pub use material::{Elasticity, Hypothesis, Material, Metric, Perzyna, Region, Viscoplasticity, Viscosity};
+pub use material::{
+    DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
+    Viscosity,
+};
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, Preconditioner, Scheme, Solver, Time};

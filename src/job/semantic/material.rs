@@ -1,7 +1,7 @@
 //! Materials: effects that need each other, and what depends on the dimension.
 
-use super::{Findings, items};
-use crate::job::document::{Elasticity, Hypothesis, Viscosity};
+use super::{Findings, MeshNames, items};
+use crate::job::document::{Elasticity, Hypothesis, Perzyna, Viscosity};
 
 /// Poisson's ratio above which P1 elements lock.
 const LOCKING: f64 = 0.45;
@@ -17,7 +17,8 @@ pub fn check(findings: &mut Findings<'_>) {
     for path in materials(findings) {
         let Some(material) = root.find(&path) else { continue };
         let present = |key: &str| material.child(key).is_some();
-        if !["density", "elasticity", "viscosity"].into_iter().any(present) {
+        let may_be_empty = path == "material" && root.count("region") > 0;
+        if !may_be_empty && !["density", "elasticity", "viscosity"].into_iter().any(present) {
             let message =
                 format!("[{path}] resists nothing: it has neither density, elasticity nor viscosity");
             findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
@@ -25,6 +26,15 @@ pub fn check(findings: &mut Findings<'_>) {
         if present("viscoplasticity") && !present("elasticity") {
             let message = "viscoplasticity without elasticity has no stress to relax";
             findings.fault(&format!("{path}.viscoplasticity"), message, format!("add [{path}.elasticity]"));
+        }
+        if let Some(Perzyna { yield_stress, exponent, .. }) =
+            root.read(&format!("{path}.viscoplasticity.perzyna"))
+            && yield_stress == 0.0
+            && exponent != 1.0
+        {
+            let message = "a power of the overstress over the yield stress needs a positive yield stress";
+            let help = "give a positive yield_stress, or leave exponent out";
+            findings.fault(&format!("{path}.viscoplasticity.perzyna.exponent"), message, help);
         }
         if path != "material" && present("hypothesis") {
             let message = "the hypothesis holds for the whole body";
@@ -39,6 +49,20 @@ pub fn check(findings: &mut Findings<'_>) {
             findings.fault(&key, format!("two regions are called \"{name}\""), "give each its own name");
         }
         seen.push(name);
+    }
+}
+
+/// Cells that no region names are of the main material, which may be empty where there are none.
+pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+    let root = findings.root;
+    let names: Vec<String> =
+        items(root, "region").into_iter().filter_map(|r| root.read(&format!("{r}.name"))).collect();
+    let Some(material) = root.find("material") else { return };
+    let resists = ["density", "elasticity", "viscosity"].into_iter().any(|key| material.child(key).is_some());
+    let other = mesh.regions.iter().find(|region| !names.iter().any(|name| name == *region));
+    if let (Some(other), false, false) = (other, resists, names.is_empty()) {
+        let message = format!("the region \"{other}\" of the mesh is of [material], which resists nothing");
+        findings.fault("material", message, "add density, elasticity or viscosity, or a [[region]] for it");
     }
 }
 
@@ -59,6 +83,11 @@ pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         findings.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
     }
     for path in materials(findings) {
+        let cone = format!("{path}.viscoplasticity.drucker_prager");
+        if hypothesis == Some(Hypothesis::PlaneStress) && root.find(&cone).is_some() {
+            let message = "Drucker and Prager's law is not for plane stress";
+            findings.fault(&cone, message, "take hypothesis = \"plane_strain\", a 3D body or another law");
+        }
         if let Some(Viscosity { volumetric, shear }) = root.read(&format!("{path}.viscosity")) {
             let modulus = dimension as f64 * volumetric + shear;
             if modulus <= 0.0 && shear > 0.0 {

@@ -5,11 +5,11 @@ use crate::job::document::Diagonal;
 use crate::job::source::Node;
 
 const RECTANGLE: MeshNames<'static> =
-    MeshNames { dimension: 2, boundaries: &["left", "right", "bottom", "top"], regions: &[] };
+    MeshNames { dimension: 2, boundaries: &["left", "right", "bottom", "top"], regions: &["body"] };
 const CUBOID: MeshNames<'static> = MeshNames {
     dimension: 3,
     boundaries: &["left", "right", "front", "back", "bottom", "top"],
-    regions: &[],
+    regions: &["body"],
 };
 
 /// The names of a generated mesh; `None` for a file, or if the job leaves it open which it is.

@@ -65,6 +65,7 @@ pub fn check_names<'a>(root: &'a Node, names: MeshNames<'_>) -> Findings<'a> {
 
 fn check_with_mesh(findings: &mut Findings<'_>, names: MeshNames<'_>) {
     material::check_dimension(findings, names.dimension);
+    material::check_names(findings, names);
     boundary::check_names(findings, names);
     contact::check_names(findings, names);
     output::check_names(findings, names);

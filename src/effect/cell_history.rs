@@ -1,0 +1,107 @@
+use super::History;
+use crate::space::CellRun;
+use std::borrow::Cow;
+
+/// Values of the cells of some materials, `W` a cell, converged and trial. Other cells take no storage.
+#[derive(Debug)]
+pub(super) struct CellHistory<const W: usize> {
+    name: &'static str,
+    /// Each run of cells with the position of its first value, if its material keeps any.
+    runs: Vec<(CellRun, Option<usize>)>,
+    converged: Vec<[f64; W]>,
+    trial: Vec<[f64; W]>,
+}
+
+impl<const W: usize> CellHistory<W> {
+    /// Zeros for the cells of materials that `keeps`; nothing if there is no such material here or elsewhere.
+    pub fn new(name: &'static str, runs: &[CellRun], keeps: impl Fn(usize) -> bool) -> Self {
+        let mut kept = 0;
+        let runs = runs
+            .iter()
+            .map(|run| {
+                let start = keeps(run.material).then_some(kept);
+                kept += start.map_or(0, |_| run.count);
+                (*run, start)
+            })
+            .collect();
+        Self { name, runs, converged: vec![[0.0; W]; kept], trial: vec![[0.0; W]; kept] }
+    }
+
+    /// Converged values of a run of cells that keeps some.
+    #[inline]
+    pub fn converged(&self, run: usize) -> &[[f64; W]] {
+        let (run, start) = &self.runs[run];
+        start.map_or(&[], |start| &self.converged[start..start + run.count])
+    }
+
+    /// Converged and trial values of a run of cells that keeps some.
+    #[inline]
+    pub fn both(&mut self, run: usize) -> (&[[f64; W]], &mut [[f64; W]]) {
+        let (run, start) = &self.runs[run];
+        match *start {
+            Some(start) => {
+                let range = start..start + run.count;
+                (&self.converged[range.clone()], &mut self.trial[range])
+            }
+            None => (&[], &mut []),
+        }
+    }
+
+    /// Makes the trial values the converged ones.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.converged, &mut self.trial);
+    }
+
+    /// The converged values for files.
+    pub fn history(&self) -> History<'_> {
+        let cells = self.runs.last().map_or(0, |(run, _)| run.first + run.count);
+        let values = if self.converged.len() == cells {
+            Cow::Borrowed(self.converged.as_flattened())
+        } else {
+            let mut all = vec![[0.0; W]; cells];
+            for (number, (run, _)) in self.runs.iter().enumerate() {
+                let kept = self.converged(number);
+                all[run.first..run.first + kept.len()].copy_from_slice(kept);
+            }
+            Cow::Owned(all.into_flattened())
+        };
+        History { name: self.name, width: W, values, bytes: 2 * size_of_val(&self.converged[..]) }
+    }
+
+    /// Takes values over, if they are of this name.
+    pub fn restore(&mut self, name: &str, values: &[f64]) {
+        if name != self.name {
+            return;
+        }
+        for (run, start) in &self.runs {
+            if let Some(start) = *start {
+                let target = self.converged[start..start + run.count].as_flattened_mut();
+                target.copy_from_slice(&values[run.first * W..][..run.count * W]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_kept_where_needed_and_written_for_all_cells() {
+        let run = |first, count, material| CellRun { first, count, material };
+        let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
+        let mut history = CellHistory::<2>::new("h", &runs, |material| material == 0);
+        assert_eq!(history.converged(1).len(), 0);
+        history.both(2).1[1] = [7.0, 8.0];
+        history.commit();
+        let written = history.history();
+        assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
+        assert_eq!(written.bytes, 2 * 4 * 2 * 8);
+        let values = written.values.into_owned();
+        let mut other = CellHistory::<2>::new("h", &runs, |material| material == 0);
+        other.restore("another", &values);
+        assert_eq!(other.converged(2)[1], [0.0, 0.0]);
+        other.restore("h", &values);
+        assert_eq!(other.converged(2)[1], [7.0, 8.0]);
+    }
+}

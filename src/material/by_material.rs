@@ -1,0 +1,46 @@
+//! Which material has which law.
+
+/// A law for each of the body's materials, or none where the material lacks it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ByMaterial<T>(Vec<Option<T>>);
+
+impl<T> ByMaterial<T> {
+    /// One entry a material; nothing where no material has the law.
+    pub fn new(laws: Vec<Option<T>>) -> Option<Self> {
+        laws.iter().any(Option::is_some).then_some(Self(laws))
+    }
+
+    /// The law of a body of one material.
+    pub fn uniform(law: T) -> Self {
+        Self(vec![Some(law)])
+    }
+
+    /// The law of a material.
+    #[inline(always)]
+    pub fn get(&self, material: usize) -> Option<&T> {
+        self.0[material].as_ref()
+    }
+
+    /// Whether every material has one.
+    pub fn is_everywhere(&self) -> bool {
+        self.0.iter().all(Option::is_some)
+    }
+
+    /// All laws there are.
+    pub fn laws(&self) -> impl Iterator<Item = &T> {
+        self.0.iter().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ByMaterial;
+
+    #[test]
+    fn a_law_that_no_material_has_does_not_exist() {
+        assert_eq!(ByMaterial::<f64>::new(vec![None, None]), None);
+        let some = ByMaterial::new(vec![None, Some(2.0)]).expect("a law");
+        assert_eq!((some.get(0), some.get(1), some.is_everywhere()), (None, Some(&2.0), false));
+        assert!(ByMaterial::uniform(1.0).is_everywhere());
+    }
+}

@@ -1,0 +1,105 @@
+//! Linear isotropic hardening of Perzyna's law.
+//!
+//! The yield stress grows with the accumulated viscoplastic strain `p`: `yield stress + h p`, with hardening modulus `h` and
+//! `dp/dt = s : X / von Mises norm of s`, the equivalent rate that does the work of `X`. Where the projection is radial this is
+//! `sqrt(2/3 X : X)`. Of the work `s : X` the part `h p dp/dt` is stored, `h p² / 2` in all; the rest,
+//! `(von Mises norm - h p) dp/dt >= yield stress dp/dt >= 0`, is dissipated.
+//! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3.)
+
+use super::Perzyna;
+use crate::tensor::{Mandel, dot, von_mises};
+
+/// A Perzyna law whose yield stress grows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hardening {
+    /// The law before any flow.
+    pub perzyna: Perzyna,
+    /// `h` in Pa, not negative.
+    pub modulus: f64,
+}
+
+impl Hardening {
+    /// The viscoplastic strain rate in 1/s and `dp/dt` in 1/s, after so much accumulated strain `p`.
+    #[inline]
+    pub fn strain_rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+        let yield_stress = self.perzyna.yield_stress + self.modulus * accumulated;
+        let rate = Perzyna { yield_stress, ..self.perzyna }.strain_rate(s);
+        let work = dot(s, &rate);
+        (rate, if work > 0.0 { work / von_mises(s) } else { 0.0 })
+    }
+
+    /// The fastest relaxation in 1/s of stress beyond the yield stress, which rises to meet it.
+    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+        // dp/dt is at most this much of overstress / (2 lambda): radial flow, or equibiaxial plane stress.
+        let share = if S == 3 { 2.0 } else { 2.0 / 3.0 };
+        let rise = self.perzyna.exponent * share * self.modulus / (2.0 * self.perzyna.relaxation);
+        self.perzyna.fastest_rate::<S>() + rise
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Elasticity, Hypothesis, Metric};
+    use proptest::prelude::*;
+
+    fn law(hypothesis: Hypothesis, modulus: f64) -> Hardening {
+        let elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 }.tensor(hypothesis);
+        let perzyna = Perzyna {
+            relaxation: 100.0,
+            yield_stress: 19.0,
+            exponent: 1.0,
+            elasticity,
+            metric: Metric::Compliance,
+        };
+        Hardening { perzyna, modulus }
+    }
+
+    #[test]
+    fn uniaxial_rates_by_hand() {
+        // s = 31 with p = 0.05 and h = 100: yield stress 24, overstress 7; dev s (62/3, ..) 7/31 / 200.
+        let (rate, growth) =
+            law(Hypothesis::Space, 100.0).strain_rate(&[31.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.05);
+        assert!((rate[0] - 14.0 / 3.0 / 200.0).abs() < 1e-15);
+        assert!((growth - rate[0]).abs() < 1e-15, "uniaxial flow accumulates itself");
+        let equivalent = (2.0 / 3.0 * dot(&rate, &rate)).sqrt();
+        assert!((growth - equivalent).abs() < 1e-15);
+    }
+
+    #[test]
+    fn hardened_stress_flows_no_more() {
+        let (rate, growth) =
+            law(Hypothesis::Space, 100.0).strain_rate(&[31.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.13);
+        assert_eq!((rate, growth), ([0.0; 6], 0.0));
+    }
+
+    #[test]
+    fn without_a_modulus_it_is_perzynas_law_to_the_last_bit() {
+        let law = law(Hypothesis::PlaneStress, 0.0);
+        let s = [31.0, -4.0, 7.0];
+        assert_eq!(law.strain_rate(&s, 3.0).0, law.perzyna.strain_rate(&s));
+        assert_eq!(law.fastest_rate::<3>(), law.perzyna.fastest_rate::<3>());
+    }
+
+    fn check<const S: usize>(hypothesis: Hypothesis, s: &Mandel<S>, accumulated: f64) {
+        let law = law(hypothesis, 100.0);
+        let (rate, growth) = law.strain_rate(s, accumulated);
+        let dissipated = dot(s, &rate) - law.modulus * accumulated * growth;
+        assert!(growth >= 0.0 && dissipated >= 19.0 * growth * (1.0 - 1e-12), "dissipation");
+        let overstress = von_mises(s) - 19.0 - 100.0 * accumulated;
+        let share = if S == 3 { 2.0 } else { 2.0 / 3.0 };
+        assert!(growth <= share * overstress.max(0.0) / 200.0 * (1.0 + 1e-9), "{growth} {overstress}");
+    }
+
+    proptest! {
+        #[test]
+        fn hardening_dissipates_what_it_does_not_store(
+            s in proptest::array::uniform6(-200.0f64..200.0),
+            accumulated in 0.0f64..2.0,
+        ) {
+            check(Hypothesis::PlaneStress, &[s[0], s[1], s[3]], accumulated);
+            check(Hypothesis::PlaneStrain, &[s[0], s[1], s[2], s[3]], accumulated);
+            check(Hypothesis::Space, &s, accumulated);
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! The choice among viscoplastic laws.
+
+use super::{DruckerPrager, Hardening, Isotropic, Maxwell, Perzyna};
+
+/// A law `G(s) = -E X(s)` of stress that relaxes by flow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Viscoplasticity {
+    /// Overstress law with the von Mises yield set.
+    Perzyna(Perzyna),
+    /// The same with a yield stress that grows.
+    Hardening(Hardening),
+    /// Linear relaxation.
+    Maxwell(Maxwell),
+    /// Overstress law with a yield stress that depends on pressure.
+    DruckerPrager(DruckerPrager),
+}
+
+impl Viscoplasticity {
+    /// The elastic tensor `E`.
+    pub fn elasticity(&self) -> &Isotropic {
+        match self {
+            Self::Perzyna(law) => &law.elasticity,
+            Self::Hardening(law) => &law.perzyna.elasticity,
+            Self::Maxwell(law) => &law.elasticity,
+            Self::DruckerPrager(law) => &law.elasticity,
+        }
+    }
+
+    /// Whether the law accumulates viscoplastic strain.
+    pub fn hardens(&self) -> bool {
+        matches!(self, Self::Hardening(_))
+    }
+
+    /// The fastest relaxation in 1/s. Explicit steps of more than twice its inverse make stress grow.
+    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+        match self {
+            Self::Perzyna(law) => law.fastest_rate::<S>(),
+            Self::Hardening(law) => law.fastest_rate::<S>(),
+            Self::Maxwell(law) => law.fastest_rate::<S>(),
+            Self::DruckerPrager(law) => law.fastest_rate::<S>(),
+        }
+    }
+}
