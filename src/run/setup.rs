@@ -48,7 +48,15 @@ pub(super) fn setup<const D: usize, const S: usize>(
             other => other,
         });
     let mut scheme = session.agree(scheme)?;
-    scheme.prepare_length(session, &body, job.time.step)?;
+    let prepared = scheme.prepare_length(session, &body, job.time.step).map_err(|error| match error {
+        Error::Internal(words) => loaded.fault(
+            "material",
+            format!("the equations of a step can't be solved: {words}"),
+            "see whether density and viscosity, in SI units, are of sensible size for this mesh and step",
+        ),
+        other => other,
+    });
+    session.agree(prepared)?;
     let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme))?;
     let unique_step = if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
