@@ -29,7 +29,10 @@ fn jobs() -> Vec<PathBuf> {
 }
 
 fn run(job: &Path, ranks: usize, output: &Path) -> Result<(), String> {
+    // Launchers that share this folder race to make and remove it.
+    let own = tempfile::tempdir().map_err(|error| format!("folder: {error}"))?;
     let run = Command::new("mpirun")
+        .env("OMPI_MCA_orte_tmpdir_base", own.path())
         .args([
             "--oversubscribe",
             "--bind-to",

@@ -15,7 +15,10 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
 }
 
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
+    // Launchers that share this folder race to make and remove it.
+    let own = tempfile::tempdir().expect("folder");
     Command::new("mpirun")
+        .env("OMPI_MCA_orte_tmpdir_base", own.path())
         .args(["--oversubscribe", "--bind-to", "none", "--timeout", "120", "-n", &ranks.to_string()])
         .arg(std::env::current_exe().expect("this program"))
         .args(["--ignored", "--exact", "scenario", "--nocapture", "--test-threads", "1"])

@@ -100,6 +100,8 @@ pub enum Target {
 
 /// A run that goes on.
 pub struct Running {
+    /// Open MPI's own folder: launchers that share one race to make and remove it.
+    _own: tempfile::TempDir,
     launcher: Child,
     mark: String,
     began: Instant,
@@ -118,6 +120,8 @@ impl Running {
     fn spawn(mut command: Command) -> Self {
         static NUMBER: AtomicUsize = AtomicUsize::new(0);
         let mark = format!("{}.{}.", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+        let own = tempfile::tempdir().expect("folder");
+        command.env("OMPI_MCA_orte_tmpdir_base", own.path());
         command.env(MARK, &mark).env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
         if is_root() {
             command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
@@ -126,7 +130,7 @@ impl Running {
         let mut launcher = command.spawn().expect("mpirun starts");
         let stdout = Collected::from(launcher.stdout.take().expect("stdout"));
         let stderr = Collected::from(launcher.stderr.take().expect("stderr"));
-        Self { launcher, mark, began: Instant::now(), stdout, stderr }
+        Self { _own: own, launcher, mark, began: Instant::now(), stdout, stderr }
     }
 
     /// Waits until the run has said this.
