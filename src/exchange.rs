@@ -1,52 +1,77 @@
 //! Messages between ranks whose sizes only the sender knows.
 
+use crate::{
+    agreement::agree,
+    error::{Error, Result},
+};
 use mpi::{
+    Count,
     datatype::{Equivalence, Partition, PartitionMut},
-    topology::{Communicator, SimpleCommunicator},
+    topology::SimpleCommunicator,
     traits::CommunicatorCollectives,
 };
 
-/// Sends `outgoing[r]` to rank `r` and gives what each rank sent here. Collective.
+/// Sends `counts[r]` of the numbers, one rank after the other, to rank `r`; gives what came, in the order of the ranks,
+/// and how many numbers from each. Collective, with the same outcome on all ranks.
 ///
-/// Counts are 32-bit in MPI: the sum over ranks of what one rank sends or receives must stay below 2^31 items.
-pub fn exchange<T>(world: &SimpleCommunicator, outgoing: &[Vec<T>]) -> Vec<Vec<T>>
-where
-    T: Equivalence + Copy + Default,
-{
-    let ranks = usize::try_from(world.size()).unwrap_or(1);
-    let sent: Vec<i32> = outgoing.iter().map(|m| count(m.len())).collect();
-    let mut received = vec![0i32; ranks];
-    world.all_to_all_into(&sent[..], &mut received[..]);
-    let flat: Vec<T> = outgoing.concat();
-    let (sent_at, _) = starts(&sent);
-    let (received_at, total) = starts(&received);
-    let mut incoming = vec![T::default(); total];
-    {
-        let send = Partition::new(&flat[..], &sent[..], &sent_at[..]);
-        let mut receive = PartitionMut::new(&mut incoming[..], &received[..], &received_at[..]);
-        world.all_to_all_varcount_into(&send, &mut receive);
-    }
-    let mut rest = &incoming[..];
-    received
-        .iter()
-        .map(|&n| {
-            let (mine, others) = rest.split_at(usize::try_from(n).unwrap_or(0));
-            rest = others;
-            mine.to_vec()
-        })
-        .collect()
+/// Fails where one rank sends or receives 2^31 numbers or more: MPI counts in 32 bits.
+pub fn exchange<T: Equivalence + Copy + Default>(
+    communicator: &SimpleCommunicator,
+    numbers: &[T],
+    counts: &[usize],
+) -> Result<(Vec<T>, Vec<usize>)> {
+    let mut received_counts = vec![0_u64; counts.len()];
+    let sent_counts: Vec<u64> = counts.iter().map(|count| *count as u64).collect();
+    communicator.all_to_all_into(&sent_counts[..], &mut received_counts[..]);
+    let received_counts: Vec<usize> = received_counts.into_iter().map(|count| count as usize).collect();
+
+    let both = mpi_counts(counts).and_then(|sent| Ok((sent, mpi_counts(&received_counts)?)));
+    let ((send_counts, send_offsets), (take_counts, take_offsets)) = agree(communicator, both)?;
+    let mut received = vec![T::default(); received_counts.iter().sum()];
+    communicator.all_to_all_varcount_into(
+        &Partition::new(numbers, &send_counts[..], &send_offsets[..]),
+        &mut PartitionMut::new(&mut received[..], &take_counts[..], &take_offsets[..]),
+    );
+    Ok((received, received_counts))
 }
 
-fn count(length: usize) -> i32 {
-    i32::try_from(length).expect("a message between two ranks stays below 2^31 items")
+/// As [`exchange`], with a list for each rank.
+pub fn exchange_lists<T: Equivalence + Copy + Default>(
+    communicator: &SimpleCommunicator,
+    lists: &[Vec<T>],
+) -> Result<Vec<T>> {
+    let counts: Vec<usize> = lists.iter().map(Vec::len).collect();
+    Ok(exchange(communicator, &lists.concat(), &counts)?.0)
 }
 
-fn starts(counts: &[i32]) -> (Vec<i32>, usize) {
-    let mut at = Vec::with_capacity(counts.len());
-    let mut total = 0usize;
-    for &n in counts {
-        at.push(count(total));
-        total += usize::try_from(n).unwrap_or(0);
+/// Where each of the counted parts starts.
+pub fn offsets(counts: &[usize]) -> Vec<usize> {
+    counts.iter().scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
+}
+
+fn mpi_counts(counts: &[usize]) -> Result<(Vec<Count>, Vec<Count>)> {
+    let narrow = |numbers: &[usize]| numbers.iter().map(|number| Count::try_from(*number)).collect();
+    let total: usize = counts.iter().sum();
+    match (narrow(counts), narrow(&offsets(counts)), Count::try_from(total)) {
+        (Ok(counts), Ok(offsets), Ok(_)) => Ok((counts, offsets)),
+        _ => Err(Error::Failed(format!(
+            "a rank has to exchange {total} numbers at once, more than MPI can count: use more ranks"
+        ))),
     }
-    (at, total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_start_where_the_parts_before_end() {
+        assert_eq!(offsets(&[2, 0, 3]), [0, 2, 2]);
+    }
+
+    #[test]
+    fn more_numbers_than_mpi_can_count_are_refused_in_words() {
+        let error = mpi_counts(&[1 << 30, 1 << 30]).expect_err("too many").to_string();
+        assert!(error.contains("use more ranks"), "{error}");
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::{
     contact::Graph,
+    error::Result,
     mesh::{Mesh, shape::facet_normal},
     session::Session,
     space::{facet_rule, surface_points},
@@ -113,15 +114,15 @@ impl<const D: usize> Contact<D> {
         quadrature: Quadrature,
         graph: Graph,
         fixed: &[bool],
-    ) -> Self {
+    ) -> Result<Self> {
         let points = match quadrature {
-            Quadrature::Nodal => surface_points(session, mesh, facets)
+            Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
                 .map(|p| Point::new(&[p.node], &[1.0], p.normal, p.weight, fixed))
                 .collect(),
             Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, fixed)).collect(),
         };
-        Self { graph, facets: facets.to_vec(), points, needs_ghosts: quadrature == Quadrature::Gauss }
+        Ok(Self { graph, facets: facets.to_vec(), points, needs_ghosts: quadrature == Quadrature::Gauss })
     }
 
     /// Whether velocities of ghost nodes are read and forces on them written.

@@ -36,13 +36,13 @@ impl<const D: usize> Profiles<D> {
         session: &Session,
         body: &Body<D, S>,
         boundaries: &[(String, Option<usize>)],
-    ) -> Self {
+    ) -> Result<Self> {
         let prepare = |(name, contact): &(String, Option<usize>)| {
             let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
-            let points = surface_points(session, &body.mesh, &facets);
-            Profile { name: name.clone(), facets, points, contact: *contact }
+            let points = surface_points(session, &body.mesh, &facets)?;
+            Ok(Profile { name: name.clone(), facets, points, contact: *contact })
         };
-        Self { profiles: boundaries.iter().map(prepare).collect(), file: None }
+        Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, file: None })
     }
 
     /// Whether there is none.

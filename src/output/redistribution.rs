@@ -4,10 +4,9 @@
 
 use crate::agreement::agree;
 use crate::error::{Error, Result};
-use mpi::Count;
-use mpi::datatype::{Partition, PartitionMut};
+use crate::exchange::{exchange, offsets};
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::{Communicator, CommunicatorCollectives, Equivalence};
+use mpi::traits::Communicator;
 
 /// A plan that moves rows; made once for a pair of row orders, applied to any number of tables.
 pub struct Redistribution {
@@ -139,42 +138,6 @@ impl Grouped {
             next[rank] += 1;
         }
         Self { order, counts }
-    }
-}
-
-fn offsets(counts: &[usize]) -> Vec<usize> {
-    counts.iter().scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
-}
-
-/// Sends `counts[r]` numbers to rank `r`; returns what came and how many numbers from each rank.
-fn exchange<T: Equivalence + Copy + Default>(
-    communicator: &SimpleCommunicator,
-    numbers: &[T],
-    counts: &[usize],
-) -> Result<(Vec<T>, Vec<usize>)> {
-    let mut received_counts = vec![0_u64; counts.len()];
-    let sent_counts: Vec<u64> = counts.iter().map(|count| *count as u64).collect();
-    communicator.all_to_all_into(&sent_counts[..], &mut received_counts[..]);
-    let received_counts: Vec<usize> = received_counts.into_iter().map(|count| count as usize).collect();
-
-    let both = mpi_counts(counts).and_then(|sent| Ok((sent, mpi_counts(&received_counts)?)));
-    let ((send_counts, send_offsets), (take_counts, take_offsets)) = agree(communicator, both)?;
-    let mut received = vec![T::default(); received_counts.iter().sum()];
-    communicator.all_to_all_varcount_into(
-        &Partition::new(numbers, &send_counts[..], &send_offsets[..]),
-        &mut PartitionMut::new(&mut received[..], &take_counts[..], &take_offsets[..]),
-    );
-    Ok((received, received_counts))
-}
-
-fn mpi_counts(counts: &[usize]) -> Result<(Vec<Count>, Vec<Count>)> {
-    let narrow = |numbers: &[usize]| numbers.iter().map(|number| Count::try_from(*number)).collect();
-    let total: usize = counts.iter().sum();
-    match (narrow(counts), narrow(&offsets(counts)), Count::try_from(total)) {
-        (Ok(counts), Ok(offsets), Ok(_)) => Ok((counts, offsets)),
-        _ => Err(Error::Failed(format!(
-            "a rank has to exchange {total} numbers at once, more than MPI can count: use more ranks"
-        ))),
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
         let graph = session.agree(graph(&contact.normal))?;
-        contacts.push(Contact::new(session, &mesh, &facets, quadrature, graph, &fixed));
+        contacts.push(Contact::new(session, &mesh, &facets, quadrature, graph, &fixed)?);
     }
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;

@@ -59,7 +59,7 @@ impl<const D: usize> Outputs<D> {
         let start = Instant::now();
         let Wanted { identity, mut probes, goes_on } = wanted;
         let folder = job.output_folder().to_owned();
-        let mut profiles = profiles(session, body, job);
+        let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
         let mut history = None;
         let opened = if session.is_first() {
@@ -202,7 +202,11 @@ fn history_and_tables<const D: usize>(
     History::open(folder, step)
 }
 
-fn profiles<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, job: &Job) -> Profiles<D> {
+fn profiles<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    job: &Job,
+) -> Result<Profiles<D>> {
     let along: Vec<(String, Option<usize>)> = job
         .output
         .profile

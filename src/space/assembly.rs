@@ -1,7 +1,7 @@
 //! Assembly of the constant matrix from cell matrices into the rows each rank owns.
 
 use super::{Geometry, Simplex};
-use crate::{error::Result, exchange::exchange, mesh::Mesh, petsc::BlockRows, session::Session};
+use crate::{error::Result, exchange::exchange_lists, mesh::Mesh, petsc::BlockRows, session::Session};
 
 /// Blocks `[a][b][i][j]` coupling component `i` of local node `a` with component `j` of local node `b`.
 pub struct CellMatrix<const D: usize> {
@@ -75,7 +75,7 @@ pub fn assemble<const D: usize>(
             }
         }
     }
-    Ok(rows.merge(session, mesh))
+    rows.merge(session, mesh)
 }
 
 /// Block rows of all local nodes, owned and ghost, with local columns.
@@ -128,7 +128,7 @@ impl LocalRows {
     }
 
     /// Sends the rows of ghost nodes to their owners and merges what comes back into global rows.
-    fn merge<const D: usize>(self, session: &Session, mesh: &Mesh<D>) -> BlockRows {
+    fn merge<const D: usize>(self, session: &Session, mesh: &Mesh<D>) -> Result<BlockRows> {
         let size = D * D;
         let mut pairs = vec![Vec::new(); session.ranks()];
         let mut blocks = vec![Vec::new(); session.ranks()];
@@ -141,8 +141,8 @@ impl LocalRows {
             }
             blocks[owner].extend_from_slice(&self.values[range.start * size..range.end * size]);
         }
-        let pairs = exchange(session.world(), &pairs).concat();
-        let blocks = exchange(session.world(), &blocks).concat();
+        let pairs = exchange_lists(session.world(), &pairs)?;
+        let blocks = exchange_lists(session.world(), &blocks)?;
         let mut arrived: Vec<(u32, u32, usize)> =
             pairs.chunks_exact(2).enumerate().map(|(at, pair)| (pair[0], pair[1], at)).collect();
         arrived.sort_unstable();
@@ -174,6 +174,6 @@ impl LocalRows {
             }
             rows.offsets.push(rows.columns.len());
         }
-        rows
+        Ok(rows)
     }
 }

@@ -1,7 +1,8 @@
 //! Points of a boundary at which nodal quadrature evaluates a law.
 
 use crate::{
-    exchange::exchange,
+    error::Result,
+    exchange::exchange_lists,
     mesh::{Mesh, shape::facet_normal},
     session::Session,
     tensor::{Vector, dot, norm},
@@ -29,7 +30,7 @@ pub fn surface_points<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     facets: &[u32],
-) -> Vec<SurfacePoint<D>> {
+) -> Result<Vec<SurfacePoint<D>>> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let nodes = mesh.facets[facet as usize];
@@ -41,10 +42,9 @@ pub fn surface_points<const D: usize>(
             record.extend(normal);
         }
     }
-    let incoming = exchange(session.world(), &outgoing);
+    let incoming = exchange_lists(session.world(), &outgoing)?;
     let mut shares: Vec<(u32, Vector<D>)> = incoming
-        .iter()
-        .flat_map(|list| list.chunks_exact(D + 1))
+        .chunks_exact(D + 1)
         .map(|record| (record[0] as u32, std::array::from_fn(|i| record[i + 1])))
         .collect();
     shares.sort_by(|a, b| {
@@ -53,7 +53,7 @@ pub fn surface_points<const D: usize>(
             vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
     });
-    shares.chunk_by(|a, b| a.0 == b.0).flat_map(|around| points_of_node(mesh, around)).collect()
+    Ok(shares.chunk_by(|a, b| a.0 == b.0).flat_map(|around| points_of_node(mesh, around)).collect())
 }
 
 fn points_of_node<const D: usize>(mesh: &Mesh<D>, shares: &[(u32, Vector<D>)]) -> Vec<SurfacePoint<D>> {

@@ -39,7 +39,8 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     facets.sort_unstable();
     for (law, graph) in laws().into_iter().enumerate() {
         for quadrature in [Quadrature::Nodal, Quadrature::Gauss] {
-            let contact = Contact::new(session, &body.mesh, &facets, quadrature, graph.clone(), &body.fixed);
+            let contact = Contact::new(session, &body.mesh, &facets, quadrature, graph.clone(), &body.fixed)
+                .expect("contact");
             assert!(session.total(contact.point_count()) > 0);
             let mut contacts = [contact];
             let mut scratch = [vector(), vector()];
