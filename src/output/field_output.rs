@@ -73,6 +73,10 @@ impl<const D: usize> FieldOutput<D> {
             Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
             Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
         ];
+        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
+        if let Some(values) = traction.as_deref() {
+            fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
+        }
         for history in body.effects.iter().filter_map(|e| e.history()) {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Cell, shape, values: history.values });

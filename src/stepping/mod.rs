@@ -4,6 +4,6 @@ mod equations;
 mod lagged_euler;
 mod linear_solver;
 
-pub use equations::ContactEquations;
+pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
 pub use linear_solver::{Preconditioner, SolverSettings};
