@@ -331,6 +331,8 @@ impl<const D: usize> Contact<D> {
     /// Largest scaled distance of (normal velocity, pressure from equilibrium) to the graph. `residual` holds what is
     /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own.
     pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 2]) -> f64 {
+        // The pressure that would change the velocities by as much as they are counts where there is no other.
+        let range = [range[0], range[1].max(self.scale * range[0])];
         let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
         let distance = |p: &Point<D>| {

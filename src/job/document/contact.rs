@@ -82,11 +82,11 @@ pub struct Graph {
     /// Corners [normal velocity, pressure], velocities ascending; two with the same velocity are an upward jump.
     #[schemars(length(min = 1), extend("unit" = "[m/s, Pa]"), example = [[0.0, 0.0], [0.003, 0.03]])]
     pub points: Vec<[f64; 2]>,
-    /// Slope below the first point; inf: a vertical ray downwards.
+    /// Slope below the first point.
     #[serde(default)]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub slope_before: f64,
-    /// Slope above the last point; inf: a vertical ray upwards, so that the last velocity is never exceeded.
+    /// Slope above the last point.
     #[serde(default)]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub slope_after: f64,
