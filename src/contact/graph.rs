@@ -279,14 +279,14 @@ mod tests {
             let off = g.distance_in(found.velocity, found.pressure, [1.0, 1.0]);
             prop_assert!(off < 1e-11, "{} off the graph", off);
             let bound = 1.0 / (c - g.monotonicity_constant());
-            prop_assert!((0.0..=bound).contains(&found.derivative));
+            prop_assert!((0.0..=bound * (1.0 + 1e-14)).contains(&found.derivative));
             prop_assert_eq!(found.derivative == 0.0, g.is_vertical(found.branch));
-            let h = 1e-6;
+            let h = 1e-5;
             let (above, below) = (g.resolve(s + h, c), g.resolve(s - h, c));
             let quotient = (above.velocity - below.velocity) / (2.0 * h);
-            prop_assert!((-1e-9..=bound + 1e-9).contains(&quotient));
+            prop_assert!((-1e-8..=bound + 1e-8).contains(&quotient));
             if above.branch == below.branch {
-                prop_assert!((quotient - found.derivative).abs() < 1e-7 * (1.0 + bound));
+                prop_assert!((quotient - found.derivative).abs() < 1e-6 * (1.0 + bound));
             }
         }
 

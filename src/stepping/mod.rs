@@ -3,6 +3,7 @@
 mod equations;
 mod lagged_euler;
 mod linear_solver;
+mod newton;
 
 pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};

@@ -15,6 +15,7 @@
 //! unknown; their law must not have vertical parts.
 
 mod point;
+mod unknowns;
 
 use crate::{
     contact::{NodeContext, NormalLaw},
@@ -23,9 +24,11 @@ use crate::{
     mesh::{Mesh, shape::facet_normal},
     session::Session,
     space::{facet_rule, surface_points},
-    tensor::{dot, norm},
+    tensor::norm,
 };
 use point::{Point, Unknown};
+
+pub use unknowns::choose_unknowns;
 
 /// Where on a facet the law holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -361,48 +364,4 @@ fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> V
     let unit = normal.map(|x| x / measure);
     let rule = facet_rule::<D>().iter();
     rule.map(|(place, weight)| Point::new(&nodes, &place[..D], unit, measure * weight, fixed)).collect()
-}
-
-/// Cosine below which directions at a node count as orthogonal.
-const ORTHOGONAL: f64 = 1e-9;
-
-/// Decides at which points the unknown is the velocity, because directions at a node are not orthogonal; refuses laws
-/// with vertical parts there and at Gauss points.
-pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
-    let mut around: std::collections::BTreeMap<usize, Vec<(usize, usize)>> = Default::default();
-    for (number, contact) in contacts.iter().enumerate() {
-        if contact.needs_ghosts {
-            if contact.law.has_vertical_parts() || contact.law.depends_on_displacement() {
-                return Err(Error::Refused(
-                    "contact at Gauss points needs a law of the velocity without jumps: use quadrature = \"nodal\"".into(),
-                ));
-            }
-            continue;
-        }
-        for (at, point) in contact.points.iter().enumerate().filter(|(_, p)| p.unknown == Unknown::Parameter)
-        {
-            around.entry(point.node()).or_default().push((number, at));
-        }
-    }
-    for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {
-        let direction = |&(number, at): &(usize, usize)| contacts[number].points[at].direction;
-        let skew = (1..places.len()).any(|i| {
-            places[..i].iter().any(|other| dot(&direction(other), &direction(&places[i])).abs() > ORTHOGONAL)
-        });
-        if !skew {
-            continue;
-        }
-        for (number, at) in places {
-            if contacts[number].law.has_vertical_parts() {
-                return Err(Error::Refused(format!(
-                    "contact at {:?} m: boundaries meet at an angle that is not square, and a law with jumps or \
-                     constraints acts there; round the edge with facets that turn by less than 40 degrees each, or leave \
-                     one of the boundaries out of contact",
-                    mesh.nodes[node]
-                )));
-            }
-            contacts[number].points[at].unknown = Unknown::Velocity;
-        }
-    }
-    Ok(())
 }
