@@ -55,9 +55,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(energy)
     }
 
-    /// Energies of this rank's cells after a committed step.
+    /// Energies of this rank's cells and contacts after a committed step.
     pub fn energy(&self, state: &State, step: Step) -> Result<Energy> {
         let mut energy = Energy::default();
+        {
+            let displacement = state.displacement.local()?;
+            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
+            energy.stored_in_contact = stored.sum();
+        }
         let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {

@@ -11,6 +11,8 @@ pub struct State {
     pub velocity: DistributedVector,
     /// Velocity before the last step in m/s.
     pub previous_velocity: DistributedVector,
+    /// Traction of nodal contacts, `-sigma_nu` along the normal without held components, in Pa; there if contact is.
+    pub contact_traction: Option<DistributedVector>,
     /// Time in s.
     pub time: f64,
     /// Steps taken.
@@ -25,7 +27,15 @@ impl State {
         let displacement = DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts)?;
         let velocity = displacement.like()?;
         let previous_velocity = displacement.like()?;
-        Ok(Self { displacement, velocity, previous_velocity, time: 0.0, step: 0, step_length: 0.0 })
+        Ok(Self {
+            displacement,
+            velocity,
+            previous_velocity,
+            contact_traction: None,
+            time: 0.0,
+            step: 0,
+            step_length: 0.0,
+        })
     }
 
     /// Takes the velocity of a solved step over and moves the body with it: `u_n = u_{n-1} + k v_n`. Collective.

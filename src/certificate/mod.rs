@@ -55,7 +55,7 @@ impl Certificates {
         state: &State,
         scheme: &mut LaggedEuler,
     ) -> Result<Self> {
-        let falls = body.contacts.iter().map(|c| c.graph.monotonicity_constant());
+        let falls = body.contacts.iter().map(|c| c.law.monotonicity_constant());
         let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
             viscosity_modulus: body.smallest_viscosity(),
@@ -144,7 +144,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (kind, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let fall = contact.graph.monotonicity_constant();
+                        let fall = contact.law.monotonicity_constant();
                         let factor = if kind == Kind::TraceNorm { 1.0 } else { fall };
                         forms::add_trace(&body.mesh, contact, factor, x, y);
                     }

@@ -1,11 +1,17 @@
 //! The graph of a contact law: pressure over normal velocity, a polyline with two half-lines at its ends.
 //!
-//! `-sigma_nu = g(v_nu)` with `g` continuous and piecewise linear; it may fall. It is the Clarke subdifferential of the
-//! potential `j(v) = integral of g from 0 to v`, relation (8) of Wang and Cheng (2022).
+//! `-sigma_nu in g(v_nu)` with `g` piecewise linear; it may fall, and it may jump upwards: two points with the same
+//! velocity, or a vertical ray at an end (an infinite slope there). It is the Clarke subdifferential of the potential
+//! `j(v) = integral of g from 0 to v`, relation (8) of Wang and Cheng (2022). A graph that jumps downwards has no
+//! relaxed monotonicity and is refused.
+//!
+//! For any `c` above the steepest fall, `s = c v + p` grows along the graph: it is a parameter of the graph, and velocity
+//! and pressure are functions of it, Lipschitz continuous also where the graph is vertical ([`Graph::resolve`]).
 
+use super::Resolved;
 use crate::error::{Error, Result};
 
-/// A continuous, piecewise linear law.
+/// A piecewise linear law that may fall, and jump upwards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Graph {
     points: Vec<[f64; 2]>,
@@ -15,7 +21,8 @@ pub struct Graph {
 
 impl Graph {
     /// The polyline through `points` (velocity in m/s ascending, pressure in Pa), with these slopes (Pa s/m) before
-    /// the first and after the last.
+    /// the first and after the last. Two points of the same velocity are an upward jump, an infinite slope is a vertical
+    /// ray: downwards before the first point, upwards after the last.
     pub fn new(points: Vec<[f64; 2]>, slope_before: f64, slope_after: f64) -> Result<Self> {
         if points.is_empty() {
             return Err(Error::Refused("a contact graph needs at least one point".into()));
@@ -23,17 +30,55 @@ impl Graph {
         let mut slopes = vec![slope_before];
         for pair in points.windows(2) {
             let [[v, p], [w, q]] = [pair[0], pair[1]];
-            if w <= v {
+            if w < v {
                 return Err(Error::Refused(format!("contact graph: velocity {w} does not come after {v}")));
             }
-            slopes.push((q - p) / (w - v));
+            if w == v && q <= p {
+                return Err(Error::Refused(format!(
+                    "contact graph: at velocity {v} the pressure goes from {p} to {q}; only upward jumps have a relaxed \
+                     monotonicity: let it fall along a steep slope"
+                )));
+            }
+            slopes.push(if w == v { f64::INFINITY } else { (q - p) / (w - v) });
         }
         slopes.push(slope_after);
+        if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
+            return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
+        }
         let reach = reach(&points, &slopes);
         Ok(Self { points, slopes, reach })
     }
 
-    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s.
+    /// Velocity and pressure where `c v + p = s`, for a `c` above the steepest fall.
+    pub fn resolve(&self, s: f64, c: f64) -> Resolved {
+        let branch = self.branch_of(s, c);
+        let [v, p] = self.points[branch.saturating_sub(1)];
+        let slope = self.slopes[branch];
+        if slope == f64::INFINITY {
+            return Resolved { velocity: v, pressure: s - c * v, derivative: 0.0, branch };
+        }
+        let derivative = 1.0 / (c + slope);
+        let advance = (s - c * v - p) * derivative;
+        Resolved { velocity: v + advance, pressure: p + slope * advance, derivative, branch }
+    }
+
+    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Self::branch).
+    fn branch_of(&self, s: f64, c: f64) -> usize {
+        self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
+    }
+
+    /// Whether the graph is vertical somewhere, so that the pressure is no function of the velocity.
+    pub fn has_vertical_parts(&self) -> bool {
+        self.slopes.contains(&f64::INFINITY)
+    }
+
+    /// Whether this branch is vertical.
+    pub fn is_vertical(&self, branch: usize) -> bool {
+        self.slopes[branch] == f64::INFINITY
+    }
+
+    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; at a jump its upper end. For graphs without a vertical
+    /// ray.
     #[inline]
     pub fn pressure(&self, velocity: f64) -> f64 {
         let branch = self.branch(velocity);
@@ -86,13 +131,18 @@ impl Graph {
 
     /// Distance of a pair (velocity, pressure) to the graph, both scaled by the graph's own range.
     pub fn distance(&self, velocity: f64, pressure: f64) -> f64 {
-        let [width, height] = self.reach;
+        self.distance_in(velocity, pressure, self.reach)
+    }
+
+    /// The same, scaled by this velocity and this pressure.
+    pub(super) fn distance_in(&self, velocity: f64, pressure: f64, [width, height]: [f64; 2]) -> f64 {
         let point = [velocity / width, pressure / height];
         let scaled = |p: [f64; 2]| [p[0] / width, p[1] / height];
         let steep = width / height;
         let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
-        let mut least = ray_distance(point, scaled(first), [-1.0, -self.slopes[0] * steep]);
-        least = least.min(ray_distance(point, scaled(last), [1.0, self.slopes[self.points.len()] * steep]));
+        let along = |slope: f64| if slope == f64::INFINITY { [0.0, 1.0] } else { [1.0, slope * steep] };
+        let mut least = ray_distance(point, scaled(first), along(self.slopes[0]).map(|x| -x));
+        least = least.min(ray_distance(point, scaled(last), along(self.slopes[self.points.len()])));
         for pair in self.points.windows(2) {
             least = least.min(segment_distance(point, scaled(pair[0]), scaled(pair[1])));
         }
@@ -110,7 +160,8 @@ fn reach(points: &[[f64; 2]], slopes: &[f64]) -> [f64; 2] {
         reach[0] = 1.0;
     }
     if reach[1] == 0.0 {
-        let steepest = slopes.iter().fold(0.0, |m, s| f64::max(m, s.abs()));
+        let finite = slopes.iter().filter(|slope| slope.is_finite());
+        let steepest = finite.fold(0.0, |m, s| f64::max(m, s.abs()));
         reach[1] = if steepest > 0.0 { steepest * reach[0] } else { 1.0 };
     }
     reach
@@ -169,7 +220,76 @@ mod tests {
         assert!(Graph::new(vec![], 0.0, 0.0).is_err());
     }
 
+    #[test]
+    fn only_downward_jumps_are_refused() {
+        let down = Graph::new(vec![[0.0, 1.0], [0.0, -1.0]], 0.0, 0.0).unwrap_err().to_string();
+        assert!(down.contains("only upward jumps"), "{down}");
+        assert!(Graph::new(vec![[0.0, 1.0]], f64::NEG_INFINITY, 0.0).is_err());
+        let up = Graph::new(vec![[0.0, -1.0], [0.0, 1.0]], 0.0, 0.0).unwrap();
+        assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
+        assert_eq!(up.monotonicity_constant(), 0.0);
+        assert_eq!([up.potential(-2.0), up.potential(0.0), up.potential(3.0)], [2.0, 0.0, 3.0]);
+        assert_eq!(up.distance(0.0, 0.3), 0.0);
+        assert_eq!(up.distance(0.0, 1.5), 0.5);
+    }
+
+    #[test]
+    fn a_wall_is_touched_at_any_pressure_and_left_at_none() {
+        let wall = Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY).unwrap();
+        let touching = wall.resolve(7.0, 2.0);
+        assert_eq!((touching.velocity, touching.pressure, touching.derivative), (0.0, 7.0, 0.0));
+        let open = wall.resolve(-6.0, 2.0);
+        assert_eq!((open.velocity, open.pressure, open.derivative), (-3.0, 0.0, 0.5));
+        assert_eq!(wall.distance(0.0, 5.0), 0.0);
+        assert_eq!(wall.distance(-1.0, 0.0), 0.0);
+        assert_eq!(wall.distance(3.0, 5.0), 3.0);
+    }
+
+    /// Random graphs: each step is a velocity (0: a jump) and a rise, with or without vertical rays at the ends.
+    fn any_graph() -> impl Strategy<Value = Graph> {
+        let step = (0.1f64..2.0, -3.0f64..3.0, any::<bool>());
+        let ray = |finite: std::ops::Range<f64>| prop_oneof![3 => finite, 1 => Just(f64::INFINITY)];
+        (proptest::collection::vec(step, 1..7), ray(-0.5..2.0), ray(-0.5..2.0)).prop_map(
+            |(steps, before, after)| {
+                let mut at = [-2.0, 0.5];
+                let mut points = vec![at];
+                for (advance, rise, jumps) in steps {
+                    at = if jumps {
+                        [at[0], at[1] + rise.abs() + 0.1]
+                    } else {
+                        [at[0] + advance, at[1] + rise]
+                    };
+                    let collinear = jumps && points.len() > 1 && points[points.len() - 2][0] == at[0];
+                    if collinear {
+                        points.pop();
+                    }
+                    points.push(at);
+                }
+                Graph::new(points, before, after).unwrap()
+            },
+        )
+    }
+
     proptest! {
+        #[test]
+        fn the_resolvent_finds_every_point_of_the_graph(g in any_graph(), s in -20.0f64..20.0, more in 1.01f64..5.0) {
+            let c = more * g.monotonicity_constant() + 0.3;
+            let found = g.resolve(s, c);
+            prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-11);
+            let off = g.distance_in(found.velocity, found.pressure, [1.0, 1.0]);
+            prop_assert!(off < 1e-11, "{} off the graph", off);
+            let bound = 1.0 / (c - g.monotonicity_constant());
+            prop_assert!((0.0..=bound * (1.0 + 1e-14)).contains(&found.derivative));
+            prop_assert_eq!(found.derivative == 0.0, g.is_vertical(found.branch));
+            let h = 1e-5;
+            let (above, below) = (g.resolve(s + h, c), g.resolve(s - h, c));
+            let quotient = (above.velocity - below.velocity) / (2.0 * h);
+            prop_assert!((-1e-8..=bound + 1e-8).contains(&quotient));
+            if above.branch == below.branch {
+                prop_assert!((quotient - found.derivative).abs() < 1e-6 * (1.0 + bound));
+            }
+        }
+
         #[test]
         fn laws_conform(steps in proptest::collection::vec((0.1f64..2.0, -3.0f64..3.0), 1..6), v in -9.0f64..9.0) {
             let mut at = [-2.0, 0.5];

@@ -19,11 +19,13 @@ pub struct Energy {
     pub kinetic: f64,
     /// Elastic energy at the end of the step.
     pub elastic: f64,
+    /// Stored in contact (compliant foundations) at the end of the step.
+    pub stored_in_contact: f64,
     /// Dissipated by viscosity in the step.
     pub viscous: f64,
     /// Taken up by viscoplastic flow in the step: dissipated, or stored by hardening.
     pub viscoplastic: f64,
-    /// Dissipated by contact in the step.
+    /// Dissipated by contact in the step, or given to a moving obstacle.
     pub contact: f64,
     /// Work of loads in the step.
     pub work: f64,
@@ -33,14 +35,23 @@ pub struct Energy {
 
 impl Energy {
     /// As an array, for sums over ranks.
-    pub fn to_array(self) -> [f64; 7] {
-        [self.kinetic, self.elastic, self.viscous, self.viscoplastic, self.contact, self.work, self.numerical]
+    pub fn to_array(self) -> [f64; 8] {
+        [
+            self.kinetic,
+            self.elastic,
+            self.stored_in_contact,
+            self.viscous,
+            self.viscoplastic,
+            self.contact,
+            self.work,
+            self.numerical,
+        ]
     }
 
     /// Back from the array.
-    pub fn from_array(a: [f64; 7]) -> Self {
-        let [kinetic, elastic, viscous, viscoplastic, contact, work, numerical] = a;
-        Self { kinetic, elastic, viscous, viscoplastic, contact, work, numerical }
+    pub fn from_array(a: [f64; 8]) -> Self {
+        let [kinetic, elastic, stored_in_contact, viscous, viscoplastic, contact, work, numerical] = a;
+        Self { kinetic, elastic, stored_in_contact, viscous, viscoplastic, contact, work, numerical }
     }
 }
 

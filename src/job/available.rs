@@ -5,8 +5,6 @@ use super::source::{Node, Value};
 
 /// Path (`*` is any position in a list), the word that is not available (or any), and what it is called.
 const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
-    ("contact.*.normal.compliance", None, "normal compliance is"),
-    ("contact.*.normal.unilateral", None, "unilateral contact is"),
     ("contact.*.friction.tresca", None, "Tresca friction is"),
     ("contact.*.friction.coulomb", None, "Coulomb friction is"),
     ("contact.*.friction.slip_weakening", None, "slip weakening friction is"),
@@ -31,16 +29,6 @@ pub fn faults(root: &Node) -> Vec<Fault> {
                 let place = if word.is_none() { &node.key } else { &node.at };
                 let message = format!("{what} not available yet");
                 faults.push(Fault::new(place.clone(), message, "not available yet"));
-            }
-        }
-    }
-    for graph in matching(root, &["contact", "*", "normal", "graph"]) {
-        let points: Vec<[f64; 2]> = graph.read("points").unwrap_or_default();
-        for index in 1..points.len() {
-            if points[index - 1][0] == points[index][0] && points[index - 1][1] < points[index][1] {
-                let place = graph.deepest(&format!("points.{index}")).at.clone();
-                let message = "a jump in a contact graph is not available yet";
-                faults.push(Fault::new(place, message, "not available yet"));
             }
         }
     }

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
 /// Raised whenever a file written before can't be read any more.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Everything of a checkpoint that is not a field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,6 +86,10 @@ pub fn save<const D: usize, const S: usize>(
     let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
     let mut tables: Vec<Table> =
         nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
+    let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
+    let traction =
+        traction.as_deref().map(|t| Table { name: "contact_traction", set: "nodes", width: D, values: t });
+    tables.extend(traction);
     let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
     tables.extend(histories.iter().map(|h| Table {
         name: h.name,
@@ -113,6 +117,11 @@ pub fn restore<const D: usize, const S: usize>(
     let fields = [&mut state.displacement, &mut state.velocity, &mut state.previous_velocity];
     for (field, values) in fields.into_iter().zip(&values) {
         fill(field, values)?;
+    }
+    if let Some(traction) = &mut state.contact_traction {
+        let values =
+            checkpoint.read("nodes", body.mesh.total_nodes as u64, &[("contact_traction", D)], &nodes)?;
+        fill(traction, &values[0])?;
     }
     let cells = cell_ids(body);
     for effect in &mut body.effects {

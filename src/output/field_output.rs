@@ -74,6 +74,10 @@ impl<const D: usize> FieldOutput<D> {
             Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
             Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
         ];
+        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
+        if let Some(values) = traction.as_deref() {
+            fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
+        }
         let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
         for history in &histories {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };

@@ -7,7 +7,7 @@ use std::path::Path;
 
 const HEADER: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
-energy_imbalance,numerical_dissipation";
+energy_imbalance,numerical_dissipation,contact_energy";
 
 /// What adds up over the steps of a run; saved in checkpoints.
 ///
@@ -19,6 +19,8 @@ pub struct Totals {
     pub kinetic_energy: f64,
     /// Elastic energy now.
     pub elastic_energy: f64,
+    /// Energy stored in contact now.
+    pub contact_energy: f64,
     /// Dissipated by viscosity.
     pub viscous_dissipation: f64,
     /// Dissipated by viscoplastic flow.
@@ -47,17 +49,22 @@ impl Totals {
     /// At time 0, with the energy of the initial state.
     pub fn at_start(energy: Energy) -> Self {
         let (kinetic_energy, elastic_energy) = (energy.kinetic, energy.elastic);
-        Self { kinetic_energy, elastic_energy, turnover: kinetic_energy + elastic_energy, ..Self::default() }
+        let contact_energy = energy.stored_in_contact;
+        let turnover = kinetic_energy + elastic_energy + contact_energy;
+        Self { kinetic_energy, elastic_energy, contact_energy, turnover, ..Self::default() }
     }
 
     /// Takes a step in.
     pub fn add(&mut self, outcome: &StepOutcome) {
         let energy = &outcome.energy;
-        let stored = energy.kinetic - self.kinetic_energy + energy.elastic - self.elastic_energy;
+        let stored = energy.kinetic - self.kinetic_energy + energy.elastic - self.elastic_energy
+            + energy.stored_in_contact
+            - self.contact_energy;
         let released = energy.viscous + energy.viscoplastic + energy.contact;
         let open = stored + released - energy.work - energy.numerical;
         self.kinetic_energy = energy.kinetic;
         self.elastic_energy = energy.elastic;
+        self.contact_energy = energy.stored_in_contact;
         self.viscous_dissipation += energy.viscous;
         self.viscoplastic_dissipation += energy.viscoplastic;
         self.contact_dissipation += energy.contact;
@@ -66,6 +73,7 @@ impl Totals {
         let sizes = [
             self.kinetic_energy,
             self.elastic_energy,
+            self.contact_energy,
             self.viscous_dissipation,
             self.viscoplastic_dissipation,
             self.contact_dissipation,
@@ -120,6 +128,7 @@ impl History {
                 totals.external_work,
                 totals.energy_imbalance,
                 totals.numerical_dissipation,
+                totals.contact_energy,
             ])
         ))
     }

@@ -3,12 +3,13 @@
 use super::csv::{CsvFile, number, numbers};
 use crate::{
     body::Body,
+    contact::NodeContext,
     error::Result,
     mesh::shape::facet_normal,
     session::Session,
     space::{SurfacePoint, surface_points},
     state::State,
-    tensor::{Mandel, apply, dot, norm},
+    tensor::{Mandel, Vector, apply, dot, norm},
 };
 use mpi::{datatype::PartitionMut, topology::Communicator, traits::Root};
 use std::path::Path;
@@ -99,13 +100,19 @@ impl<const D: usize> Profile<D> {
         let by_stress =
             if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
         let mut out = Vec::with_capacity(self.points.len() * (D + 3));
         for (at, point) in self.points.iter().enumerate() {
             let node = point.node as usize;
             let along = |field: &[f64]| (0..D).map(|i| field[node * D + i] * point.normal[i]).sum::<f64>();
             let normal_velocity = along(&velocity);
             let pressure = match self.contact {
-                Some(contact) => body.contacts[contact].graph.pressure(normal_velocity),
+                Some(contact) => match &traction {
+                    Some(traction) if !body.contacts[contact].needs_ghosts() => {
+                        free_component(body, traction, point)
+                    }
+                    _ => body.contacts[contact].law.pressure(normal_velocity, NodeContext::default()),
+                },
                 None => by_stress[at],
             };
             out.extend(body.mesh.nodes[node]);
@@ -142,6 +149,18 @@ impl<const D: usize> Profile<D> {
         let sums = sums.owned()?;
         Ok(self.points.iter().map(|p| sums[p.node as usize * D] / sums[p.node as usize * D + 1]).collect())
     }
+}
+
+/// The component of a nodal field along the part of a point's normal that no support holds.
+fn free_component<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    nodal: &[f64],
+    point: &SurfacePoint<D>,
+) -> f64 {
+    let at = point.node as usize * D;
+    let free: Vector<D> = std::array::from_fn(|i| if body.fixed[at + i] { 0.0 } else { point.normal[i] });
+    let size = norm(&free);
+    if size == 0.0 { 0.0 } else { (0..D).map(|i| free[i] * nodal[at + i]).sum::<f64>() / size }
 }
 
 /// The rows of all ranks on rank 0; nothing elsewhere. Collective.

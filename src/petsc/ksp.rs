@@ -8,7 +8,6 @@ use std::{marker::PhantomData, ptr};
 #[derive(Debug)]
 pub struct Ksp {
     pub(super) raw: sys::KSP,
-    owned: bool,
     not_send: PhantomData<*mut ()>,
 }
 
@@ -59,18 +58,24 @@ impl Ksp {
         // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
         unsafe {
             check(sys::KSPCreate(communicator(), &mut raw))?;
-            let ksp = Self { raw, owned: true, not_send: PhantomData };
+            let ksp = Self { raw, not_send: PhantomData };
             check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
             Ok(ksp)
         }
     }
 
-    /// The solver inside another PETSc object, which stays its owner.
-    ///
-    /// # Safety
-    /// The owner must outlive the returned handle.
-    pub(super) unsafe fn inside(raw: sys::KSP) -> Self {
-        Self { raw, owned: false, not_send: PhantomData }
+    /// A solver by another method with the same operator and preconditioner, whose options carry this prefix. Its norm
+    /// is that of the preconditioned residual.
+    pub(super) fn sharing_preconditioner(&self, prefix: &str, method: &str) -> Result<Self> {
+        let other = Self::new(prefix)?;
+        let (mut pc, method) = (ptr::null_mut(), c_string(method)?);
+        // SAFETY: live objects; PETSc counts its own reference to the shared preconditioner, copies the name.
+        unsafe {
+            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::KSPSetPC(other.raw, pc))?;
+            check(sys::KSPSetType(other.raw, method.as_ptr()))?;
+        }
+        Ok(other)
     }
 
     /// Solves with this matrix, which also makes the preconditioner.
@@ -167,9 +172,7 @@ impl Ksp {
 
 impl Drop for Ksp {
     fn drop(&mut self) {
-        if self.owned {
-            // SAFETY: this handle owns one reference.
-            unsafe { sys::KSPDestroy(&mut self.raw) };
-        }
+        // SAFETY: this handle owns one reference.
+        unsafe { sys::KSPDestroy(&mut self.raw) };
     }
 }

@@ -5,9 +5,11 @@
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
+mod callback;
 mod ksp;
 mod library;
 mod matrix;
+mod projected;
 mod snes;
 pub mod sys;
 mod vector;
@@ -15,6 +17,7 @@ mod vector;
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
+pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use vector::{DistributedVector, LocalRead, LocalWrite};
 

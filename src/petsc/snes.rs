@@ -1,17 +1,18 @@
 use super::{
-    DistributedVector, Ksp, Matrix, c_string, check, index, ksp::linear_reason, library::communicator, sys,
+    DistributedVector, c_string,
+    callback::{Callback, USER_ERROR, spoil},
+    check, index,
+    library::communicator,
+    sys,
 };
-use crate::error::{Error, Result};
+use crate::error::Result;
 use std::{
-    any::Any,
-    cell::{Cell, RefCell},
     ffi::{CString, c_void},
     marker::PhantomData,
-    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     ptr,
 };
 
-/// A system of nonlinear equations `residual(x) = 0` with a generalised Jacobian given by its action.
+/// A system of nonlinear equations `residual(x) = 0` with a generalised Jacobian given by its action and its solution.
 pub trait NonlinearProblem {
     /// Writes the residual at `x`. `x` carries no ghost values of its own.
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()>;
@@ -22,6 +23,14 @@ pub trait NonlinearProblem {
     /// Writes the Jacobian at the last point of linearisation times `direction`.
     fn apply_jacobian(&mut self, direction: &DistributedVector, result: &mut DistributedVector)
     -> Result<()>;
+
+    /// Writes the `direction` that the Jacobian at the last point of linearisation takes to `residual`, as closely as
+    /// Newton's method needs it.
+    fn solve_jacobian(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+    ) -> Result<()>;
 }
 
 /// How a nonlinear solve ended.
@@ -31,12 +40,8 @@ pub struct NonlinearOutcome {
     pub reason: i32,
     /// Newton iterations.
     pub iterations: usize,
-    /// Linear iterations of all Newton iterations together.
-    pub linear_iterations: usize,
     /// Residual norm at the end.
     pub residual: f64,
-    /// PETSc's reason of the last linear solve.
-    pub linear_reason: i32,
 }
 
 impl NonlinearOutcome {
@@ -49,7 +54,7 @@ impl NonlinearOutcome {
     pub fn words(&self) -> &'static str {
         match self.reason {
             1.. => "converged",
-            -3 => linear_reason(self.linear_reason),
+            -3 => "no direction was found that reduces the residual",
             -4 => "the residual is not a number",
             -5 => "too many Newton iterations",
             -6 => "the line search found no decrease of the residual",
@@ -59,20 +64,20 @@ impl NonlinearOutcome {
     }
 }
 
-/// Newton's method with backtracking, the Jacobian applied by the problem, preconditioned by a constant matrix.
+/// Newton's method with backtracking; the problem applies its Jacobian and solves with it.
+///
+/// To PETSc the linear solve is a shell preconditioner, applied once; its own options carry the prefix `newton_`.
 #[derive(Debug)]
 pub struct Snes {
     raw: sys::SNES,
     jacobian: sys::Mat,
+    /// Inside `raw`, which owns it.
+    preconditioner: sys::PC,
     residual: DistributedVector,
     not_send: PhantomData<*mut ()>,
 }
 
-struct Context<'a> {
-    problem: RefCell<&'a mut dyn NonlinearProblem>,
-    error: RefCell<Option<Error>>,
-    panic: Cell<Option<Box<dyn Any + Send>>>,
-}
+type Context<'a> = Callback<'a, dyn NonlinearProblem + 'a>;
 
 impl Snes {
     /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
@@ -85,7 +90,8 @@ impl Snes {
         // is only multiplied inside `solve`, which sets its context.
         unsafe {
             check(sys::SNESCreate(communicator(), &mut raw))?;
-            let mut snes = Self { raw, jacobian, residual, not_send: PhantomData };
+            let mut snes =
+                Self { raw, jacobian, preconditioner: ptr::null_mut(), residual, not_send: PhantomData };
             check(sys::MatCreateShell(
                 communicator(),
                 local,
@@ -104,52 +110,47 @@ impl Snes {
             check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
+            let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
+            check(sys::SNESGetKSP(raw, &mut ksp))?;
+            check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
+            check(sys::KSPSetType(ksp, c"preonly".as_ptr()))?;
+            check(sys::KSPGetPC(ksp, &mut pc))?;
+            check(sys::PCSetType(pc, c"shell".as_ptr()))?;
+            check(sys::PCShellSetApply(pc, Some(solve_jacobian)))?;
+            snes.preconditioner = pc;
             check(sys::SNESGetLineSearch(raw, &mut search))?;
             check(sys::SNESLineSearchSetType(search, c"bt".as_ptr()))?;
             Ok(snes)
         }
     }
 
-    /// The linear solver inside.
-    pub fn linear_solver(&mut self) -> Result<Ksp> {
-        let mut raw = ptr::null_mut();
-        // SAFETY: the solver belongs to this live object; callers drop the handle before `self`, since it only
-        // serves for set-up in the same scope.
-        unsafe {
-            check(sys::SNESGetKSP(self.raw, &mut raw))?;
-            Ok(Ksp::inside(raw))
-        }
-    }
-
-    /// Lets PETSc options override what was set, also in the linear solver.
+    /// Lets PETSc options override what was set.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::SNESSetFromOptions(self.raw) })
     }
 
-    /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`, preconditioned by `constant`.
-    /// Collective.
+    /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`. Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
     /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.
     pub fn solve(
         &mut self,
         problem: &mut dyn NonlinearProblem,
-        constant: &Matrix,
         x: &mut DistributedVector,
         tolerance: f64,
         iterations: usize,
     ) -> Result<NonlinearOutcome> {
-        let context =
-            Context { problem: RefCell::new(problem), error: RefCell::new(None), panic: Cell::new(None) };
-        let pointer: *mut c_void = ptr::from_ref(&context).cast_mut().cast();
+        let callback = Callback::new(problem);
+        let pointer = callback.pointer();
         let unlimited = sys::PetscInt::MAX;
         // SAFETY: the context lives on this frame until after SNESSolve; PETSc calls the trampolines only inside
         // SNESSolve, and the context is detached before the frame ends.
         let code = unsafe {
             check(sys::SNESSetFunction(self.raw, self.residual.raw, Some(residual), pointer))?;
-            check(sys::SNESSetJacobian(self.raw, self.jacobian, constant.raw, Some(linearise), pointer))?;
+            check(sys::SNESSetJacobian(self.raw, self.jacobian, self.jacobian, Some(linearise), pointer))?;
             check(sys::MatShellSetContext(self.jacobian, pointer))?;
+            check(sys::PCShellSetContext(self.preconditioner, pointer))?;
             check(sys::SNESSetTolerances(
                 self.raw,
                 tolerance,
@@ -160,14 +161,10 @@ impl Snes {
             ))?;
             let code = sys::SNESSolve(self.raw, ptr::null_mut(), x.raw);
             check(sys::MatShellSetContext(self.jacobian, ptr::null_mut()))?;
+            check(sys::PCShellSetContext(self.preconditioner, ptr::null_mut()))?;
             code
         };
-        if let Some(panic) = context.panic.take() {
-            resume_unwind(panic);
-        }
-        if let Some(error) = context.error.into_inner() {
-            return Err(error);
-        }
+        callback.finish()?;
         check(code)?;
         self.outcome()
     }
@@ -177,22 +174,16 @@ impl Snes {
         &self.residual
     }
 
-    fn outcome(&mut self) -> Result<NonlinearOutcome> {
-        let (mut reason, mut iterations, mut linear_iterations, mut residual) = (0, 0, 0, 0.0);
+    fn outcome(&self) -> Result<NonlinearOutcome> {
+        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
         // SAFETY: live object, live numbers.
         unsafe {
             check(sys::SNESGetConvergedReason(self.raw, &mut reason))?;
             check(sys::SNESGetIterationNumber(self.raw, &mut iterations))?;
-            check(sys::SNESGetLinearSolveIterations(self.raw, &mut linear_iterations))?;
             check(sys::SNESGetFunctionNorm(self.raw, &mut residual))?;
         }
-        Ok(NonlinearOutcome {
-            reason,
-            iterations: usize::try_from(iterations).unwrap_or(0),
-            linear_iterations: usize::try_from(linear_iterations).unwrap_or(0),
-            residual,
-            linear_reason: self.linear_solver()?.outcome()?.reason,
-        })
+        let iterations = usize::try_from(iterations).unwrap_or(0);
+        Ok(NonlinearOutcome { reason, iterations, residual })
     }
 }
 
@@ -206,49 +197,16 @@ impl Drop for Snes {
     }
 }
 
-/// What a callback returns to make PETSc stop.
-const USER_ERROR: sys::PetscErrorCode = sys::PETSC_ERR_USER as sys::PetscErrorCode;
-
-/// Runs a callback; an error is kept and from then on `spoil` marks every output, so that all ranks see the same failure.
-fn guard(context: &Context, body: impl FnOnce() -> Result<()>, spoil: impl FnOnce()) -> sys::PetscErrorCode {
-    match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(())) => {
-            if context.error.borrow().is_some() {
-                spoil();
-            }
-            0
-        }
-        Ok(Err(error)) => {
-            context.error.borrow_mut().get_or_insert(error);
-            spoil();
-            0
-        }
-        Err(panic) => {
-            context.panic.set(Some(panic));
-            USER_ERROR
-        }
-    }
-}
-
-/// Fills the values of this rank with NaN, which norms carry to all ranks.
-fn spoil(vector: &mut DistributedVector) {
-    if let Ok(mut values) = vector.owned_mut() {
-        values.fill(f64::NAN);
-    }
-}
-
 unsafe extern "C" fn residual(
     _: sys::SNES,
     x: sys::Vec,
     f: sys::Vec,
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
-    // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call.
-    let (context, x, mut f) =
-        unsafe { (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(f)) };
-    // SAFETY: a second view of the same live vector, used only after the first is done.
-    let mut spoilt = unsafe { DistributedVector::view(f.raw) };
-    guard(context, || context.problem.borrow_mut().residual(&x, &mut f), || spoil(&mut spoilt))
+    // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call. The second view of `f` is
+    // used only after the first is done.
+    let (context, x, mut f, mut spoilt) = unsafe { views(context, x, f) };
+    context.run(|problem| problem.residual(&x, &mut f), || spoil(&mut spoilt))
 }
 
 unsafe extern "C" fn linearise(
@@ -259,8 +217,8 @@ unsafe extern "C" fn linearise(
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
     // SAFETY: as in `residual`.
-    let (context, x) = unsafe { (&*context.cast::<Context>(), DistributedVector::view(x)) };
-    guard(context, || context.problem.borrow_mut().linearise(&x), || ())
+    let (context, x) = unsafe { (&*context.cast::<Context<'_>>(), DistributedVector::view(x)) };
+    context.run(|problem| problem.linearise(&x), || ())
 }
 
 unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
@@ -270,10 +228,34 @@ unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys
     if code != 0 || context.is_null() {
         return USER_ERROR;
     }
-    // SAFETY: `solve` set the context to its live frame; PETSc's vectors live for the call.
-    let (context, x, mut y) =
-        unsafe { (&*context.cast::<Context>(), DistributedVector::view(x), DistributedVector::view(y)) };
-    // SAFETY: a second view of the same live vector, used only after the first is done.
-    let mut spoilt = unsafe { DistributedVector::view(y.raw) };
-    guard(context, || context.problem.borrow_mut().apply_jacobian(&x, &mut y), || spoil(&mut spoilt))
+    // SAFETY: as in `residual`.
+    let (context, x, mut y, mut spoilt) = unsafe { views(context, x, y) };
+    context.run(|problem| problem.apply_jacobian(&x, &mut y), || spoil(&mut spoilt))
+}
+
+unsafe extern "C" fn solve_jacobian(pc: sys::PC, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    let mut context: *mut c_void = ptr::null_mut();
+    // SAFETY: a live shell preconditioner; PETSc writes its context pointer.
+    let code = unsafe { sys::PCShellGetContext(pc, ptr::from_mut(&mut context).cast()) };
+    if code != 0 || context.is_null() {
+        return USER_ERROR;
+    }
+    // SAFETY: as in `residual`.
+    let (context, x, mut y, mut spoilt) = unsafe { views(context, x, y) };
+    context.run(|problem| problem.solve_jacobian(&x, &mut y), || spoil(&mut spoilt))
+}
+
+type View = std::mem::ManuallyDrop<DistributedVector>;
+
+/// The context, the input, and the output twice.
+///
+/// # Safety
+/// `context` must point to a live [`Context`], the vectors must live while the views are used, and the views of the
+/// output must not be used at once.
+unsafe fn views<'a>(context: *mut c_void, x: sys::Vec, y: sys::Vec) -> (&'a Context<'a>, View, View, View) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let view = |raw| DistributedVector::view(raw);
+        (&*context.cast::<Context<'a>>(), view(x), view(y), view(y))
+    }
 }

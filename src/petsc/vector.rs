@@ -121,6 +121,12 @@ impl DistributedVector {
         check(unsafe { sys::VecAXPY(self.raw, factor, other.raw) })
     }
 
+    /// Multiplies the owned values.
+    pub fn scale(&mut self, factor: f64) -> Result<()> {
+        // SAFETY: live vector.
+        check(unsafe { sys::VecScale(self.raw, factor) })
+    }
+
     /// Euclidean norm over all ranks. Collective.
     pub fn norm(&self) -> Result<f64> {
         let mut norm = 0.0;

@@ -2,13 +2,13 @@
 
 use crate::{
     body::Body,
-    contact::{DampedResponse, Graph, Symmetry},
+    contact::{self, DampedResponse, Graph, Symmetry},
     effect::{
         BodyForce, Contact, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load, Quadrature, Support,
-        Traction, ViscoplasticHistory, ViscousStress, fixed_components,
+        Traction, ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw},
+    job::{self, Fix, Job, Material, Named, NormalLaw, Scalar},
     material::{
         ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
         Viscoplasticity,
@@ -41,8 +41,12 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Nodal => Quadrature::Nodal,
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
-        let graph = session.agree(graph(&contact.normal))?;
-        contacts.push(Contact::new(session, &mesh, &facets, quadrature, graph, &fixed)?);
+        let (law, gap) = session.agree(normal_law(&contact.normal))?;
+        contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
+    }
+    session.agree(choose_unknowns(&mut contacts, &mesh))?;
+    if contacts.iter().any(|contact| !contact.needs_ghosts()) {
+        state.contact_traction = Some(state.velocity.like()?);
     }
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
@@ -152,22 +156,31 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
     }
 }
 
-/// The law of a contact as a graph.
-pub(super) fn graph(law: &NormalLaw) -> Result<Graph> {
-    match law {
+/// The law of a contact, and the gap it is felt beyond.
+fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
+    let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
+    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Scalar::default());
+    Ok(match law {
         NormalLaw::DampedResponse(d) => {
             let symmetry = match d.symmetry {
                 job::Symmetry::Even => Symmetry::Even,
                 job::Symmetry::Odd => Symmetry::Odd,
                 job::Symmetry::OneSided => Symmetry::OneSided,
             };
-            DampedResponse { breakpoints: d.breakpoints.clone(), slopes: d.slopes.clone(), symmetry }.graph()
+            let law =
+                DampedResponse { breakpoints: d.breakpoints.clone(), slopes: d.slopes.clone(), symmetry };
+            of_velocity(law.graph()?)
         }
-        NormalLaw::Graph(g) => Graph::new(g.points.clone(), g.slope_before, g.slope_after),
-        NormalLaw::Compliance(_) | NormalLaw::Unilateral(_) => {
-            Err(Error::Refused("this contact law is not available yet".into()))
+        NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
+        NormalLaw::Compliance(c) => {
+            let law = contact::Compliance { stiffness: c.stiffness, exponent: c.exponent };
+            (contact::NormalLaw::Compliance(law), c.gap.clone())
         }
-    }
+        NormalLaw::Unilateral(u) => match u.bound {
+            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), u.gap.clone()),
+            job::Bound::Velocity => of_velocity(wall()?),
+        },
+    })
 }
 
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {

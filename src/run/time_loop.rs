@@ -175,12 +175,13 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let step = self.state.step;
         let words = format!(
             "step {step:>6}/{last}  t = {:.6} s  newton {:>2}  linear {:>4}  branch changes {:>4}  inclusion {:.1e}  \
-             energy {:.1e}  {} left",
+             {}energy {:.1e}  {} left",
             self.state.time,
             outcome.newton_iterations,
             outcome.linear_iterations,
             outcome.active_changes,
             outcome.inclusion_residual,
+            kinds(outcome),
             self.totals.energy_imbalance,
             clock_time(self.pace() * (last - step) as f64)
         );
@@ -325,6 +326,16 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let seconds = self.session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
         phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
     }
+}
+
+/// What happens at the contact points, where there is any to tell.
+fn kinds(outcome: &StepOutcome) -> String {
+    let told = [
+        ("open", outcome.points.open),
+        ("sticking", outcome.points.sticking),
+        ("indefinite", outcome.indefinite_solves),
+    ];
+    told.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}  ")).collect()
 }
 
 /// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.

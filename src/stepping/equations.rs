@@ -2,11 +2,11 @@
 
 use crate::{
     effect::Contact,
-    error::Result,
-    petsc::{DistributedVector, Matrix, NonlinearProblem},
+    error::{Error, Result},
+    petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator},
 };
 
-/// `R(v) = K v + C(v) - b` with the generalised Jacobian `K + C'(v)`.
+/// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::effect::Contact`] for the unknown `x`.
 pub struct ContactEquations<'a, const D: usize> {
     /// `K`.
     pub matrix: &'a Matrix,
@@ -14,55 +14,110 @@ pub struct ContactEquations<'a, const D: usize> {
     pub contacts: &'a mut [Contact<D>],
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
-    /// Ghosted scratch space, where some contact reads ghost nodes.
-    pub ghosted: Option<&'a mut [DistributedVector; 2]>,
-    /// Calls of the residual, for the log.
+    /// What the evaluation needs room for.
+    pub scratch: &'a mut Scratch,
+    /// Solves with the Jacobian; its constant matrix is `K`.
+    pub linear_solver: &'a mut ProjectedKsp,
+    /// What was done so far.
+    pub effort: Effort,
+}
+
+/// Work vectors of a contact step.
+#[derive(Debug)]
+pub struct Scratch {
+    velocity: DistributedVector,
+    open: DistributedVector,
+    /// Ghosted values and forces, where some contact reads ghost nodes.
+    ghosted: Option<[DistributedVector; 2]>,
+}
+
+impl Scratch {
+    /// Work vectors laid out like `like`, for these contacts.
+    pub fn new<const D: usize>(like: &DistributedVector, contacts: &[Contact<D>]) -> Result<Self> {
+        let ghosts = contacts.iter().any(Contact::needs_ghosts);
+        Ok(Self {
+            velocity: like.like()?,
+            open: like.like()?,
+            ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
+        })
+    }
+}
+
+/// What Newton's method did in a step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Effort {
+    /// Calls of the residual.
     pub residuals: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Linear systems in which CG met negative curvature.
+    pub indefinite: usize,
+    /// Numbers that tell the sets of branches of this rank's points apart, one a linearisation.
+    pub sets: Vec<u64>,
+}
+
+/// Adds to `out` what `add` puts on the nodes, given the nodal values of `x`.
+fn add_contact<const D: usize>(
+    ghosted: &mut Option<[DistributedVector; 2]>,
+    contacts: &[Contact<D>],
+    x: &DistributedVector,
+    out: &mut DistributedVector,
+    add: impl Fn(&Contact<D>, &[f64], &mut [f64]),
+) -> Result<()> {
+    let Some([values, forces]) = ghosted else {
+        let (x, mut out) = (x.owned()?, out.owned_mut()?);
+        contacts.iter().for_each(|contact| add(contact, &x, &mut out));
+        return Ok(());
+    };
+    values.copy_from(x)?;
+    values.update_ghosts()?;
+    {
+        let (values, mut forces) = (values.local()?, forces.local_mut()?);
+        forces.fill(0.0);
+        contacts.iter().for_each(|contact| add(contact, &values, &mut forces));
+    }
+    forces.add_ghosts_to_owners()?;
+    out.add_scaled(1.0, forces)
 }
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Adds to `out` what `add` puts on the nodes, given the nodal values of `x`.
-    fn add_contact(
-        &mut self,
-        x: &DistributedVector,
-        out: &mut DistributedVector,
-        add: impl Fn(&Contact<D>, &[f64], &mut [f64]),
-    ) -> Result<()> {
-        let Some([values, forces]) = self.ghosted.as_deref_mut() else {
-            let (x, mut out) = (x.owned()?, out.owned_mut()?);
-            self.contacts.iter().for_each(|contact| add(contact, &x, &mut out));
-            return Ok(());
-        };
-        values.copy_from(x)?;
-        values.update_ghosts()?;
-        {
-            let (values, mut forces) = (values.local()?, forces.local_mut()?);
-            forces.fill(0.0);
-            self.contacts.iter().for_each(|contact| add(contact, &values, &mut forces));
-        }
-        forces.add_ghosts_to_owners()?;
-        out.add_scaled(1.0, forces)
+    /// Writes the velocities of these unknowns.
+    fn map(&mut self, x: &DistributedVector) -> Result<()> {
+        self.scratch.velocity.copy_from(x)?;
+        let mut velocity = self.scratch.velocity.owned_mut()?;
+        self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        Ok(())
     }
 }
 
 impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
-        self.residuals += 1;
-        self.matrix.multiply(x, residual)?;
+        self.effort.residuals += 1;
+        self.map(x)?;
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        self.matrix.multiply(velocity, residual)?;
         residual.add_scaled(-1.0, self.right_hand_side)?;
-        self.add_contact(x, residual, Contact::add_forces)
+        add_contact(ghosted, self.contacts, velocity, residual, Contact::add_forces)
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
-        let Some([values, _]) = self.ghosted.as_deref_mut() else {
+        {
             let x = x.owned()?;
-            self.contacts.iter_mut().for_each(|contact| contact.linearise(&x));
-            return Ok(());
-        };
-        values.copy_from(x)?;
-        values.update_ghosts()?;
-        let values = values.local()?;
-        self.contacts.iter_mut().for_each(|contact| contact.linearise(&values));
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x));
+        }
+        self.map(x)?;
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        if let Some([values, _]) = ghosted {
+            values.copy_from(velocity)?;
+            values.update_ghosts()?;
+            let values = values.local()?;
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&values));
+        } else {
+            let velocity = velocity.owned()?;
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&velocity));
+        }
+        let digests = self.contacts.iter().map(Contact::set_digest);
+        self.effort.sets.push(digests.fold(0, |sum, digest| sum.rotate_left(7) ^ digest));
         Ok(())
     }
 
@@ -71,7 +126,61 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         direction: &DistributedVector,
         result: &mut DistributedVector,
     ) -> Result<()> {
-        self.matrix.multiply(direction, result)?;
-        self.add_contact(direction, result, Contact::add_derivative)
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        velocity.copy_from(direction)?;
+        {
+            let mut velocity = velocity.owned_mut()?;
+            self.contacts.iter_mut().for_each(|contact| contact.map_direction(&mut velocity));
+        }
+        self.matrix.multiply(velocity, result)?;
+        add_contact(ghosted, self.contacts, velocity, result, Contact::add_derivative)
+    }
+
+    fn solve_jacobian(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+    ) -> Result<()> {
+        let Scratch { velocity, open, ghosted } = &mut *self.scratch;
+        let mut operator = Reduced { matrix: self.matrix, contacts: self.contacts, ghosted };
+        open.copy_from(residual)?;
+        operator.project(open)?;
+        let outcome = self.linear_solver.solve(&mut operator, open, velocity)?;
+        self.effort.linear_iterations += outcome.linear.iterations;
+        self.effort.indefinite += usize::from(outcome.indefinite);
+        if !outcome.linear.converged() {
+            return Err(Error::Failed(outcome.linear.words().into()));
+        }
+        direction.copy_from(velocity)?;
+        if self.contacts.iter().any(|contact| contact.law.has_vertical_parts()) {
+            self.matrix.multiply(velocity, open)?;
+            add_contact(operator.ghosted, self.contacts, velocity, open, Contact::add_slopes)?;
+            open.scale(-1.0)?;
+            open.add_scaled(1.0, residual)?;
+        }
+        let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
+        self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
+        Ok(())
+    }
+}
+
+/// `P (K + C') P` in velocities, where `P` holds the points on vertical parts of their graphs.
+struct Reduced<'a, const D: usize> {
+    matrix: &'a Matrix,
+    contacts: &'a [Contact<D>],
+    ghosted: &'a mut Option<[DistributedVector; 2]>,
+}
+
+impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
+    fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)?;
+        self.project(y)
+    }
+
+    fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
+        let mut x = x.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.project(&mut x));
+        Ok(())
     }
 }

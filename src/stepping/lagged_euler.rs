@@ -8,14 +8,15 @@
 //! ```
 
 use super::{
-    equations::ContactEquations,
+    equations::Scratch,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
+    newton::{Newton, REMEDY, failed},
 };
 use crate::{
     body::Body,
-    effect::{Energy, Step},
+    effect::{Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, Snes, Stage},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage},
     session::Session,
     state::State,
 };
@@ -35,6 +36,10 @@ pub struct StepOutcome {
     pub linear_iterations: usize,
     /// Contact points that changed their branch, over all ranks.
     pub active_changes: usize,
+    /// Contact points by what happens there, over all ranks.
+    pub points: PointCount,
+    /// Linear systems that were not positive definite, so that GMRES had to solve them.
+    pub indefinite_solves: usize,
     /// Largest scaled distance to the contact graphs.
     pub inclusion_residual: f64,
     /// Energies of the step, over all ranks.
@@ -78,7 +83,7 @@ impl Stages {
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
 enum Solver {
     Linear(Ksp),
-    Newton { snes: Snes, scratch: Option<[DistributedVector; 2]>, before: Vec<u8>, after: Vec<u8> },
+    Newton(Box<Newton>),
 }
 
 /// The scheme with its matrix, solver and work vectors.
@@ -113,14 +118,13 @@ impl LaggedEuler {
             Solver::Linear(ksp)
         } else {
             let mut snes = Snes::new("", &state.velocity, D)?;
-            preconditioner.configure(&mut snes.linear_solver()?, session.ranks(), unknowns)?;
             snes.apply_options()?;
-            let scratch = if body.contacts.iter().any(|c| c.needs_ghosts()) {
-                Some([state.velocity.like()?, state.velocity.like()?])
-            } else {
-                None
-            };
-            Solver::Newton { snes, scratch, before: Vec::new(), after: Vec::new() }
+            let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
+            preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
+            linear_solver.linear_solver().apply_options()?;
+            let scratch = Scratch::new(&state.velocity, &body.contacts)?;
+            let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
+            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
@@ -137,7 +141,7 @@ impl LaggedEuler {
 
     /// Whether steps are solved by Newton's method.
     pub fn is_nonlinear(&self) -> bool {
-        matches!(self.solver, Solver::Newton { .. })
+        matches!(self.solver, Solver::Newton(_))
     }
 
     /// Whether a vector of nodal loads exists.
@@ -170,12 +174,17 @@ impl LaggedEuler {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
         }
-        let ksp = match &mut self.solver {
-            Solver::Linear(ksp) => ksp,
-            Solver::Newton { snes, .. } => &mut snes.linear_solver()?,
-        };
-        ksp.set_matrix(&matrix)?;
-        session.agree(ksp.set_up())?;
+        match &mut self.solver {
+            Solver::Linear(ksp) => {
+                ksp.set_matrix(&matrix)?;
+                session.agree(ksp.set_up())?;
+            }
+            Solver::Newton(newton) => {
+                newton.linear_solver.set_constant(&matrix)?;
+                session.agree(newton.linear_solver.linear_solver().set_up())?;
+                newton.choose_scales(session, &body.contacts, &self.right_hand_side)?;
+            }
+        }
         self.matrix = Some((length, matrix));
         self.clock.assembly += start.elapsed();
         if self.clock.first_assembly.is_zero() {
@@ -196,7 +205,7 @@ impl LaggedEuler {
     pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         match &mut self.solver {
             Solver::Linear(ksp) => ksp.precondition(r, z),
-            Solver::Newton { snes, .. } => snes.linear_solver()?.precondition(r, z),
+            Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
         }
     }
 
@@ -213,12 +222,14 @@ impl LaggedEuler {
         let stage = self.stages.history.enter()?;
         let explicit = self.write_right_hand_side(session, body, state, step)?;
         self.extrapolate(state, step)?;
+        session.agree(prepare_contacts(body, state, step))?;
         drop(stage);
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
         let mut outcome = self.solve(session, body, state, step)?;
         state.commit(&self.trial, step.time, step.length)?;
+        commit_tractions(body, state)?;
         body.commit();
         drop(stage);
         let balancing = Instant::now();
@@ -229,7 +240,9 @@ impl LaggedEuler {
         {
             let velocity = state.velocity.local()?;
             for contact in &body.contacts {
-                energy.contact += step.length * contact.dissipation(&velocity);
+                let [given, numerical] = contact.release(&velocity, step.length);
+                energy.contact += given;
+                energy.numerical += numerical;
             }
         }
         outcome.energy = Energy::from_array(session.sum(energy.to_array()));
@@ -307,76 +320,45 @@ impl LaggedEuler {
                 }
                 Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
             }
-            Solver::Newton { snes, scratch, before, after } => {
-                branches(body, &state.velocity, before)?;
-                snes.linear_solver()?.set_tolerances(
+            Solver::Newton(newton) => {
+                newton.linear_solver.set_tolerances(
                     LINEAR_REDUCTION,
                     LINEAR_SHARE * tolerance,
                     LINEAR_ITERATIONS,
                 )?;
-                let mut equations = ContactEquations {
-                    matrix,
-                    contacts: &mut body.contacts,
-                    right_hand_side: &self.right_hand_side,
-                    ghosted: scratch.as_mut(),
-                    residuals: 0,
-                };
-                let solved = snes.solve(
-                    &mut equations,
-                    matrix,
-                    &mut self.trial,
-                    tolerance,
-                    self.settings.newton_iterations,
-                );
-                let outcome = session.agree(solved)?;
-                if !outcome.converged() {
-                    return Err(failed(step, outcome.words(), REMEDY));
-                }
-                self.trial.update_ghosts()?;
-                branches(body, &self.trial, after)?;
-                let changes = before.iter().zip(after.iter()).filter(|(a, b)| a != b).count();
-                let inclusion = {
-                    let (velocity, residual) = (self.trial.local()?, snes.residual().owned()?);
-                    let each = body.contacts.iter().map(|c| c.inclusion_residual(&velocity, &residual));
-                    each.fold(0.0, f64::max)
-                };
-                let inclusion = session.largest([inclusion])[0];
-                if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
-                    let found = format!("velocity and pressure are {inclusion:.1e} off the contact graph");
-                    return Err(failed(step, &found, INCLUSION_REMEDY));
-                }
-                Ok(StepOutcome {
-                    newton_iterations: outcome.iterations,
-                    linear_iterations: outcome.linear_iterations,
-                    active_changes: session.total(changes),
-                    inclusion_residual: inclusion,
-                    energy: Energy::default(),
-                })
+                let limits = (tolerance, self.settings);
+                let right_hand_side = &self.right_hand_side;
+                newton.solve(session, body, state, step, matrix, right_hand_side, &mut self.trial, limits)
             }
         }
     }
 }
 
-const REMEDY: &str =
-    "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
-
-const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
-
-fn failed(step: Step, what: &str, remedy: &str) -> Error {
-    Error::Failed(format!(
-        "step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}",
-        step.time, step.length
-    ))
+/// Takes in what the step brings to the points of all contacts.
+fn prepare_contacts<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+    step: Step,
+) -> Result<()> {
+    if body.contacts.is_empty() {
+        return Ok(());
+    }
+    let displacement = state.displacement.local()?;
+    for contact in &mut body.contacts {
+        contact.prepare(step.time, step.length, &displacement)?;
+    }
+    if let Some(traction) = &state.contact_traction {
+        let traction = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+    }
+    Ok(())
 }
 
-/// Branches of all contact points at owned or ghost velocities.
-fn branches<const D: usize, const S: usize>(
-    body: &Body<D, S>,
-    velocity: &DistributedVector,
-    out: &mut Vec<u8>,
-) -> Result<()> {
-    let velocity = velocity.local()?;
-    out.clear();
-    body.contacts.iter().for_each(|contact| contact.branches(&velocity, out));
+/// Puts the pressures of the step just taken into the state.
+fn commit_tractions<const D: usize, const S: usize>(body: &Body<D, S>, state: &mut State) -> Result<()> {
+    let Some(traction) = &mut state.contact_traction else { return Ok(()) };
+    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
+    traction.fill(0.0);
+    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
     Ok(())
 }

@@ -19,7 +19,7 @@ pub enum Preconditioner {
 }
 
 /// How the equations of a step are solved.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
     /// Residual norm relative to the norm of the right-hand side.
     pub tolerance: f64,

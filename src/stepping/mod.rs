@@ -3,7 +3,8 @@
 mod equations;
 mod lagged_euler;
 mod linear_solver;
+mod newton;
 
-pub use equations::ContactEquations;
+pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
 pub use linear_solver::{Preconditioner, SolverSettings};

@@ -42,6 +42,15 @@ impl Case {
             .set("output.probe", probes)
     }
 
+    /// A job of the folder `jobs`, with its own steps.
+    pub fn of(name: &str) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("jobs/{name}.toml"));
+        let text = std::fs::read_to_string(&file).expect("job");
+        let job = text.parse::<Table>().expect("TOML");
+        let step = job["time"]["step"].to_string();
+        Self::from(&file).set("time.step", &step)
+    }
+
     /// A job of the repository with 16 steps a second.
     pub fn from(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).expect("job");

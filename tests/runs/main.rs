@@ -3,6 +3,7 @@
 mod case;
 mod certificates;
 mod check_values;
+mod contact;
 mod effects;
 mod failures;
 mod hdf5_file;

@@ -96,6 +96,20 @@ fn a_restarted_run_with_fewer_effects_is_the_straight_run_to_the_last_bit() {
 }
 
 #[test]
+fn a_restarted_run_with_each_contact_law_is_the_straight_run_to_the_last_bit() {
+    for law in [
+        "unilateral = { gap = '0.004 - 0.01*t' }",
+        "unilateral = { bound = 'velocity' }",
+        "compliance = { stiffness = 1000, exponent = 1.5, gap = 0.004 }",
+        "graph = { points = [[0, -2], [0, 2]] }",
+    ] {
+        let make = || saving().set("contact.0.normal", &format!("{{ {law} }}"));
+        compare_with_straight(make, 1, law);
+        compare_with_straight(make, 3, law);
+    }
+}
+
+#[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");

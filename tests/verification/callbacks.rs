@@ -4,7 +4,7 @@ use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, v
 use crate::{mpirun, run_on};
 use clarke::{
     error::{Error, Exit, Result},
-    petsc::{DistributedVector, Matrix, NonlinearProblem, Snes},
+    petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, Snes},
     session::Session,
 };
 use std::path::Path;
@@ -16,6 +16,8 @@ enum Fault {
     Residual(usize),
     Linearise(usize),
     Jacobian(usize),
+    Solve(usize),
+    Inner(usize),
     Panic(usize),
 }
 
@@ -24,16 +26,29 @@ struct Cubic<'a> {
     matrix: &'a Matrix,
     right_hand_side: DistributedVector,
     slopes: Vec<f64>,
+    linear_solver: ProjectedKsp,
+    linear_iterations: usize,
     fault: Fault,
-    calls: [usize; 3],
+    calls: [usize; 5],
 }
 
 impl Cubic<'_> {
     fn called(&mut self, callback: usize) -> Result<()> {
-        self.calls[callback] += 1;
-        let call = self.calls[callback];
-        let now = match (self.fault, callback) {
-            (Fault::Residual(at), 0) | (Fault::Linearise(at), 1) | (Fault::Jacobian(at), 2) => at == call,
+        called(self.fault, &mut self.calls, callback)
+    }
+}
+
+/// Counts a call, and fails at the one that is to go wrong.
+fn called(fault: Fault, calls: &mut [usize; 5], callback: usize) -> Result<()> {
+    {
+        calls[callback] += 1;
+        let call = calls[callback];
+        let now = match (fault, callback) {
+            (Fault::Residual(at), 0)
+            | (Fault::Linearise(at), 1)
+            | (Fault::Jacobian(at), 2)
+            | (Fault::Solve(at), 3)
+            | (Fault::Inner(at), 4) => at == call,
             (Fault::Panic(at), 0) => {
                 assert_ne!(at, call, "a callback panicked");
                 false
@@ -73,20 +88,58 @@ impl NonlinearProblem for Cubic<'_> {
         }
         self.called(2)
     }
+
+    fn solve_jacobian(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+    ) -> Result<()> {
+        let Self { matrix, slopes, linear_solver, fault, calls, .. } = self;
+        let mut operator = Inner { matrix, slopes, fault: *fault, calls };
+        let outcome = linear_solver.solve(&mut operator, residual, direction)?;
+        self.linear_iterations += outcome.linear.iterations;
+        self.called(3)
+    }
+}
+
+/// The Jacobian on the whole space.
+struct Inner<'a> {
+    matrix: &'a Matrix,
+    slopes: &'a [f64],
+    fault: Fault,
+    calls: &'a mut [usize; 5],
+}
+
+impl ProjectedOperator for Inner<'_> {
+    fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        {
+            let (x, mut y) = (x.owned()?, y.owned_mut()?);
+            y.iter_mut().zip(x.iter().zip(self.slopes)).for_each(|(y, (x, slope))| *y += slope * x);
+        }
+        called(self.fault, self.calls, 4)
+    }
+
+    fn project(&mut self, _: &mut DistributedVector) -> Result<()> {
+        Ok(())
+    }
 }
 
 fn solution(unknown: usize) -> f64 {
     1.0 + 0.5 * (unknown as f64).sin()
 }
 
-fn solver(session: &Session, matrix: &Matrix) -> Snes {
-    let mut snes = Snes::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver");
-    let mut ksp = snes.linear_solver().expect("linear solver");
-    ksp.set_method("cg").expect("cg");
-    ksp.set_preconditioner("jacobi", None).expect("jacobi");
-    ksp.set_tolerances(1e-12, 1e-14, 100).expect("tolerances");
-    ksp.set_matrix(matrix).expect("matrix");
-    snes
+fn solver(session: &Session) -> Snes {
+    Snes::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver")
+}
+
+fn linear_solver(session: &Session, matrix: &Matrix) -> ProjectedKsp {
+    let mut solver = ProjectedKsp::new("", &vector(session), crate::petsc_boundary::BLOCK).expect("solver");
+    solver.linear_solver().set_method("cg").expect("cg");
+    solver.linear_solver().set_preconditioner("jacobi", None).expect("jacobi");
+    solver.set_tolerances(1e-12, 1e-14, 100).expect("tolerances");
+    solver.set_constant(matrix).expect("matrix");
+    solver
 }
 
 fn problem<'a>(session: &Session, matrix: &'a Matrix, fault: Fault) -> Cubic<'a> {
@@ -95,25 +148,34 @@ fn problem<'a>(session: &Session, matrix: &'a Matrix, fault: Fault) -> Cubic<'a>
     set(session, &mut right_hand_side, |row| product(all, row, solution) + solution(row).powi(3));
     let last = session.rank() == session.ranks() - 1;
     let fault = if last { fault } else { Fault::None };
-    Cubic { matrix, right_hand_side, slopes: Vec::new(), fault, calls: [0; 3] }
+    let linear_solver = linear_solver(session, matrix);
+    Cubic {
+        matrix,
+        right_hand_side,
+        slopes: Vec::new(),
+        linear_solver,
+        linear_iterations: 0,
+        fault,
+        calls: [0; 5],
+    }
 }
 
 pub fn solve_nonlinear(session: &Session) {
     let matrix = matrix(session);
-    let mut snes = solver(session, &matrix);
+    let mut snes = solver(session);
     let mut problem = problem(session, &matrix, Fault::None);
     let mut x = vector(session);
-    let outcome = snes.solve(&mut problem, &matrix, &mut x, 1e-11, 30).expect("solve");
+    let outcome = snes.solve(&mut problem, &mut x, 1e-11, 30).expect("solve");
     assert!(outcome.converged() && outcome.residual <= 1e-11, "{outcome:?}");
     assert!((3..=10).contains(&outcome.iterations), "Newton's method converges fast: {outcome:?}");
-    assert!(outcome.linear_iterations > outcome.iterations);
+    assert!(problem.linear_iterations > outcome.iterations);
     assert_owned(session, &x, solution);
     assert!(snes.residual().norm().expect("norm") <= 1e-11);
 
-    let again = snes.solve(&mut problem, &matrix, &mut x, 1e-9, 30).expect("again");
-    assert_eq!((again.iterations, again.linear_iterations), (0, 0), "it started from the solution");
+    let again = snes.solve(&mut problem, &mut x, 1e-9, 30).expect("again");
+    assert_eq!(again.iterations, 0, "it started from the solution");
     x.fill(0.0).expect("fill");
-    let short = snes.solve(&mut problem, &matrix, &mut x, 1e-11, 1).expect("an outcome, not an error");
+    let short = snes.solve(&mut problem, &mut x, 1e-11, 1).expect("an outcome, not an error");
     assert!(!short.converged());
     assert_eq!(short.words(), "too many Newton iterations");
 }
@@ -121,13 +183,18 @@ pub fn solve_nonlinear(session: &Session) {
 pub fn fail_on_the_last_rank(session: &Session) {
     let last = session.ranks() - 1;
     let matrix = matrix(session);
-    let mut snes = solver(session, &matrix);
-    for fault in
-        [Fault::Residual(1), Fault::Residual(3), Fault::Jacobian(1), Fault::Jacobian(7), Fault::Linearise(2)]
-    {
+    let mut snes = solver(session);
+    for fault in [
+        Fault::Residual(1),
+        Fault::Residual(3),
+        Fault::Jacobian(1),
+        Fault::Solve(2),
+        Fault::Inner(7),
+        Fault::Linearise(2),
+    ] {
         let mut x = vector(session);
         let mut faulty = problem(session, &matrix, fault);
-        let result = snes.solve(&mut faulty, &matrix, &mut x, 1e-11, 30);
+        let result = snes.solve(&mut faulty, &mut x, 1e-11, 30);
         match (&result, session.rank() == last) {
             (Err(error), true) => assert_eq!(error.to_string(), "this rank gave up"),
             (Ok(outcome), false) => {
@@ -147,7 +214,7 @@ pub fn fail_on_the_last_rank(session: &Session) {
         }
         let mut sound = problem(session, &matrix, Fault::None);
         x.fill(0.0).expect("fill");
-        let outcome = session.agree(snes.solve(&mut sound, &matrix, &mut x, 1e-11, 30)).expect("solve");
+        let outcome = session.agree(snes.solve(&mut sound, &mut x, 1e-11, 30)).expect("solve");
         assert!(outcome.converged(), "the solver works again after a failure: {outcome:?}");
         assert_owned(session, &x, solution);
     }
@@ -157,9 +224,9 @@ pub fn panic_on_the_last_rank(session: &Session, folder: &Path) {
     let pid = std::process::id().to_string();
     std::fs::write(folder.join(format!("rank-{}", session.rank())), pid).expect("written");
     let matrix = matrix(session);
-    let mut snes = solver(session, &matrix);
+    let mut snes = solver(session);
     let mut faulty = problem(session, &matrix, Fault::Panic(2));
-    let result = snes.solve(&mut faulty, &matrix, &mut vector(session), 1e-11, 30);
+    let result = snes.solve(&mut faulty, &mut vector(session), 1e-11, 30);
     println!("a rank went on: {:?}", result.is_ok());
 }
 

@@ -56,27 +56,45 @@ fn material(draw: &mut Draw, dynamic: bool) -> String {
 }
 
 fn contact(draw: &mut Draw) -> String {
-    let quadrature = draw.one_of(&["nodal", "gauss"]);
+    let law = draw.one_of(&["damped", "graph", "jumps", "wall", "moving wall", "one way", "springs"]);
+    let anywhere = law == "damped" || law == "graph";
+    let quadrature = if anywhere { draw.one_of(&["nodal", "gauss"]) } else { "nodal" };
     let mut text = format!("[[contact]]\non = [\"bottom\"]\nquadrature = \"{quadrature}\"\n");
     let first = draw.between(0.01, 0.1);
     let fall = -draw.between(0.02, 0.2);
-    if draw.flip() {
-        let symmetry = draw.one_of(&["even", "odd", "one_sided"]);
-        // Mirrored, a rise falls.
-        let rise = if symmetry == "even" { -fall } else { draw.between(0.1, 3.0) };
-        text += &format!(
-            "[contact.normal.damped_response]\nbreakpoints = [{first}, {}]\nslopes = [{rise}, {fall}, {rise}]\n\
-             symmetry = \"{symmetry}\"\n",
-            2.0 * first
-        );
-    } else {
-        let high = draw.between(0.1, 0.5);
-        text += &format!(
+    let gap = draw.between(-0.001, 0.01);
+    let high = draw.between(0.1, 0.5);
+    text += &match law {
+        "damped" => {
+            let symmetry = draw.one_of(&["even", "odd", "one_sided"]);
+            // Mirrored, a rise falls.
+            let rise = if symmetry == "even" { -fall } else { draw.between(0.1, 3.0) };
+            format!(
+                "[contact.normal.damped_response]\nbreakpoints = [{first}, {}]\nslopes = [{rise}, {fall}, {rise}]\n\
+                 symmetry = \"{symmetry}\"\n",
+                2.0 * first
+            )
+        }
+        "graph" => format!(
             "[contact.normal.graph]\npoints = [[-{first}, 0], [{first}, {high}], [{}, {}]]\nslope_after = 1\n",
             3.0 * first,
             high + 2.0 * first * fall
-        );
-    }
+        ),
+        "jumps" => format!(
+            "[contact.normal.graph]\npoints = [[-{first}, -1], [-{first}, 0], [0, 0], [0, {high}], [{first}, {}], \
+             [{first}, 1]]\nslope_after = {fall}\n",
+            high + first * fall
+        ),
+        "wall" => format!("[contact.normal.unilateral]\ngap = {gap}\n"),
+        "moving wall" => format!("[contact.normal.unilateral]\ngap = \"{gap} - {high}*t + 0.01*x\"\n"),
+        "one way" => "[contact.normal.unilateral]\nbound = \"velocity\"\n".into(),
+        _ => {
+            let (stiffness, exponent) = (draw.between(10.0, 1000.0), draw.one_of(&["1", "1.5", "2"]));
+            format!(
+                "[contact.normal.compliance]\nstiffness = {stiffness}\nexponent = {exponent}\ngap = \"{gap} - {high}*t\"\n"
+            )
+        }
+    };
     text
 }
 

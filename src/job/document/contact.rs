@@ -92,27 +92,49 @@ pub struct Graph {
     pub slope_after: f64,
 }
 
-/// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)`.
+/// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compliance {
-    /// Pressure per penetration.
-    #[schemars(extend("unit" = "Pa/m", "exclusiveMinimum" = 0), example = 1e4)]
+    /// Pressure at unit penetration.
+    #[schemars(extend("unit" = "Pa/m^exponent", "exclusiveMinimum" = 0), example = 1e4)]
     pub stiffness: f64,
+    /// Power of the penetration; 1 is a bed of springs.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 10), example = 1.5)]
+    pub exponent: f64,
     /// Distance to the obstacle along the normal, at time t at the point x, y, z.
     #[serde(default)]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Scalar,
 }
 
-/// Unilateral constraint: normal displacement <= gap.
+fn one() -> f64 {
+    1.0
+}
+
+/// Unilateral constraint: normal displacement <= gap, or normal velocity <= 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Unilateral {
+    /// What is bounded.
+    #[serde(default)]
+    pub bound: Bound,
     /// Distance to the obstacle along the normal, at time t at the point x, y, z.
     #[serde(default)]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Scalar,
+}
+
+/// What a rigid obstacle bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Bound {
+    /// The normal displacement never exceeds the gap.
+    #[default]
+    Displacement,
+    /// The normal velocity never exceeds zero: the body only ever moves away.
+    Velocity,
 }
 
 /// The friction law.

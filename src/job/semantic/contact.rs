@@ -2,13 +2,15 @@
 
 use super::boundary::check_flat;
 use super::{Findings, MeshNames, items};
-use crate::job::document::{DampedResponse, SlipWeakening};
+use crate::job::document::{Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
     for contact in items(findings.root, "contact") {
         check_damped_response(findings, &format!("{contact}.normal.damped_response"));
         check_graph(findings, &format!("{contact}.normal.graph.points"));
+        check_quadrature(findings, &contact);
+        check_bound(findings, &format!("{contact}.normal.unilateral"));
         let path = format!("{contact}.friction.slip_weakening");
         if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
             && at_rest < dynamic
@@ -16,6 +18,33 @@ pub fn check(findings: &mut Findings<'_>) {
             let message = "the static coefficient is below the dynamic one";
             findings.fault(&format!("{path}.static"), message, format!("it must be at least {dynamic}"));
         }
+    }
+}
+
+/// Gauss points know neither jumps nor the displacement.
+fn check_quadrature(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    if root.read::<Quadrature>(&format!("{contact}.quadrature")) != Some(Quadrature::Gauss) {
+        return;
+    }
+    let graph: Option<Graph> = root.read(&format!("{contact}.normal.graph"));
+    let jumps = graph.is_some_and(|graph| graph.points.windows(2).any(|pair| pair[0][0] == pair[1][0]));
+    let displaced = ["compliance", "unilateral"]
+        .into_iter()
+        .any(|law| root.find(&format!("{contact}.normal.{law}")).is_some());
+    if jumps || displaced {
+        let message = "this contact law does not act at Gauss points";
+        findings.fault(&format!("{contact}.quadrature"), message, "use \"nodal\", or leave the key out");
+    }
+}
+
+/// A bound on the velocity knows no gap.
+fn check_bound(findings: &mut Findings<'_>, path: &str) {
+    let gap = format!("{path}.gap");
+    if findings.root.read(&format!("{path}.bound")) == Some(Bound::Velocity)
+        && findings.root.find(&gap).is_some()
+    {
+        findings.fault(&gap, "a bound on the velocity has no gap", "delete it, or bound the displacement");
     }
 }
 

@@ -1,0 +1,367 @@
+//! Contact: a law at the quadrature points of a boundary.
+//!
+//! At nodal points the unknown `x` of a step carries, in place of the velocity along the normal, the parameter of the
+//! law's graph: `s = c v + p`, which is `c f (x . m)`, with `m` the normal without held components at length 1 and `f` the
+//! length it had. [`Contact::map`] turns unknowns into velocities: `v = x + (V(s) / f - x . m) m`. Graphs may then be
+//! vertical: constraints and sticking. With `theta = c V'(s)` between 0 and 1,
+//!
+//! ```text
+//! R(x) = K v + sum w f p m - b
+//! J dx = K dv + sum w f^2 c (1 - theta) (dx . m) m,   dv = dx + (theta - 1) (dx . m) m
+//! ```
+//!
+//! In terms of `dv` the Jacobian is symmetric: `K + sum w f^2 c (1 - theta) / theta m m^T`, and `dv . m = 0` where `theta = 0`.
+//! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
+//! unknown; their law must not have vertical parts.
+
+mod point;
+mod unknowns;
+
+use crate::{
+    contact::{NodeContext, NormalLaw},
+    error::{Error, Result},
+    job::Scalar,
+    mesh::{Mesh, shape::facet_normal},
+    session::Session,
+    space::{facet_rule, surface_points},
+    tensor::norm,
+};
+use point::{Point, Unknown};
+
+pub use unknowns::choose_unknowns;
+
+/// Where on a facet the law holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quadrature {
+    /// At its nodes (trapezoidal rule).
+    Nodal,
+    /// At Gauss points.
+    Gauss,
+}
+
+/// A law on a contact boundary.
+#[derive(Debug)]
+pub struct Contact<const D: usize> {
+    /// The law.
+    pub law: NormalLaw,
+    /// Distance to the obstacle along the normal in m, at a time, of the point that was at a place at first.
+    gap: Scalar,
+    /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
+    pub scale: f64,
+    facets: Vec<u32>,
+    points: Vec<Point<D>>,
+    needs_ghosts: bool,
+}
+
+/// Points of a contact boundary by what happens there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PointCount {
+    /// On a vertical part of the graph: stuck in a jump, or held by an obstacle.
+    pub sticking: usize,
+    /// Without pressure.
+    pub open: usize,
+}
+
+impl<const D: usize> Contact<D> {
+    /// Puts the law on these facets of this rank. `fixed` has one flag a local component. Collective.
+    pub fn new(
+        session: &Session,
+        mesh: &Mesh<D>,
+        facets: &[u32],
+        quadrature: Quadrature,
+        law: NormalLaw,
+        gap: Scalar,
+        fixed: &[bool],
+    ) -> Result<Self> {
+        let mut points: Vec<Point<D>> = match quadrature {
+            Quadrature::Nodal => surface_points(session, mesh, facets)?
+                .into_iter()
+                .map(|p| Point::nodal(p.node, p.normal, p.weight, fixed))
+                .collect(),
+            Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, fixed)).collect(),
+        };
+        for point in &mut points {
+            let mut place = [0.0; D];
+            for (node, share) in point.nodes() {
+                for i in 0..D {
+                    place[i] += share * mesh.nodes[node][i];
+                }
+            }
+            point.place = place;
+        }
+        let scale = 2.0 * law.monotonicity_constant() + 1.0;
+        let needs_ghosts = quadrature == Quadrature::Gauss;
+        Ok(Self { law, gap, scale, facets: facets.to_vec(), points, needs_ghosts })
+    }
+
+    /// Whether velocities of ghost nodes are read and forces on them written.
+    pub fn needs_ghosts(&self) -> bool {
+        self.needs_ghosts
+    }
+
+    /// Quadrature points on this rank.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Facets of this rank, local numbers.
+    pub fn facets(&self) -> &[u32] {
+        &self.facets
+    }
+
+    /// Adds the normals at the points to nodal values.
+    pub fn add_normals(&self, nodal: &mut [f64]) {
+        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
+            point.add_along(point.stretch, nodal);
+        }
+    }
+
+    /// Adds the nodal forces of a pressure of 1 Pa; nodal quadrature.
+    pub fn add_unit_pressure(&self, forces: &mut [f64]) {
+        self.points.iter().filter(|_| !self.needs_ghosts).for_each(|point| point.push(1.0, forces));
+    }
+
+    /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
+    pub fn normal_square(&self, nodal: &[f64]) -> f64 {
+        let points = self.points.iter().filter(|_| !self.needs_ghosts);
+        points.map(|p| p.weight * (p.stretch * p.along(nodal)).powi(2)).sum()
+    }
+
+    /// Takes in what a step of this length to `time` brings, from the displacement at its start (with ghosts).
+    pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
+        if !self.law.depends_on_displacement() {
+            return Ok(());
+        }
+        for point in &mut self.points {
+            let gap = gap_at(&self.gap, time, point)?;
+            let before = gap_at(&self.gap, time - length, point)?;
+            let penetration = point.normal_component(displacement) - gap;
+            point.context = NodeContext { penetration, step_length: length };
+            point.gap_change = gap - before;
+        }
+        Ok(())
+    }
+
+    /// Takes the pressures from the nodal tractions of the converged state.
+    pub fn recall(&mut self, traction: &[f64]) {
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+            point.pressure = point.along(traction);
+        }
+    }
+
+    /// Turns velocities into unknowns, with the pressures as they are.
+    pub fn unmap(&self, values: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
+            point.add_along(point.pressure / (self.scale * point.stretch), values);
+        }
+    }
+
+    /// Turns unknowns at owned nodes into velocities, and takes the pressures that go with them.
+    pub fn map(&mut self, values: &mut [f64]) {
+        let (law, scale) = (&self.law, self.scale);
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+            let along = point.along(values);
+            let found = point.resolve(law, scale, along);
+            point.pressure = found.pressure;
+            point.add_along(found.velocity / point.stretch - along, values);
+        }
+    }
+
+    /// Adds the contact forces in N to `forces`: of the last mapped unknowns, elsewhere of these velocities.
+    pub fn add_forces(&self, velocity: &[f64], forces: &mut [f64]) {
+        for point in &self.points {
+            point.push(point.pressure_at(&self.law, velocity), forces);
+        }
+    }
+
+    /// Takes the derivative of the law at these unknowns at owned nodes.
+    pub fn linearise_parameters(&mut self, values: &[f64]) {
+        let (law, scale) = (&self.law, self.scale);
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+            let derivative = point.resolve(law, scale, point.along(values)).derivative;
+            point.theta = scale * derivative;
+            point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
+        }
+    }
+
+    /// Takes the slopes of the law at these velocities, where the velocity is the unknown.
+    pub fn linearise_velocities(&mut self, velocity: &[f64]) {
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Velocity) {
+            point.slope = self.law.slope(point.normal_component(velocity), point.context);
+        }
+    }
+
+    /// Turns a change of the unknowns at owned nodes into the change of the velocities, and takes the change of the
+    /// pressures.
+    pub fn map_direction(&mut self, values: &mut [f64]) {
+        let scale = self.scale;
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+            let along = point.along(values);
+            point.change = scale * point.stretch * (1.0 - point.theta) * along;
+            point.add_along((point.theta - 1.0) * along, values);
+        }
+    }
+
+    /// Adds the change of the contact forces: of the last mapped direction, elsewhere of this change of velocity.
+    pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
+        for point in &self.points {
+            match point.unknown {
+                Unknown::Parameter => point.push(point.change, forces),
+                Unknown::Velocity => point.push(point.slope * point.normal_component(direction), forces),
+                Unknown::Held => {}
+            }
+        }
+    }
+
+    /// Adds the change of the contact forces with the velocity; nothing where the graph is vertical.
+    pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
+        for point in &self.points {
+            match point.unknown {
+                Unknown::Parameter => {
+                    point.push(point.slope * point.stretch * point.along(direction), forces);
+                }
+                Unknown::Velocity => point.push(point.slope * point.normal_component(direction), forces),
+                Unknown::Held => {}
+            }
+        }
+    }
+
+    /// Removes from nodal values what moves points on vertical parts of the graph.
+    pub fn project(&self, values: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.theta == 0.0) {
+            point.add_along(-point.along(values), values);
+        }
+    }
+
+    /// Turns a change of velocities at owned nodes into the change of the unknowns. `open` holds the forces in N that the
+    /// change of velocities leaves open.
+    pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
+            let change = if point.theta == 0.0 {
+                point.along(open) / (self.scale * point.weight * point.stretch * point.stretch)
+            } else {
+                (1.0 / point.theta - 1.0) * point.along(values)
+            };
+            point.add_along(change, values);
+        }
+    }
+
+    /// The branch of every point, to count changes of the active set.
+    pub fn branches(&self, velocity: &[f64], out: &mut Vec<u8>) {
+        out.extend(self.points.iter().map(|point| {
+            let along = point.normal_component(velocity);
+            let branch = match point.unknown {
+                Unknown::Parameter => {
+                    self.law.resolve(self.scale * along + point.pressure, self.scale, point.context).branch
+                }
+                Unknown::Velocity => self.law.branch(along, point.context),
+                Unknown::Held => 0,
+            };
+            branch.min(255) as u8
+        }));
+    }
+
+    /// A number that tells sets of points on the same branches of the last linearisation from others.
+    pub fn set_digest(&self) -> u64 {
+        let bits: Vec<u8> =
+            self.points.iter().flat_map(|p| [p.theta, p.slope]).flat_map(f64::to_le_bytes).collect();
+        xxhash_rust::xxh3::xxh3_64(&bits)
+    }
+
+    /// Counts the points by what happens there.
+    pub fn count(&self, velocity: &[f64]) -> PointCount {
+        let mut count = PointCount::default();
+        for point in &self.points {
+            count.open += usize::from(point.pressure_at(&self.law, velocity) == 0.0);
+            if point.unknown == Unknown::Parameter {
+                let parameter = self.scale * point.normal_component(velocity) + point.pressure;
+                let found = self.law.resolve(parameter, self.scale, point.context);
+                count.sticking += usize::from(found.derivative == 0.0);
+            }
+        }
+        count
+    }
+
+    /// Adds the tractions in Pa on the body's obstacle, `-sigma_nu` along the free normal, to nodal values.
+    pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
+        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
+            point.add_along(point.pressure_at(&self.law, velocity), nodal);
+        }
+    }
+
+    /// Energy in J that a step of this length gave away, and the scheme's own term, from velocities at its end.
+    ///
+    /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
+    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme.
+    pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for point in &self.points {
+            let v = point.normal_component(velocity);
+            let pressure = point.pressure_at(&self.law, velocity);
+            let work = length * pressure * v;
+            let before = point.context.penetration + point.gap_change;
+            let after = point.context.penetration + length * v;
+            let stored = self.law.energy(after) - self.law.energy(before);
+            let numerical = if matches!(self.law, NormalLaw::Compliance(_)) {
+                stored - pressure * (after - before)
+            } else {
+                0.0
+            };
+            sums[0] += point.weight * (work - stored + numerical);
+            sums[1] += point.weight * numerical;
+        }
+        sums
+    }
+
+    /// Energy in J stored at `time`, from displacements with ghosts.
+    pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> f64 {
+        let NormalLaw::Compliance(law) = &self.law else { return 0.0 };
+        let energy = |point: &Point<D>| {
+            let gap = self.gap.evaluate(time, &point.place);
+            point.weight * law.energy(point.normal_component(displacement) - gap)
+        };
+        self.points.iter().map(energy).sum()
+    }
+
+    /// Largest normal velocity and largest pressure at points here, without signs.
+    pub fn range(&self, velocity: &[f64]) -> [f64; 2] {
+        self.points.iter().fold([0.0; 2], |[v, p], point| {
+            let along = point.normal_component(velocity).abs().max(point.context_velocity());
+            [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
+        })
+    }
+
+    /// Largest scaled distance of (normal velocity, pressure from equilibrium) to the graph. `residual` holds what is
+    /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own.
+    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 2]) -> f64 {
+        // The pressure that would change the velocities by as much as they are counts where there is no other.
+        let range = [range[0], range[1].max(self.scale * range[0])];
+        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
+        let distance = |p: &Point<D>| {
+            let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
+            self.law.distance(p.normal_component(velocity), pressure, p.context, range)
+        };
+        free.map(distance).fold(0.0, f64::max)
+    }
+}
+
+fn gap_at<const D: usize>(gap: &Scalar, time: f64, point: &Point<D>) -> Result<f64> {
+    let value = gap.evaluate(time, &point.place);
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(Error::Failed(format!(
+        "contact: the gap is {value} at t = {time} s, position {:?} m; correct the expression in the job",
+        point.place
+    )))
+}
+
+fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
+    let nodes = mesh.facets[facet as usize];
+    let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+    let measure = norm(&normal);
+    let unit = normal.map(|x| x / measure);
+    let rule = facet_rule::<D>().iter();
+    rule.map(|(place, weight)| Point::new(&nodes, &place[..D], unit, measure * weight, fixed)).collect()
+}

@@ -1,0 +1,70 @@
+//! Vertical parts of contact graphs: rest in a jump, rigid obstacles; and foundations that store energy.
+
+use crate::{case::Case, results::assert_same_answer};
+
+#[test]
+fn contact_laws_give_the_same_answer_on_any_number_of_ranks() {
+    for (job, end) in [("rigid_wall", "0.2"), ("stick_on_a_jump", "0.7"), ("compliant_foundation", "2.0")] {
+        let make = || Case::of(job).set("time.end", end).set("solver.tolerance", "1e-12");
+        let alone = make();
+        alone.run(1);
+        for ranks in [2, 3] {
+            let case = make();
+            case.run(ranks);
+            assert_same_answer(&alone.results(), &case.results(), 1e-8, &format!("{job} on {ranks} ranks"));
+        }
+    }
+}
+
+#[test]
+fn a_bar_hits_a_rigid_wall_when_it_gets_there_and_stays_out_of_it() {
+    let case = Case::of("rigid_wall");
+    let results = case.run(1);
+    let probes = results.table("probes.csv").only("probe", "front");
+    let (times, displacements) = (probes.numbers("time"), probes.numbers("displacement_x"));
+    let deepest = displacements.iter().copied().fold(f64::MIN, f64::max);
+    assert!(deepest <= 0.01 * (1.0 + 1e-12), "the bar is {} m in the wall", deepest - 0.01);
+    let touching: Vec<f64> = times
+        .iter()
+        .zip(&displacements)
+        .filter(|(_, u)| **u > 0.01 * (1.0 - 1e-12))
+        .map(|(time, _)| *time)
+        .collect();
+    let (first, last) = (touching[0], touching[touching.len() - 1]);
+    assert!((first - 0.1).abs() < 1e-3, "it gets there at {first} s");
+    assert!((last - 0.3).abs() < 0.02, "it leaves at {last} s, when the wave is back");
+}
+
+#[test]
+fn a_block_rests_in_a_jump_of_its_contact_law_until_the_load_is_beyond() {
+    let case = Case::of("stick_on_a_jump");
+    let results = case.run(1);
+    let profile = results.table("profiles.csv");
+    let (times, velocities) = (profile.numbers("time"), profile.numbers("normal_velocity"));
+    for (time, velocity) in times.iter().zip(velocities) {
+        if *time < 0.4 {
+            assert!(velocity.abs() < 1e-15, "it moves with {velocity} m/s at {time} s");
+        }
+        if *time > 0.7 {
+            assert!(velocity > 0.05, "it sticks at {time} s: {velocity} m/s");
+        }
+    }
+    let forces = profile.numbers("contact_pressure");
+    let mean = |wanted: f64| {
+        let here: Vec<f64> =
+            times.iter().zip(&forces).filter(|(t, _)| (**t - wanted).abs() < 1e-9).map(|(_, p)| *p).collect();
+        here.iter().sum::<f64>() / here.len() as f64
+    };
+    assert!((mean(0.25) - 2.5).abs() < 0.5, "{}", mean(0.25));
+}
+
+#[test]
+fn a_foundation_of_springs_carries_the_load_at_the_penetration_of_the_closed_form() {
+    let case = Case::of("compliant_foundation").set("time.end", "40.0");
+    let results = case.run(1);
+    let depth = -results.table("probes.csv").last("displacement_y");
+    assert!((depth - 0.021).abs() < 1e-5, "{depth}");
+    let stored = results.table("history.csv").last("contact_energy");
+    assert!((stored - 0.5 * 20.0 * 0.02).abs() < 1e-3, "{stored}");
+    assert!(results.number("max_energy_imbalance") < 1e-10);
+}
