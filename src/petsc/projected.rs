@@ -88,11 +88,19 @@ impl ProjectedKsp {
         self.ksp.set_tolerances(relative, absolute, iterations)
     }
 
-    /// Takes the constant matrix that makes the preconditioner.
+    /// Takes the constant matrix and sets up its preconditioner. Collective.
+    ///
+    /// The preconditioner is set up with the constant matrix alone: multigrid would smooth with the operator otherwise.
     pub fn set_constant(&mut self, constant: &Matrix) -> Result<()> {
         self.fallback = None;
         // SAFETY: live objects; PETSc keeps its own references.
-        check(unsafe { sys::KSPSetOperators(self.ksp.raw, self.shell, constant.raw) })
+        unsafe {
+            check(sys::KSPSetReusePreconditioner(self.ksp.raw, 0))?;
+            check(sys::KSPSetOperators(self.ksp.raw, constant.raw, constant.raw))?;
+            check(sys::KSPSetUp(self.ksp.raw))?;
+            check(sys::KSPSetReusePreconditioner(self.ksp.raw, 1))?;
+            check(sys::KSPSetOperators(self.ksp.raw, self.shell, constant.raw))
+        }
     }
 
     /// Solves `P B x = r` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an error.

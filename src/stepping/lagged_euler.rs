@@ -180,8 +180,7 @@ impl LaggedEuler {
                 session.agree(ksp.set_up())?;
             }
             Solver::Newton(newton) => {
-                newton.linear_solver.set_constant(&matrix)?;
-                session.agree(newton.linear_solver.linear_solver().set_up())?;
+                session.agree(newton.linear_solver.set_constant(&matrix))?;
                 newton.choose_scales(session, &body.contacts, &self.right_hand_side)?;
             }
         }
