@@ -26,6 +26,7 @@ const FUNCTIONS: &[&str] = &[
     "PC(Apply|SetType|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
+    "SNESLineSearchSetFromOptions",
     "SNESLineSearchSetType",
 ];
 

@@ -18,7 +18,7 @@ pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
-pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
+pub use snes::{LineSearch, NonlinearOutcome, NonlinearProblem, Snes};
 pub use vector::{DistributedVector, LocalRead, LocalWrite};
 
 use crate::error::{Error, Result};

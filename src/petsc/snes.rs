@@ -64,7 +64,16 @@ impl NonlinearOutcome {
     }
 }
 
-/// Newton's method with backtracking; the problem applies its Jacobian and solves with it.
+/// How far along its direction Newton's method goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LineSearch {
+    /// All the way.
+    FullSteps,
+    /// As far as the norm of the residual falls enough.
+    Backtracking,
+}
+
+/// Newton's method; the problem applies its Jacobian and solves with it.
 ///
 /// To PETSc the linear solve is a shell preconditioner, applied once; its own options carry the prefix `newton_`.
 #[derive(Debug)]
@@ -128,6 +137,21 @@ impl Snes {
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::SNESSetFromOptions(self.raw) })
+    }
+
+    /// Chooses the line search, unless PETSc options do.
+    pub fn set_line_search(&mut self, line_search: LineSearch) -> Result<()> {
+        let name = match line_search {
+            LineSearch::FullSteps => c"basic",
+            LineSearch::Backtracking => c"bt",
+        };
+        let mut search = ptr::null_mut();
+        // SAFETY: live objects; PETSc copies the name.
+        unsafe {
+            check(sys::SNESGetLineSearch(self.raw, &mut search))?;
+            check(sys::SNESLineSearchSetType(search, name.as_ptr()))?;
+            check(sys::SNESLineSearchSetFromOptions(search))
+        }
     }
 
     /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`. Collective.

@@ -4,6 +4,7 @@ use crate::{
     effect::Contact,
     error::{Error, Result},
     petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator},
+    state::State,
 };
 
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::effect::Contact`] for the unknown `x`.
@@ -81,6 +82,19 @@ fn add_contact<const D: usize>(
 }
 
 impl<const D: usize> ContactEquations<'_, D> {
+    /// Turns the converged velocities in `x` into unknowns, with the converged pressures; tells sets met before this from
+    /// later ones no more.
+    pub fn start_again(&mut self, state: &State, x: &mut DistributedVector) -> Result<()> {
+        self.effort.sets.clear();
+        if let Some(traction) = &state.contact_traction {
+            let traction = traction.owned()?;
+            self.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+        }
+        let mut x = x.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.unmap(&mut x));
+        Ok(())
+    }
+
     /// Writes the velocities of these unknowns.
     fn map(&mut self, x: &DistributedVector) -> Result<()> {
         self.scratch.velocity.copy_from(x)?;

@@ -9,10 +9,14 @@ use crate::{
     body::Body,
     effect::{Contact, Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
+    petsc::{DistributedVector, LineSearch, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
     session::Session,
     state::State,
 };
+
+/// Iterations with full steps before backtracking starts anew. A new set of branches raises the residual at first, so that
+/// backtracking would creep where full steps arrive; where the sets repeat, only backtracking arrives.
+const FULL_STEPS: usize = 12;
 
 /// Newton's method with what it needs.
 pub(super) struct Newton {
@@ -74,12 +78,24 @@ impl Newton {
             linear_solver: &mut self.linear_solver,
             effort: Effort::default(),
         };
-        let solved = self.snes.solve(&mut equations, trial, tolerance, settings.newton_iterations);
-        let effort = equations.effort;
-        let outcome = session.agree(solved.map_err(|error| match error {
+        let words = |error| match error {
             Error::Failed(words) => failed(step, &words, REMEDY),
             other => other,
-        }))?;
+        };
+        let iterations = settings.newton_iterations;
+        self.snes.set_line_search(LineSearch::FullSteps)?;
+        let full = self.snes.solve(&mut equations, trial, tolerance, iterations.min(FULL_STEPS));
+        let mut outcome = session.agree(full.map_err(words))?;
+        if !outcome.converged() && outcome.iterations < iterations {
+            let tried = outcome.iterations;
+            trial.copy_from(&state.velocity)?;
+            equations.start_again(state, trial)?;
+            self.snes.set_line_search(LineSearch::Backtracking)?;
+            let solved = self.snes.solve(&mut equations, trial, tolerance, iterations - tried);
+            outcome = session.agree(solved.map_err(words))?;
+            outcome.iterations += tried;
+        }
+        let effort = equations.effort;
         if !outcome.converged() {
             return Err(failed(step, &why(session, &outcome, &effort), REMEDY));
         }

@@ -149,10 +149,17 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Turns velocities into unknowns, with the pressures as they are.
+    /// Turns velocities into unknowns, with the pressures that the law gives them; where its graph has vertical parts,
+    /// with the pressures as they are.
     pub fn unmap(&self, values: &mut [f64]) {
+        let recalled = self.law.has_vertical_parts();
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
-            point.add_along(point.pressure / (self.scale * point.stretch), values);
+            let pressure = if recalled {
+                point.pressure
+            } else {
+                self.law.pressure(point.normal_component(values), point.context)
+            };
+            point.add_along(pressure / (self.scale * point.stretch), values);
         }
     }
 
