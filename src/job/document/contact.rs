@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Adhesion;
 use crate::job::Scalar;
 
 /// Boundaries that touch an obstacle, and the laws there.
@@ -20,6 +21,9 @@ pub struct Contact {
     /// The friction traction; absent: sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
+    /// Bonds to the obstacle; absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adhesion: Option<Adhesion>,
 }
 
 /// Where on a facet the contact laws hold.

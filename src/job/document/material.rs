@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Damage;
+
 /// A material; each effect is there only if its table or key is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -23,6 +25,9 @@ pub struct Material {
     /// Viscoplastic flow; absent: no stress history is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscoplasticity: Option<Viscoplasticity>,
+    /// Damage that weakens elastic and viscoplastic stress; absent: none is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Damage>,
 }
 
 /// What a 2D body stands for.
