@@ -3,10 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Bonds made at displacement zero that pull the body back to the obstacle and give way: the bonding b falls from 1 as
-/// `viscosity b' = -<b (stiffness R(opening)^2 + tangential_stiffness R(sliding)^2) - energy>_+` and never comes back. The
-/// traction is `b^2 stiffness R(opening)` along the normal and `b^2 tangential_stiffness R(sliding)` against the sliding, R
-/// the truncation at `length`. `contact_pressure` is that of the normal law alone.
+/// Adhesive bonds on a contact boundary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adhesion {

@@ -3,9 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Isotropic damage d of the cells: of elastic and viscoplastic stress s the share 1 - d is left; viscous stress stays. It
-/// grows as `viscosity d' = (1 - d)^exponent <Y - threshold>_+`, where `Y = s : E^-1 s / 2` is the elastic energy per volume
-/// of a sound cell under the same strain, and never heals.
+/// Isotropic damage with a rate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Damage {

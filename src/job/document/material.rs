@@ -25,7 +25,9 @@ pub struct Material {
     /// Viscoplastic flow; absent: no stress history is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscoplasticity: Option<Viscoplasticity>,
-    /// Damage that weakens elastic and viscoplastic stress; absent: none is kept.
+    /// Isotropic damage d of the cells: of elastic and viscoplastic stress the share 1 - d is left; viscous stress stays whole.
+    /// It grows as `viscosity d' = (1 - d)^exponent max(Y - threshold, 0)`, with the elastic energy per volume
+    /// `Y = s : E^-1 s / 2` of sound material under the same strain, and never heals. Absent: no damage is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damage: Option<Damage>,
 }
