@@ -1,10 +1,12 @@
 //! Contact laws: pure functions at a point of the contact boundary.
 
+mod adhesion;
 mod compliance;
 mod damped_response;
 mod graph;
 mod normal_law;
 
+pub use adhesion::Adhesion;
 pub use compliance::Compliance;
 pub use damped_response::{DampedResponse, Symmetry};
 pub use graph::Graph;

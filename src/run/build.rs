@@ -4,18 +4,19 @@ use crate::{
     body::Body,
     contact::{self, DampedResponse, Graph, Symmetry},
     effect::{
-        BodyForce, Contact, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load, Quadrature, Support,
-        Traction, ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
+        Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load,
+        Quadrature, Support, SurfaceEffect, Traction, ViscoplasticHistory, ViscousStress, choose_unknowns,
+        fixed_components,
     },
     error::{Error, Result},
     job::{self, Fix, Job, Material, Named, NormalLaw, Scalar},
     material::{
-        ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
-        Viscoplasticity,
+        self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
+        Perzyna, Viscoplasticity,
     },
     mesh::Mesh,
     session::Session,
-    space::Geometry,
+    space::{Geometry, surface_points},
     state::State,
     stepping::{Preconditioner, SolverSettings},
     tensor::Vector,
@@ -44,6 +45,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         let (law, gap) = session.agree(normal_law(&contact.normal))?;
         contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
     }
+    let surface_effects = surface_effects(session, job, &mesh)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -51,7 +53,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
-    Ok((Body { mesh, geometry, effects, contacts, load, fixed }, state))
+    Ok((Body { mesh, geometry, effects, contacts, surface_effects, load, fixed }, state))
 }
 
 /// What the stresses of this many components stand for.
@@ -99,7 +101,46 @@ fn effects<const D: usize, const S: usize>(
     if let Some(laws) = ByMaterial::new(flow) {
         effects.push(Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs)));
     }
+    if let Some(laws) = by_material(materials, damage_law::<S>) {
+        effects.push(Box::new(Damage::new(laws, &geometry.runs)));
+    }
     Ok(effects)
+}
+
+/// What acts at nodes of boundaries beside contact. Collective.
+fn surface_effects<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
+    let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
+    let mut bonded = Vec::new();
+    for contact in &job.contact {
+        let Some(adhesion) = &contact.adhesion else { continue };
+        let law = contact::Adhesion {
+            stiffness: adhesion.stiffness,
+            tangential_stiffness: adhesion.tangential_stiffness.unwrap_or(0.0),
+            energy: adhesion.energy,
+            viscosity: adhesion.viscosity,
+            length: adhesion.length.unwrap_or(f64::INFINITY),
+        };
+        bonded.push(Bonded { law, points: surface_points(session, mesh, &facets(mesh, &contact.on))? });
+    }
+    if !bonded.is_empty() {
+        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
+    }
+    Ok(effects)
+}
+
+fn damage_law<const S: usize>(material: &Material) -> Option<material::Damage> {
+    let (damage, elastic) = (material.damage.as_ref()?, material.elasticity.as_ref()?);
+    Some(material::Damage {
+        threshold: damage.threshold,
+        viscosity: damage.viscosity,
+        exponent: damage.exponent,
+        largest: damage.largest,
+        elasticity: elasticity(elastic).tensor(hypothesis(S)),
+    })
 }
 
 fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {

@@ -2,7 +2,7 @@
 
 use super::boundary::check_flat;
 use super::{Findings, MeshNames, items};
-use crate::job::document::{Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
+use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
@@ -10,6 +10,7 @@ pub fn check(findings: &mut Findings<'_>) {
         check_damped_response(findings, &format!("{contact}.normal.damped_response"));
         check_graph(findings, &format!("{contact}.normal.graph.points"));
         check_quadrature(findings, &contact);
+        check_adhesion(findings, &contact);
         check_bound(findings, &format!("{contact}.normal.unilateral"));
         let path = format!("{contact}.friction.slip_weakening");
         if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
@@ -35,6 +36,37 @@ fn check_quadrature(findings: &mut Findings<'_>, contact: &str) {
     if jumps || displaced {
         let message = "this contact law does not act at Gauss points";
         findings.fault(&format!("{contact}.quadrature"), message, "use \"nodal\", or leave the key out");
+    }
+}
+
+/// Bonds are at nodes, and between what touches at first.
+fn check_adhesion(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let path = format!("{contact}.adhesion");
+    if root.find(&path).is_none() {
+        return;
+    }
+    if root.read::<Quadrature>(&format!("{contact}.quadrature")) == Some(Quadrature::Gauss) {
+        let message = "adhesion does not act at Gauss points";
+        let help = "use \"nodal\", or leave the key out";
+        findings.fault(&format!("{contact}.quadrature"), message, help);
+    }
+    for law in ["compliance", "unilateral"] {
+        let gap = format!("{contact}.normal.{law}.gap");
+        if root.find(&gap).is_some() {
+            let message = "adhesion binds what touches at first: there is no gap";
+            findings.fault(&gap, message, format!("delete it, or [{path}]"));
+        }
+    }
+    if let Some(Adhesion { stiffness, tangential_stiffness, energy, length: Some(length), .. }) =
+        root.read(&path)
+    {
+        let most = (stiffness + tangential_stiffness.unwrap_or(0.0)) * length * length;
+        if most <= energy && most > 0.0 {
+            findings.warnings.push(format!(
+                "{path}: at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
+            ));
+        }
     }
 }
 
