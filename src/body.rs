@@ -75,7 +75,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         {
             let displacement = state.displacement.local()?;
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
-            energy.stored_in_contact = stored.sum();
+            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
         }
         if !self.surface_effects.is_empty() {
             with_surface(state, |nodal| {

@@ -2,14 +2,14 @@
 
 use crate::{
     body::Body,
-    contact::{self, DampedResponse, Graph, Symmetry},
+    contact::{self, DampedResponse, Gap, Graph, Symmetry},
     effect::{
         Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load,
         Quadrature, Support, SurfaceEffect, Traction, ViscoplasticHistory, ViscousStress, choose_unknowns,
         fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw, Scalar},
+    job::{self, Fix, Job, Material, Named, NormalLaw, Obstacle, Scalar},
     material::{
         self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
         Perzyna, Viscoplasticity,
@@ -42,7 +42,7 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Nodal => Quadrature::Nodal,
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
-        let (law, gap) = session.agree(normal_law(&contact.normal))?;
+        let (law, gap) = session.agree(normal_law(contact))?;
         contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
     }
     let surface_effects = surface_effects(session, job, &mesh)?;
@@ -198,10 +198,11 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 }
 
 /// The law of a contact, and the gap it is felt beyond.
-fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
+fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
     let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
-    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Scalar::default());
-    Ok(match law {
+    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Gap::default());
+    let gap = |given: &Option<Scalar>| gap(contact.obstacle.as_ref(), given.as_ref());
+    Ok(match &contact.normal {
         NormalLaw::DampedResponse(d) => {
             let symmetry = match d.symmetry {
                 job::Symmetry::Even => Symmetry::Even,
@@ -215,13 +216,24 @@ fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
         NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
         NormalLaw::Compliance(c) => {
             let law = contact::Compliance { stiffness: c.stiffness, exponent: c.exponent };
-            (contact::NormalLaw::Compliance(law), c.gap.clone())
+            (contact::NormalLaw::Compliance(law), gap(&c.gap))
         }
         NormalLaw::Unilateral(u) => match u.bound {
-            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), u.gap.clone()),
+            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), gap(&u.gap)),
             job::Bound::Velocity => of_velocity(wall()?),
         },
     })
+}
+
+/// What the gap of a contact is measured to.
+fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
+    match obstacle {
+        None => Gap::Distance(given.cloned().unwrap_or_default()),
+        Some(Obstacle::Plane(p)) => Gap::Plane { point: p.point.clone(), normal: p.normal.clone() },
+        Some(Obstacle::Sphere(s)) => {
+            Gap::Sphere { centre: s.centre.clone(), radius: s.radius, hollow: s.hollow }
+        }
+    }
 }
 
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {

@@ -15,8 +15,8 @@ mod time;
 pub use adhesion::Adhesion;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
 pub use contact::{
-    Bound, Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Quadrature,
-    SlipWeakening, Symmetry, Tresca, Unilateral,
+    Bound, Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Obstacle, Plane,
+    Quadrature, SlipWeakening, Sphere, Symmetry, Tresca, Unilateral,
 };
 pub use damage::Damage;
 pub use material::{

@@ -1,8 +1,9 @@
 //! Contact laws: graphs that have a relaxed monotonicity, friction that falls the right way.
 
-use super::boundary::check_flat;
+use super::boundary::{check_flat, check_vector};
 use super::{Findings, MeshNames, items};
 use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
+use crate::job::expression::Scalar;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
@@ -12,6 +13,7 @@ pub fn check(findings: &mut Findings<'_>) {
         check_quadrature(findings, &contact);
         check_adhesion(findings, &contact);
         check_bound(findings, &format!("{contact}.normal.unilateral"));
+        check_obstacle(findings, &contact);
         let path = format!("{contact}.friction.slip_weakening");
         if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
             && at_rest < dynamic
@@ -80,6 +82,50 @@ fn check_bound(findings: &mut Findings<'_>, path: &str) {
     }
 }
 
+/// Vectors of an obstacle.
+const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.centre"];
+
+/// An obstacle is for laws that know a gap, stands in for it, and moves as one.
+fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let obstacle = format!("{contact}.obstacle");
+    if root.find(&obstacle).is_none() {
+        return;
+    }
+    let law = |name: &str| format!("{contact}.normal.{name}");
+    let known = ["damped_response", "graph"].into_iter().find(|name| root.find(&law(name)).is_some());
+    if let Some(name) = known {
+        let message = format!("`{name}` acts at any distance: it has no obstacle");
+        findings.fault_at_key(&obstacle, message, "delete the obstacle, or use `compliance` or `unilateral`");
+    }
+    if root.read(&law("unilateral.bound")) == Some(Bound::Velocity) {
+        let help = "delete the obstacle, or bound the displacement";
+        findings.fault_at_key(&obstacle, "a bound on the velocity has no obstacle", help);
+    }
+    for gap in ["compliance.gap", "unilateral.gap"].map(law) {
+        if root.find(&gap).is_some() {
+            findings.fault_at_key(
+                &gap,
+                "`gap` beside [contact.obstacle]",
+                "give one of them: the obstacle says how far it is",
+            );
+        }
+    }
+    for vector in OBSTACLE_VECTORS {
+        for component in items(root, &format!("{obstacle}.{vector}")) {
+            if root.read::<Scalar>(&component).is_some_and(|scalar| scalar.depends_on_position()) {
+                let help = "use t only; `gap` in the law may depend on x, y and z";
+                findings.fault(&component, "a rigid obstacle moves as one", help);
+            }
+        }
+    }
+    let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
+    if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
+        let help = "let it point out of the obstacle toward the body";
+        findings.fault(&format!("{obstacle}.plane.normal"), "this normal has no direction", help);
+    }
+}
+
 fn check_damped_response(findings: &mut Findings<'_>, path: &str) {
     let root = findings.root;
     let key = format!("{path}.breakpoints");
@@ -134,6 +180,9 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     for contact in items(findings.root, "contact") {
         for law in ["compliance", "unilateral"] {
             check_flat(findings, &format!("{contact}.normal.{law}.gap"), mesh.dimension);
+        }
+        for vector in OBSTACLE_VECTORS {
+            check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);
         }
     }
 }
