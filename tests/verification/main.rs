@@ -3,10 +3,12 @@
 //!
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
 
+mod adhesion;
 mod assembly;
 mod callbacks;
 mod closed_forms;
 mod creep;
+mod damage;
 mod effects;
 mod energy;
 mod jacobian;
@@ -44,6 +46,8 @@ fn scenario() {
         "energy" => energy::random_jobs(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
+        "damage" => damage::all(&session),
+        "adhesion" => adhesion::all(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),
