@@ -27,6 +27,7 @@ const FUNCTIONS: &[&str] = &[
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
     "SNESLineSearchSetType",
+    "SNESVISetVariableBounds",
 ];
 
 fn main() {

@@ -45,6 +45,19 @@ pub struct NonlinearOutcome {
 }
 
 impl NonlinearOutcome {
+    /// How the last solve of a live solver ended.
+    pub(super) fn of(raw: sys::SNES) -> Result<Self> {
+        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
+        // SAFETY: live object, live numbers.
+        unsafe {
+            check(sys::SNESGetConvergedReason(raw, &mut reason))?;
+            check(sys::SNESGetIterationNumber(raw, &mut iterations))?;
+            check(sys::SNESGetFunctionNorm(raw, &mut residual))?;
+        }
+        let iterations = usize::try_from(iterations).unwrap_or(0);
+        Ok(Self { reason, iterations, residual })
+    }
+
     /// Whether the tolerance was reached.
     pub fn converged(&self) -> bool {
         self.reason > 0
@@ -166,24 +179,12 @@ impl Snes {
         };
         callback.finish()?;
         check(code)?;
-        self.outcome()
+        NonlinearOutcome::of(self.raw)
     }
 
     /// The residual at the end of the last solve.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
-    }
-
-    fn outcome(&self) -> Result<NonlinearOutcome> {
-        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
-        // SAFETY: live object, live numbers.
-        unsafe {
-            check(sys::SNESGetConvergedReason(self.raw, &mut reason))?;
-            check(sys::SNESGetIterationNumber(self.raw, &mut iterations))?;
-            check(sys::SNESGetFunctionNorm(self.raw, &mut residual))?;
-        }
-        let iterations = usize::try_from(iterations).unwrap_or(0);
-        Ok(NonlinearOutcome { reason, iterations, residual })
     }
 }
 
