@@ -13,6 +13,7 @@ mod jacobian;
 mod manufactured;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
+mod obstacles;
 mod patch;
 mod petsc_boundary;
 mod scenes;
@@ -44,6 +45,9 @@ fn scenario() {
         "energy" => energy::random_jobs(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
+        "moving_obstacles" => obstacles::moving(&session),
+        "bounds" => obstacles::bounds(&session),
+        "several_laws" => obstacles::several(&session, &folder),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),
