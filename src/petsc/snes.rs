@@ -143,7 +143,8 @@ impl Snes {
         check(unsafe { sys::SNESSetFromOptions(self.raw) })
     }
 
-    /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`. Collective.
+    /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.
+    /// Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
     /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.
@@ -151,7 +152,7 @@ impl Snes {
         &mut self,
         problem: &mut dyn NonlinearProblem,
         x: &mut DistributedVector,
-        tolerance: f64,
+        (absolute, relative): (f64, f64),
         iterations: usize,
     ) -> Result<NonlinearOutcome> {
         let callback = Callback::new(problem);
@@ -166,8 +167,8 @@ impl Snes {
             check(sys::PCShellSetContext(self.preconditioner, pointer))?;
             check(sys::SNESSetTolerances(
                 self.raw,
-                tolerance,
-                0.0,
+                absolute,
+                relative,
                 0.0,
                 index(iterations, "Newton iterations")?,
                 unlimited,

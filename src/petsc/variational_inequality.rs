@@ -52,14 +52,16 @@ impl BoundedSnes {
         }
     }
 
-    /// Solves from and into `x`, down to a norm of the residual of the free entries of `tolerance`. Collective.
+    /// Solves from and into `x`, down to a norm of the residual of the free entries of `absolute`, or of `relative` times
+    /// the first one. Collective.
     pub fn solve(
         &mut self,
         matrix: &Matrix,
         right_hand_side: &DistributedVector,
         [lower, upper]: [&DistributedVector; 2],
         x: &mut DistributedVector,
-        (tolerance, iterations): (f64, usize),
+        (absolute, relative): (f64, f64),
+        iterations: usize,
     ) -> Result<NonlinearOutcome> {
         let mut linear = Linear { matrix, right_hand_side };
         let callback = Callback::new(&mut linear);
@@ -70,7 +72,7 @@ impl BoundedSnes {
             check(sys::SNESSetFunction(self.raw, self.residual.raw, Some(residual), callback.pointer()))?;
             check(sys::SNESSetJacobian(self.raw, matrix.raw, matrix.raw, Some(constant), ptr::null_mut()))?;
             check(sys::SNESVISetVariableBounds(self.raw, lower.raw, upper.raw))?;
-            check(sys::SNESSetTolerances(self.raw, tolerance, 0.0, 0.0, iterations, sys::PetscInt::MAX))?;
+            check(sys::SNESSetTolerances(self.raw, absolute, relative, 0.0, iterations, sys::PetscInt::MAX))?;
             sys::SNESSolve(self.raw, ptr::null_mut(), x.raw)
         };
         callback.finish()?;

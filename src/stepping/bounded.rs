@@ -32,7 +32,8 @@ impl Bounded {
         matrix: &Matrix,
         right_hand_side: &DistributedVector,
         trial: &mut DistributedVector,
-        limits: (f64, usize),
+        tolerances: (f64, f64),
+        iterations: usize,
     ) -> Result<NonlinearOutcome> {
         self.lower.fill(-UNBOUNDED)?;
         self.upper.fill(UNBOUNDED)?;
@@ -41,7 +42,7 @@ impl Bounded {
             contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
         }
         let bounds = [&self.lower, &self.upper];
-        let outcome = self.snes.solve(matrix, right_hand_side, bounds, trial, limits)?;
+        let outcome = self.snes.solve(matrix, right_hand_side, bounds, trial, tolerances, iterations)?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {

@@ -65,9 +65,12 @@ impl Newton {
     ) -> Result<StepOutcome> {
         body.contacts.iter_mut().zip(&self.scales).for_each(|(contact, scale)| contact.scale = *scale);
         branches(body, &state.velocity, &mut self.before)?;
+        // Where nothing acts but an obstacle that moves, its first push is what residuals are small against.
+        let tolerances = (tolerance, settings.tolerance);
         if let Some(bounded) = &mut self.bounded {
-            let limits = (tolerance, settings.newton_iterations);
-            let solved = bounded.solve(&mut body.contacts, matrix, right_hand_side, trial, limits);
+            let contacts = &mut body.contacts;
+            let most = settings.newton_iterations;
+            let solved = bounded.solve(contacts, matrix, right_hand_side, trial, tolerances, most);
             let outcome = session.agree(solved)?;
             if !outcome.converged() {
                 return Err(failed(step, outcome.words(), REMEDY));
@@ -86,7 +89,7 @@ impl Newton {
             linear_solver: &mut self.linear_solver,
             effort: Effort::default(),
         };
-        let solved = self.snes.solve(&mut equations, trial, tolerance, settings.newton_iterations);
+        let solved = self.snes.solve(&mut equations, trial, tolerances, settings.newton_iterations);
         let effort = equations.effort;
         let outcome = session.agree(solved.map_err(|error| match error {
             Error::Failed(words) => failed(step, &words, REMEDY),

@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Gap, Compliance, DampedResponse, Graph, NormalLaw, Symmetry},
+    contact::{Compliance, DampedResponse, Gap, Graph, NormalLaw, Symmetry},
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     material::{ByMaterial, Isotropic},
     mesh::GlobalMesh,

@@ -38,13 +38,14 @@ const SPRINGS: &str = "[contact.normal.compliance]\nstiffness = 300\nexponent = 
 
 fn obstacles<const D: usize>() -> [(&'static str, String); 4] {
     let rising = vector::<D>("0.3", "-0.01+0.5*t");
+    let lower = vector::<D>("0.3", "-0.08+t");
     let (normal, tilted) =
         if D == 2 { ("[0, 1]", "[\"0.1+t\", 1]") } else { ("[0, 0, 1]", "[\"0.1+t\", 0.1, 1]") };
     let rolling = vector::<D>("0.2+5*t", "-0.5+0.05*sin(40*t)");
     let shell = vector::<D>("0.5+t", "2+0.5*sin(40*t)");
     [
         ("a plane that rises", format!("[contact.obstacle.plane]\npoint = {rising}\nnormal = {normal}\n")),
-        ("a plane that turns", format!("[contact.obstacle.plane]\npoint = {rising}\nnormal = {tilted}\n")),
+        ("a plane that turns", format!("[contact.obstacle.plane]\npoint = {lower}\nnormal = {tilted}\n")),
         ("a ball that rolls", format!("[contact.obstacle.sphere]\ncentre = {rolling}\nradius = 0.52\n")),
         (
             "a shell that shakes",
@@ -67,7 +68,10 @@ fn balanced<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
                 touched += usize::from(outcome.energy.contact != 0.0);
                 open = open.max(outcome.points.open);
             }
-            assert!(touched > 10 && open > 0 && open < points, "{name}: {touched} steps, {open} open\n{text}");
+            assert!(
+                touched > 10 && open > 0 && open < points,
+                "{name}: {touched} steps, {open} open\n{text}"
+            );
             let given = run.totals.contact_dissipation;
             assert!(given != 0.0 && run.totals.elastic_energy > 0.0, "{name} does no work\n{text}");
         }
@@ -105,7 +109,7 @@ fn alike<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
     let half = format!("0.52^2-(x-0.2-5*t)^2{across}");
     let gaps = [
         "-(-0.01+0.5*t) ".to_owned() + "+" + z,
-        format!("(0.01-0.5*t+(x-0.3)*(0.1+t){}) + {z}", if D == 2 { "" } else { "+(y-0.4)*0.1" }),
+        format!("(0.08-t+(x-0.3)*(0.1+t){}) + {z}", if D == 2 { "" } else { "+(y-0.4)*0.1" }),
         format!("{z}+0.5-0.05*sin(40*t)-sqrt(max({half},0))+1e9*max(sign(-({half})),0)"),
         format!("{z}-2-0.5*sin(40*t)+sqrt(2.2^2-(x-0.5-t)^2{across})"),
     ];
@@ -129,7 +133,11 @@ fn bounded<const D: usize>(method: &str) -> String {
          [[contact]]\non = [\"front\"]\n[contact.normal.unilateral]\ngap = 0.005\n"
     };
     let ball = vector::<D>("0.4+3*t", "-0.5+0.05*sin(60*t)");
-    let load = if D == 2 { "[\"30*sin(90*t)\", \"20*cos(50*t)\"]" } else { "[\"30*sin(90*t)\", -9, \"20*cos(50*t)\"]" };
+    let load = if D == 2 {
+        "[\"30*sin(90*t)\", \"20*cos(50*t)\"]"
+    } else {
+        "[\"30*sin(90*t)\", -9, \"20*cos(50*t)\"]"
+    };
     let solver = format!("method = \"{method}\"");
     format!(
         "{}{}{walls}[[contact]]\non = [\"right\"]\n[contact.normal.unilateral]\nbound = \"velocity\"\n\
@@ -224,10 +232,8 @@ pub fn bounds(session: &Session) {
 }
 
 pub fn several(session: &Session, folder: &std::path::Path) {
-    let found = [
-        mixed_laws::<2, 4>(session, &crossed([6, 4])),
-        mixed_laws::<3, 6>(session, &brick([3, 3, 3])),
-    ];
+    let found =
+        [mixed_laws::<2, 4>(session, &crossed([6, 4])), mixed_laws::<3, 6>(session, &brick([3, 3, 3]))];
     let file = folder.join("several.json");
     if session.ranks() == 1 {
         std::fs::write(&file, serde_json::to_string(&found).expect("JSON")).expect("written");
