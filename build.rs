@@ -28,6 +28,7 @@ const FUNCTIONS: &[&str] = &[
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
     "SNESLineSearchSetFromOptions",
     "SNESLineSearchSetType",
+    "SNESVISetVariableBounds",
 ];
 
 fn main() {

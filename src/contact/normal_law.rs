@@ -103,6 +103,18 @@ impl NormalLaw {
         }
     }
 
+    /// The largest normal velocity in m/s that it allows, if to bound the velocity is all it does.
+    pub fn velocity_bound(&self, node: NodeContext) -> Option<f64> {
+        match self {
+            Self::Graph(graph) => match graph.points() {
+                [[v, 0.0]] if graph.is_vertical(1) && graph.slope(v - 1.0) == 0.0 => Some(*v),
+                _ => None,
+            },
+            Self::Compliance(_) => None,
+            Self::Unilateral(_) => Some(node.closing_velocity()),
+        }
+    }
+
     /// Whether it depends on the displacement, so that it knows no velocity and no pressure of its own.
     pub fn depends_on_displacement(&self) -> bool {
         !matches!(self, Self::Graph(_))
@@ -187,6 +199,20 @@ mod tests {
         // Springs need to be pressed: d + (k / c) p(d) = k s / c, 26 d = 1.75 with 100 Pa/m.
         let springs = laws()[1].resolve(7.0, 2.0, node);
         assert!((springs.velocity * 0.5 - 1.75 / 26.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn only_walls_are_pure_bounds() {
+        let node = NodeContext { penetration: -0.25, step_length: 0.5 };
+        let graph = |points, before, after| NormalLaw::Graph(Graph::new(points, before, after).unwrap());
+        assert_eq!(NormalLaw::unilateral().unwrap().velocity_bound(node), Some(0.5));
+        assert_eq!(NormalLaw::unilateral().unwrap().velocity_bound(NOWHERE), Some(f64::INFINITY));
+        assert_eq!(graph(vec![[0.25, 0.0]], 0.0, f64::INFINITY).velocity_bound(node), Some(0.25));
+        assert_eq!(graph(vec![[0.0, 1.0]], 0.0, f64::INFINITY).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0]], 1.0, f64::INFINITY).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0]], 0.0, 1e9).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0], [0.0, 1.0]], 0.0, 0.0).velocity_bound(node), None);
+        assert_eq!(laws()[1].velocity_bound(node), None);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod matrix;
 mod projected;
 mod snes;
 pub mod sys;
+mod variational_inequality;
 mod vector;
 
 pub use ksp::{Ksp, LinearOutcome};
@@ -19,6 +20,7 @@ pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
 pub use snes::{LineSearch, NonlinearOutcome, NonlinearProblem, Snes};
+pub use variational_inequality::{BoundedSnes, UNBOUNDED};
 pub use vector::{DistributedVector, LocalRead, LocalWrite};
 
 use crate::error::{Error, Result};

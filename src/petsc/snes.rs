@@ -45,6 +45,19 @@ pub struct NonlinearOutcome {
 }
 
 impl NonlinearOutcome {
+    /// How the last solve of a live solver ended.
+    pub(super) fn of(raw: sys::SNES) -> Result<Self> {
+        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
+        // SAFETY: live object, live numbers.
+        unsafe {
+            check(sys::SNESGetConvergedReason(raw, &mut reason))?;
+            check(sys::SNESGetIterationNumber(raw, &mut iterations))?;
+            check(sys::SNESGetFunctionNorm(raw, &mut residual))?;
+        }
+        let iterations = usize::try_from(iterations).unwrap_or(0);
+        Ok(Self { reason, iterations, residual })
+    }
+
     /// Whether the tolerance was reached.
     pub fn converged(&self) -> bool {
         self.reason > 0
@@ -154,7 +167,8 @@ impl Snes {
         }
     }
 
-    /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`. Collective.
+    /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.
+    /// Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
     /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.
@@ -162,7 +176,7 @@ impl Snes {
         &mut self,
         problem: &mut dyn NonlinearProblem,
         x: &mut DistributedVector,
-        tolerance: f64,
+        (absolute, relative): (f64, f64),
         iterations: usize,
     ) -> Result<NonlinearOutcome> {
         let callback = Callback::new(problem);
@@ -177,8 +191,8 @@ impl Snes {
             check(sys::PCShellSetContext(self.preconditioner, pointer))?;
             check(sys::SNESSetTolerances(
                 self.raw,
-                tolerance,
-                0.0,
+                absolute,
+                relative,
                 0.0,
                 index(iterations, "Newton iterations")?,
                 unlimited,
@@ -190,24 +204,12 @@ impl Snes {
         };
         callback.finish()?;
         check(code)?;
-        self.outcome()
+        NonlinearOutcome::of(self.raw)
     }
 
     /// The residual at the end of the last solve.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
-    }
-
-    fn outcome(&self) -> Result<NonlinearOutcome> {
-        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
-        // SAFETY: live object, live numbers.
-        unsafe {
-            check(sys::SNESGetConvergedReason(self.raw, &mut reason))?;
-            check(sys::SNESGetIterationNumber(self.raw, &mut iterations))?;
-            check(sys::SNESGetFunctionNorm(self.raw, &mut residual))?;
-        }
-        let iterations = usize::try_from(iterations).unwrap_or(0);
-        Ok(NonlinearOutcome { reason, iterations, residual })
     }
 }
 

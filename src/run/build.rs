@@ -18,7 +18,7 @@ use crate::{
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{Preconditioner, SolverSettings},
+    stepping::{Method, Preconditioner, SolverSettings},
     tensor::Vector,
 };
 
@@ -303,6 +303,10 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
         tolerance: job.solver.tolerance,
         inclusion_tolerance: job.solver.inclusion_tolerance,
+        method: match job.solver.method {
+            job::Method::Newton => Method::Newton,
+            job::Method::Vinewtonrsls => Method::VariationalInequality,
+        },
         preconditioner: match job.solver.preconditioner {
             job::Preconditioner::Auto => Preconditioner::Auto,
             job::Preconditioner::Cholesky => Preconditioner::Cholesky,

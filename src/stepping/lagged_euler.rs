@@ -8,8 +8,9 @@
 //! ```
 
 use super::{
+    bounded::{self, Bounded},
     equations::Scratch,
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
     newton::{Newton, REMEDY, failed},
 };
 use crate::{
@@ -124,7 +125,14 @@ impl LaggedEuler {
             linear_solver.linear_solver().apply_options()?;
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+            let bounded = match settings.method {
+                Method::Newton => None,
+                Method::VariationalInequality => {
+                    session.agree(bounded::refuse(body))?;
+                    Some(Bounded::new(&state.velocity)?)
+                }
+            };
+            Solver::Newton(Box::new(Newton { snes, bounded, linear_solver, scratch, before, after, scales }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },

@@ -18,6 +18,15 @@ pub enum Preconditioner {
     Boomeramg,
 }
 
+/// What solves a step with contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Newton's method on the contact graphs.
+    Newton,
+    /// PETSc's solver for variational inequalities, where contacts are nothing but bounds on velocity components.
+    VariationalInequality,
+}
+
 /// How the equations of a step are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
@@ -25,6 +34,8 @@ pub struct SolverSettings {
     pub tolerance: f64,
     /// Largest scaled distance to a contact graph.
     pub inclusion_tolerance: f64,
+    /// The method for steps with contact.
+    pub method: Method,
     /// The preconditioner.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step has failed.

@@ -2,6 +2,7 @@
 
 use super::{
     StepOutcome,
+    bounded::Bounded,
     equations::{ContactEquations, Effort, Scratch},
     linear_solver::SolverSettings,
 };
@@ -21,6 +22,8 @@ const FULL_STEPS: usize = 12;
 /// Newton's method with what it needs.
 pub(super) struct Newton {
     pub snes: Snes,
+    /// PETSc's solver for variational inequalities, if that solves the steps.
+    pub bounded: Option<Bounded>,
     pub linear_solver: ProjectedKsp,
     pub scratch: Scratch,
     pub before: Vec<u8>,
@@ -66,6 +69,18 @@ impl Newton {
     ) -> Result<StepOutcome> {
         body.contacts.iter_mut().zip(&self.scales).for_each(|(contact, scale)| contact.scale = *scale);
         branches(body, &state.velocity, &mut self.before)?;
+        // Where nothing acts but an obstacle that moves, its first push is what residuals are small against.
+        let tolerances = (tolerance, settings.tolerance);
+        if let Some(bounded) = &mut self.bounded {
+            let contacts = &mut body.contacts;
+            let most = settings.newton_iterations;
+            let solved = bounded.solve(contacts, matrix, right_hand_side, trial, tolerances, most);
+            let outcome = session.agree(solved)?;
+            if !outcome.converged() {
+                return Err(failed(step, outcome.words(), REMEDY));
+            }
+            return self.judge(session, body, step, trial, settings, (&outcome, &Effort::default()));
+        }
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
@@ -84,14 +99,14 @@ impl Newton {
         };
         let iterations = settings.newton_iterations;
         self.snes.set_line_search(LineSearch::FullSteps)?;
-        let full = self.snes.solve(&mut equations, trial, tolerance, iterations.min(FULL_STEPS));
+        let full = self.snes.solve(&mut equations, trial, tolerances, iterations.min(FULL_STEPS));
         let mut outcome = session.agree(full.map_err(words))?;
         if !outcome.converged() && outcome.iterations < iterations {
             let tried = outcome.iterations;
             trial.copy_from(&state.velocity)?;
             equations.start_again(state, trial)?;
             self.snes.set_line_search(LineSearch::Backtracking)?;
-            let solved = self.snes.solve(&mut equations, trial, tolerance, iterations - tried);
+            let solved = self.snes.solve(&mut equations, trial, tolerances, iterations - tried);
             outcome = session.agree(solved.map_err(words))?;
             outcome.iterations += tried;
         }
@@ -103,6 +118,19 @@ impl Newton {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
         }
+        self.judge(session, body, step, trial, settings, (&outcome, &effort))
+    }
+
+    /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
+    fn judge<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        step: Step,
+        trial: &DistributedVector,
+        settings: SolverSettings,
+        (outcome, effort): (&NonlinearOutcome, &Effort),
+    ) -> Result<StepOutcome> {
         trial.update_ghosts()?;
         branches(body, trial, &mut self.after)?;
         let changes = self.before.iter().zip(&self.after).filter(|(a, b)| a != b).count();
@@ -133,7 +161,8 @@ impl Newton {
         body: &Body<D, S>,
         velocity: &DistributedVector,
     ) -> Result<f64> {
-        let (velocity, residual) = (velocity.local()?, self.snes.residual().owned()?);
+        let residual = self.bounded.as_ref().map_or(self.snes.residual(), Bounded::residual);
+        let (velocity, residual) = (velocity.local()?, residual.owned()?);
         let mut largest = 0.0;
         for contact in &body.contacts {
             let range = session.largest(contact.range(&velocity));

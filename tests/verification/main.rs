@@ -15,6 +15,7 @@ mod jacobian;
 mod manufactured;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
+mod obstacles;
 mod patch;
 mod petsc_boundary;
 mod scenes;
@@ -48,6 +49,9 @@ fn scenario() {
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),
         "adhesion" => adhesion::all(&session),
+        "moving_obstacles" => obstacles::moving(&session),
+        "bounds" => obstacles::bounds(&session),
+        "several_laws" => obstacles::several(&session, &folder),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),

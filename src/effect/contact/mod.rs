@@ -14,6 +14,7 @@
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
+mod bounds;
 mod point;
 mod unknowns;
 

@@ -2,11 +2,12 @@
 
 use super::boundary::{check_flat, check_vector};
 use super::{Findings, MeshNames, items};
-use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
+use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Method, Quadrature, SlipWeakening};
 use crate::job::expression::Scalar;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
+    check_method(findings);
     for contact in items(findings.root, "contact") {
         check_damped_response(findings, &format!("{contact}.normal.damped_response"));
         check_graph(findings, &format!("{contact}.normal.graph.points"));
@@ -21,6 +22,23 @@ pub fn check(findings: &mut Findings<'_>) {
             let message = "the static coefficient is below the dynamic one";
             findings.fault(&format!("{path}.static"), message, format!("it must be at least {dynamic}"));
         }
+    }
+}
+
+/// PETSc's solver for variational inequalities knows bounds only.
+fn check_method(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    if root.read("solver.method") != Some(Method::Vinewtonrsls) {
+        return;
+    }
+    let contacts = items(root, "contact");
+    let bounds = |contact: &String| {
+        let has = |key: &str| root.find(&format!("{contact}.{key}")).is_some();
+        has("normal.unilateral") && !has("friction")
+    };
+    if contacts.is_empty() || !contacts.iter().all(bounds) {
+        let message = "this method solves frictionless contact whose every normal law is `unilateral`";
+        findings.fault("solver.method", message, "use \"newton\", or leave the key out");
     }
 }
 
