@@ -110,6 +110,8 @@ impl Snes {
             check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
+            // A full step may take the residual up by orders of magnitude while the branches settle.
+            check(sys::SNESSetDivergenceTolerance(raw, -1.0))?;
             let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
             check(sys::SNESGetKSP(raw, &mut ksp))?;
             check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
@@ -121,6 +123,16 @@ impl Snes {
             check(sys::SNESGetLineSearch(raw, &mut search))?;
             check(sys::SNESLineSearchSetType(search, c"bt".as_ptr()))?;
             Ok(snes)
+        }
+    }
+
+    /// Takes every step in full, or searches along it for a decrease of the residual.
+    pub fn search_along_steps(&mut self, search: bool) -> Result<()> {
+        let mut line_search = ptr::null_mut();
+        // SAFETY: live object, which owns its line search; the names are static.
+        unsafe {
+            check(sys::SNESGetLineSearch(self.raw, &mut line_search))?;
+            check(sys::SNESLineSearchSetType(line_search, if search { c"bt" } else { c"basic" }.as_ptr()))
         }
     }
 

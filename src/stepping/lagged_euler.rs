@@ -16,7 +16,7 @@ use crate::{
     body::Body,
     effect::{Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage, has_option},
     session::Session,
     state::State,
 };
@@ -124,7 +124,18 @@ impl LaggedEuler {
             linear_solver.linear_solver().apply_options()?;
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+            linear_solver.set_patience(preconditioner.patience(D));
+            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
+            Solver::Newton(Box::new(Newton {
+                snes,
+                linear_solver,
+                scratch,
+                before,
+                after,
+                scales,
+                start,
+                chosen_search,
+            }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },

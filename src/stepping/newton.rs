@@ -2,7 +2,7 @@
 
 use super::{
     StepOutcome,
-    equations::{ContactEquations, Effort, Scratch},
+    equations::{ContactEquations, Effort, Scratch, cycle},
     linear_solver::SolverSettings,
 };
 use crate::{
@@ -23,6 +23,10 @@ pub(super) struct Newton {
     pub after: Vec<u8>,
     /// The parameter of each contact's graphs for the matrix in use.
     pub scales: Vec<f64>,
+    /// Where the step started.
+    pub start: DistributedVector,
+    /// Whether the user chose how to search along steps.
+    pub chosen_search: bool,
 }
 
 impl Newton {
@@ -66,22 +70,34 @@ impl Newton {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
-        let mut equations = ContactEquations {
-            matrix,
-            contacts: &mut body.contacts,
-            right_hand_side,
-            scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
-            effort: Effort::default(),
-        };
-        let solved = self.snes.solve(&mut equations, trial, tolerance, settings.newton_iterations);
-        let effort = equations.effort;
-        let outcome = session.agree(solved.map_err(|error| match error {
-            Error::Failed(words) => failed(step, &words, REMEDY),
-            other => other,
-        }))?;
-        if !outcome.converged() {
-            return Err(failed(step, &why(session, &outcome, &effort), REMEDY));
+        self.start.copy_from(trial)?;
+        let (mut effort, mut newton_iterations) = (Effort::default(), 0);
+        for last in if self.chosen_search { &[true][..] } else { &[false, true] } {
+            if !self.chosen_search {
+                self.snes.search_along_steps(*last)?;
+            }
+            trial.copy_from(&self.start)?;
+            effort.sets.clear();
+            let mut equations = ContactEquations {
+                matrix,
+                contacts: &mut body.contacts,
+                right_hand_side,
+                scratch: &mut self.scratch,
+                linear_solver: &mut self.linear_solver,
+                session,
+                stop_at_cycles: !last,
+                effort,
+            };
+            let solved = self.snes.solve(&mut equations, trial, tolerance, settings.newton_iterations);
+            effort = equations.effort;
+            newton_iterations += effort.sets.len();
+            match session.agree(solved) {
+                Ok(outcome) if outcome.converged() => break,
+                Ok(_) | Err(Error::Failed(_)) if !last => {}
+                Ok(outcome) => return Err(failed(step, &why(&outcome, &effort), REMEDY)),
+                Err(Error::Failed(words)) => return Err(failed(step, &words, REMEDY)),
+                Err(other) => return Err(other),
+            }
         }
         {
             let mut trial = trial.owned_mut()?;
@@ -100,7 +116,7 @@ impl Newton {
         let mine = counts.fold([changes, 0, 0], |[a, s, o], c| [a, s + c.sticking, o + c.open]);
         let [active_changes, sticking, open] = session.sum(mine.map(|n| n as f64)).map(|n| n as usize);
         Ok(StepOutcome {
-            newton_iterations: outcome.iterations,
+            newton_iterations,
             linear_iterations: effort.linear_iterations,
             active_changes,
             points: PointCount { sticking, open },
@@ -128,20 +144,10 @@ impl Newton {
     }
 }
 
-/// Why Newton's method failed, in words. Collective.
-fn why(session: &Session, outcome: &NonlinearOutcome, effort: &Effort) -> String {
+/// Why Newton's method failed, in words.
+fn why(outcome: &NonlinearOutcome, effort: &Effort) -> String {
     let words = outcome.words().to_owned();
-    let Some(last) = effort.sets.len().checked_sub(1) else { return words };
-    // Half the bits suffice to tell sets apart, and add up over ranks without a carry beyond them.
-    let of = |at: usize| (effort.sets[at] >> 32) as f64;
-    let seen = (0..last).rev().find(|&at| session.sum([f64::from(u8::from(of(at) != of(last)))])[0] == 0.0);
-    match seen {
-        Some(first) => format!(
-            "{words}; Newton's method came back to the branches of the contact graph that it had {} iterations before",
-            last - first
-        ),
-        None => words,
-    }
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
 pub(super) const REMEDY: &str =

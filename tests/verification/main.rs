@@ -15,7 +15,9 @@ mod manufactured;
 mod mpirun;
 mod patch;
 mod petsc_boundary;
+mod random_laws;
 mod scenes;
+mod subspace;
 mod wave;
 
 use clarke::session::Mpi;
@@ -44,6 +46,8 @@ fn scenario() {
         "energy" => energy::random_jobs(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
+        "random_laws" => random_laws::solve(&session),
+        "subspace" => subspace::solve(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),
