@@ -77,15 +77,6 @@ impl NonlinearOutcome {
     }
 }
 
-/// How far along its direction Newton's method goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LineSearch {
-    /// All the way.
-    FullSteps,
-    /// As far as the norm of the residual falls enough.
-    Backtracking,
-}
-
 /// Newton's method; the problem applies its Jacobian and solves with it.
 ///
 /// To PETSc the linear solve is a shell preconditioner, applied once; its own options carry the prefix `newton_`.
@@ -132,6 +123,8 @@ impl Snes {
             check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
+            // A full step may take the residual up by orders of magnitude while the branches settle.
+            check(sys::SNESSetDivergenceTolerance(raw, -1.0))?;
             let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
             check(sys::SNESGetKSP(raw, &mut ksp))?;
             check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
@@ -146,25 +139,20 @@ impl Snes {
         }
     }
 
+    /// Takes every step in full, or searches along it for a decrease of the residual.
+    pub fn search_along_steps(&mut self, search: bool) -> Result<()> {
+        let mut line_search = ptr::null_mut();
+        // SAFETY: live object, which owns its line search; the names are static.
+        unsafe {
+            check(sys::SNESGetLineSearch(self.raw, &mut line_search))?;
+            check(sys::SNESLineSearchSetType(line_search, if search { c"bt" } else { c"basic" }.as_ptr()))
+        }
+    }
+
     /// Lets PETSc options override what was set.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::SNESSetFromOptions(self.raw) })
-    }
-
-    /// Chooses the line search, unless PETSc options do.
-    pub fn set_line_search(&mut self, line_search: LineSearch) -> Result<()> {
-        let name = match line_search {
-            LineSearch::FullSteps => c"basic",
-            LineSearch::Backtracking => c"bt",
-        };
-        let mut search = ptr::null_mut();
-        // SAFETY: live objects; PETSc copies the name.
-        unsafe {
-            check(sys::SNESGetLineSearch(self.raw, &mut search))?;
-            check(sys::SNESLineSearchSetType(search, name.as_ptr()))?;
-            check(sys::SNESLineSearchSetFromOptions(search))
-        }
     }
 
     /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.

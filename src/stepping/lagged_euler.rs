@@ -17,7 +17,7 @@ use crate::{
     body::Body,
     effect::{Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage, has_option},
     session::Session,
     state::State,
 };
@@ -132,7 +132,19 @@ impl LaggedEuler {
                     Some(Bounded::new(&state.velocity)?)
                 }
             };
-            Solver::Newton(Box::new(Newton { snes, bounded, linear_solver, scratch, before, after, scales }))
+            linear_solver.set_patience(preconditioner.patience(D));
+            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
+            Solver::Newton(Box::new(Newton {
+                snes,
+                bounded,
+                linear_solver,
+                scratch,
+                before,
+                after,
+                scales,
+                start,
+                chosen_search,
+            }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },

@@ -84,6 +84,15 @@ impl Preconditioner {
         matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
     }
 
+    /// Iterations that cost as much as making it anew (measured, see docs/contact-preconditioner.md).
+    pub(super) fn patience(self, dimension: usize) -> usize {
+        match self {
+            Self::Auto | Self::Cholesky if dimension == 2 => 5,
+            Self::Auto | Self::Cholesky => 40,
+            Self::Gamg | Self::Boomeramg => 40,
+        }
+    }
+
     /// Its name in job files.
     pub fn name(self) -> &'static str {
         match self {
@@ -117,6 +126,7 @@ impl Preconditioner {
                 }
                 set_default_option("pc_gamg_threshold", "0.01")?;
                 set_default_option("pc_gamg_agg_nsmooths", "1")?;
+                set_default_option("pc_gamg_reuse_interpolation", "true")?;
                 set_default_option("mg_levels_ksp_type", "chebyshev")?;
                 set_default_option("mg_levels_ksp_max_it", "2")?;
                 set_default_option("mg_levels_pc_type", "jacobi")

@@ -3,21 +3,17 @@
 use super::{
     StepOutcome,
     bounded::Bounded,
-    equations::{ContactEquations, Effort, Scratch},
+    equations::{ContactEquations, Effort, Scratch, cycle},
     linear_solver::SolverSettings,
 };
 use crate::{
     body::Body,
     effect::{Contact, Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, LineSearch, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
+    petsc::{DistributedVector, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
     session::Session,
     state::State,
 };
-
-/// Iterations with full steps before backtracking starts anew. A new set of branches raises the residual at first, so that
-/// backtracking would creep where full steps arrive; where the sets repeat, only backtracking arrives.
-const FULL_STEPS: usize = 12;
 
 /// Newton's method with what it needs.
 pub(super) struct Newton {
@@ -30,6 +26,10 @@ pub(super) struct Newton {
     pub after: Vec<u8>,
     /// The parameter of each contact's graphs for the matrix in use.
     pub scales: Vec<f64>,
+    /// Where the step started.
+    pub start: DistributedVector,
+    /// Whether the user chose how to search along steps.
+    pub chosen_search: bool,
 }
 
 impl Newton {
@@ -79,46 +79,46 @@ impl Newton {
             if !outcome.converged() {
                 return Err(failed(step, outcome.words(), REMEDY));
             }
-            return self.judge(session, body, step, trial, settings, (&outcome, &Effort::default()));
+            return self.judge(session, body, step, trial, settings, (outcome.iterations, &Effort::default()));
         }
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
-        let mut equations = ContactEquations {
-            matrix,
-            contacts: &mut body.contacts,
-            right_hand_side,
-            scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
-            effort: Effort::default(),
-        };
-        let words = |error| match error {
-            Error::Failed(words) => failed(step, &words, REMEDY),
-            other => other,
-        };
-        let iterations = settings.newton_iterations;
-        self.snes.set_line_search(LineSearch::FullSteps)?;
-        let full = self.snes.solve(&mut equations, trial, tolerances, iterations.min(FULL_STEPS));
-        let mut outcome = session.agree(full.map_err(words))?;
-        if !outcome.converged() && outcome.iterations < iterations {
-            let tried = outcome.iterations;
-            trial.copy_from(&state.velocity)?;
-            equations.start_again(state, trial)?;
-            self.snes.set_line_search(LineSearch::Backtracking)?;
-            let solved = self.snes.solve(&mut equations, trial, tolerances, iterations - tried);
-            outcome = session.agree(solved.map_err(words))?;
-            outcome.iterations += tried;
-        }
-        let effort = equations.effort;
-        if !outcome.converged() {
-            return Err(failed(step, &why(session, &outcome, &effort), REMEDY));
+        self.start.copy_from(trial)?;
+        let (mut effort, mut newton_iterations) = (Effort::default(), 0);
+        for last in if self.chosen_search { &[true][..] } else { &[false, true] } {
+            if !self.chosen_search {
+                self.snes.search_along_steps(*last)?;
+            }
+            trial.copy_from(&self.start)?;
+            effort.sets.clear();
+            let mut equations = ContactEquations {
+                matrix,
+                contacts: &mut body.contacts,
+                right_hand_side,
+                scratch: &mut self.scratch,
+                linear_solver: &mut self.linear_solver,
+                session,
+                stop_at_cycles: !last,
+                effort,
+            };
+            let solved = self.snes.solve(&mut equations, trial, tolerances, settings.newton_iterations);
+            effort = equations.effort;
+            newton_iterations += effort.sets.len();
+            match session.agree(solved) {
+                Ok(outcome) if outcome.converged() => break,
+                Ok(_) | Err(Error::Failed(_)) if !last => {}
+                Ok(outcome) => return Err(failed(step, &why(&outcome, &effort), REMEDY)),
+                Err(Error::Failed(words)) => return Err(failed(step, &words, REMEDY)),
+                Err(other) => return Err(other),
+            }
         }
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
         }
-        self.judge(session, body, step, trial, settings, (&outcome, &effort))
+        self.judge(session, body, step, trial, settings, (newton_iterations, &effort))
     }
 
     /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
@@ -129,7 +129,7 @@ impl Newton {
         step: Step,
         trial: &DistributedVector,
         settings: SolverSettings,
-        (outcome, effort): (&NonlinearOutcome, &Effort),
+        (newton_iterations, effort): (usize, &Effort),
     ) -> Result<StepOutcome> {
         trial.update_ghosts()?;
         branches(body, trial, &mut self.after)?;
@@ -144,7 +144,7 @@ impl Newton {
         let mine = counts.fold([changes, 0, 0], |[a, s, o], c| [a, s + c.sticking, o + c.open]);
         let [active_changes, sticking, open] = session.sum(mine.map(|n| n as f64)).map(|n| n as usize);
         Ok(StepOutcome {
-            newton_iterations: outcome.iterations,
+            newton_iterations,
             linear_iterations: effort.linear_iterations,
             active_changes,
             points: PointCount { sticking, open },
@@ -173,20 +173,10 @@ impl Newton {
     }
 }
 
-/// Why Newton's method failed, in words. Collective.
-fn why(session: &Session, outcome: &NonlinearOutcome, effort: &Effort) -> String {
+/// Why Newton's method failed, in words.
+fn why(outcome: &NonlinearOutcome, effort: &Effort) -> String {
     let words = outcome.words().to_owned();
-    let Some(last) = effort.sets.len().checked_sub(1) else { return words };
-    // Half the bits suffice to tell sets apart, and add up over ranks without a carry beyond them.
-    let of = |at: usize| (effort.sets[at] >> 32) as f64;
-    let seen = (0..last).rev().find(|&at| session.sum([f64::from(u8::from(of(at) != of(last)))])[0] == 0.0);
-    match seen {
-        Some(first) => format!(
-            "{words}; Newton's method came back to the branches of the contact graph that it had {} iterations before",
-            last - first
-        ),
-        None => words,
-    }
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
 pub(super) const REMEDY: &str =

@@ -94,6 +94,8 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 right_hand_side: &load,
                 scratch: &mut scratch,
                 linear_solver: &mut linear_solver,
+                session,
+                stop_at_cycles: false,
                 effort: Effort::default(),
             };
             equations.linearise(&point).expect("linearised");

@@ -18,7 +18,9 @@ mod mpirun;
 mod obstacles;
 mod patch;
 mod petsc_boundary;
+mod random_laws;
 mod scenes;
+mod subspace;
 mod wave;
 
 use clarke::session::Mpi;
@@ -52,6 +54,8 @@ fn scenario() {
         "moving_obstacles" => obstacles::moving(&session),
         "bounds" => obstacles::bounds(&session),
         "several_laws" => obstacles::several(&session, &folder),
+        "random_laws" => random_laws::solve(&session),
+        "subspace" => subspace::solve(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),
