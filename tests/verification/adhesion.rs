@@ -207,7 +207,8 @@ fn inert(session: &Session) {
     let mesh = crossed([3, 2]);
     let bond = Bond { stiffness: 0.0, energy: 1.0, viscosity: 0.0, length: 0.1 };
     let with = job::<2>(&bond, &[0.3, 1.0], &["bottom"], "stiffness", 20, 0.1)
-        .replace("graph = { points = [[0, 0]] }", "unilateral = {}")
+        .replace("graph = { points = [[0, 0]] }", "compliance = { stiffness = 100 }")
+        .replace("shear = 1e7", "shear = 5")
         + "[[body_force]]\nvalue = [\"x\", \"-300*sin(50*t)\"]\n";
     let start = with.find("[contact.adhesion]").expect("a table");
     let end = with.find("[initial]").expect("a table");
