@@ -46,6 +46,7 @@ fn scenario() {
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
         "moving_obstacles" => obstacles::moving(&session),
+        "impacts" => obstacles::impacts(&session),
         "bounds" => obstacles::bounds(&session),
         "several_laws" => obstacles::several(&session, &folder),
         "manufactured_plane" => manufactured::plane(&session),
