@@ -1,8 +1,8 @@
 //! Every job under jobs/ gives the numbers of its `[check]` table, on one and on two ranks.
 //!
 //! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
-//! end: `history.COLUMN` and `probe.NAME.COLUMN` at the last step, `probe.NAME.max.COLUMN` or `.min.` over all steps, `profile.BOUNDARY.max.COLUMN` or `.min.` over the
-//! boundary at the last output.
+//! end: `history.COLUMN` and `probe.NAME.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or `.min.` over the
+//! boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -52,6 +52,7 @@ fn scenario() {
         "damage" => damage::all(&session),
         "adhesion" => adhesion::all(&session),
         "moving_obstacles" => obstacles::moving(&session),
+        "impacts" => obstacles::impacts(&session),
         "bounds" => obstacles::bounds(&session),
         "several_laws" => obstacles::several(&session, &folder),
         "random_laws" => random_laws::solve(&session),

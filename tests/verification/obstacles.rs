@@ -3,7 +3,14 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
-use clarke::{mesh::GlobalMesh, run::Simulation, session::Session};
+use clarke::{
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, rectangle},
+    },
+    run::Simulation,
+    session::Session,
+};
 
 /// All but time, solver and contact.
 fn body<const D: usize>(dynamic: bool) -> String {
@@ -219,6 +226,58 @@ fn mixed_laws<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMe
     [totals.elastic_energy, totals.contact_dissipation, totals.viscous_dissipation, totals.external_work]
 }
 
+/// An elastic bar of 1 m with waves of 10 m/s flies at 0.1 m/s into a wall 1 cm away: it touches from 0.1 s to 0.3 s under
+/// 1000 Pa, and flies back. Gives first and last time in touch, the mean pressure between 0.15 s and 0.25 s, and the
+/// velocity of the rebound.
+fn impact(session: &Session, cells: usize) -> [f64; 4] {
+    let step = 0.025 / cells as f64;
+    let job = format!(
+        "{}[material]\nhypothesis = \"plane_strain\"\ndensity = 1000\n\
+         elasticity = {{ youngs_modulus = 1e5, poisson_ratio = 0 }}\n[[support]]\non = [\"bottom\", \"top\"]\nfix = [\"y\"]\n\
+         [[contact]]\non = [\"right\"]\n[contact.normal.unilateral]\n[contact.obstacle.plane]\npoint = [1.01, 0]\n\
+         normal = [-1, 0]\n[initial]\nvelocity = [0.1, 0]\n[time]\nend = 0.4\nstep = {step}\n",
+        any_mesh::<2>()
+    );
+    let mesh = rectangle([1.0, 0.05], [cells, 1], Diagonal::Right, [1.0, 1.0]).expect("mesh");
+    let mut run = simulation::<2, 4>(session, &job, &mesh);
+    let (mut touch, mut middle, mut impulse) = (Vec::new(), Vec::new(), 0.0);
+    while run.advance(session).expect("step").is_some() {
+        let tractions = run.state.contact_traction.as_ref().expect("tractions").owned().expect("values");
+        let [sum] = session.sum([tractions.chunks_exact(2).map(|t| t[0]).sum()]);
+        // Two nodes of the same weight touch.
+        let (pressure, time) = (0.5 * sum, run.state.time);
+        impulse += step * pressure;
+        if pressure > 0.0 {
+            touch.push(time);
+        }
+        if (0.15..0.25).contains(&time) {
+            middle.push(pressure);
+        }
+        assert!(run.totals.energy_imbalance <= 1e-10);
+    }
+    let mean = middle.iter().sum::<f64>() / middle.len() as f64;
+    [touch[0], touch[touch.len() - 1], mean, 0.1 - impulse / 1000.0]
+}
+
+pub fn impacts(session: &Session) {
+    let found = [10, 20, 40].map(|cells| impact(session, cells));
+    for ([first, last, pressure, rebound], cells) in found.into_iter().zip([10.0, 20.0, 40.0]) {
+        if session.is_first() {
+            println!("{cells} cells: {first} s to {last} s, {pressure} Pa, {rebound} m/s");
+        }
+        assert!((first - 0.1).abs() <= 0.05 / cells, "it arrives at {first} s");
+        assert!((last - 0.3).abs() <= 0.1 / cells, "it leaves at {last} s");
+        assert!((pressure - 1000.0).abs() <= 400.0 / cells, "it presses with {pressure} Pa");
+        // The node that hits the wall loses what kinetic energy it has: a share of the bar that falls with its cells.
+        assert!((-0.1..=-0.1 + 0.12 / cells).contains(&rebound), "it flies back with {rebound} m/s");
+    }
+    let lost = found.map(|f| 0.1 + f[3]);
+    for pair in lost.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!(order > 0.5, "the loss of velocity falls with order {order} only: {lost:?}");
+    }
+}
+
 pub fn moving(session: &Session) {
     balanced::<2, 4>(session, &crossed([6, 3]));
     balanced::<3, 6>(session, &brick([4, 3, 2]));
@@ -244,6 +303,11 @@ pub fn several(session: &Session, folder: &std::path::Path) {
     for (one, several) in alone.iter().flatten().zip(found.iter().flatten()) {
         assert!((one - several).abs() <= 1e-9 * one.abs(), "{several} instead of {one}");
     }
+}
+
+#[test]
+fn an_elastic_bar_is_thrown_back_by_a_wall_as_travelling_waves_say() {
+    run_on(&[1], "impacts");
 }
 
 #[test]
