@@ -12,7 +12,7 @@ mod support;
 mod viscoplastic_history;
 mod viscous_stress;
 
-pub use contact::{Contact, PointCount, Quadrature, choose_unknowns};
+pub use contact::{COUNTS, Contact, PointCount, Quadrature, choose_unknowns};
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;
 pub use inertia::Inertia;

@@ -8,7 +8,7 @@ use super::{
 use crate::error::Result;
 use std::{ffi::c_void, ptr};
 
-/// A symmetric operator on a subspace, given by its action.
+/// An operator on a subspace, given by its action.
 pub trait ProjectedOperator {
     /// `y = P B x` for an `x` of the subspace.
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
@@ -95,7 +95,8 @@ impl ProjectedKsp {
         check(unsafe { sys::KSPSetOperators(self.ksp.raw, self.shell, constant.raw) })
     }
 
-    /// Solves `P B x = r` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an error.
+    /// Solves `P B x = r` with a symmetric `P B` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an
+    /// error.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank.
     pub fn solve(
@@ -103,6 +104,28 @@ impl ProjectedKsp {
         operator: &mut dyn ProjectedOperator,
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
+    ) -> Result<ProjectedOutcome> {
+        self.attached(operator, |solver| solver.solve_attached(right_hand_side, solution))
+    }
+
+    /// The same with a `P B` that is not symmetric, by GMRES.
+    pub fn solve_unsymmetric(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<ProjectedOutcome> {
+        self.attached(operator, |solver| {
+            let linear = solver.solve_by_fallback(right_hand_side, solution)?;
+            Ok(ProjectedOutcome { linear, indefinite: false })
+        })
+    }
+
+    /// Runs a solve with this operator behind the shell matrix.
+    fn attached(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        solve: impl FnOnce(&mut Self) -> Result<ProjectedOutcome>,
     ) -> Result<ProjectedOutcome> {
         let callback = Callback::new(operator);
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
@@ -112,7 +135,7 @@ impl ProjectedKsp {
             check(sys::MatSetNullSpace(self.shell, self.complement))?;
             check(sys::MatShellSetContext(self.shell, callback.pointer()))?;
         }
-        let outcome = self.solve_attached(right_hand_side, solution);
+        let outcome = solve(self);
         // SAFETY: as above.
         unsafe {
             check(sys::MatShellSetContext(self.shell, ptr::null_mut()))?;
@@ -132,6 +155,16 @@ impl ProjectedKsp {
         if !INDEFINITE.contains(&first.reason) {
             return Ok(ProjectedOutcome { linear: first, indefinite: false });
         }
+        let second = self.solve_by_fallback(right_hand_side, solution)?;
+        let linear = LinearOutcome { iterations: first.iterations + second.iterations, ..second };
+        Ok(ProjectedOutcome { linear, indefinite: true })
+    }
+
+    fn solve_by_fallback(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<LinearOutcome> {
         if self.fallback.is_none() {
             self.fallback = Some(self.ksp.sharing_preconditioner("indefinite_", "gmres")?);
         }
@@ -139,9 +172,7 @@ impl ProjectedKsp {
         let (relative, absolute, iterations) = self.tolerances;
         let relative = relative.max(absolute / right_hand_side.norm()?).min(relative.max(1e-3));
         fallback.set_tolerances(relative, 0.0, iterations)?;
-        let second = fallback.solve(right_hand_side, solution)?;
-        let linear = LinearOutcome { iterations: first.iterations + second.iterations, ..second };
-        Ok(ProjectedOutcome { linear, indefinite: true })
+        fallback.solve(right_hand_side, solution)
     }
 }
 

@@ -2,13 +2,13 @@
 
 use crate::{
     body::Body,
-    contact::{self, DampedResponse, Graph, Symmetry},
+    contact::{self, DampedResponse, FrictionLaw, Graph, Symmetry},
     effect::{
         BodyForce, Contact, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load, Quadrature, Support,
         Traction, ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw, Scalar},
+    job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Scalar},
     material::{
         ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
         Viscoplasticity,
@@ -17,7 +17,7 @@ use crate::{
     session::Session,
     space::Geometry,
     state::State,
-    stepping::{Preconditioner, SolverSettings},
+    stepping::{FrictionIteration, Preconditioner, SolverSettings},
     tensor::Vector,
 };
 
@@ -42,7 +42,11 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
         let (law, gap) = session.agree(normal_law(&contact.normal))?;
-        contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
+        let mut laws = Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?;
+        if let Some(friction) = &contact.friction {
+            session.agree(laws.add_friction(friction_law(friction), &mesh, &fixed))?;
+        }
+        contacts.push(laws);
     }
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
@@ -183,6 +187,18 @@ fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
     })
 }
 
+fn friction_law(law: &Friction) -> FrictionLaw {
+    match law {
+        Friction::Tresca(t) => FrictionLaw::Tresca { bound: t.bound },
+        Friction::Coulomb(c) => FrictionLaw::Coulomb { coefficient: c.coefficient },
+        Friction::SlipWeakening(s) => FrictionLaw::SlipWeakening {
+            at_rest: s.at_rest,
+            dynamic: s.dynamic,
+            decay_velocity: s.decay_velocity,
+        },
+    }
+}
+
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
     let mut all: Vec<u32> =
         names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
@@ -257,5 +273,9 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
             job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
         },
         newton_iterations: job.solver.max_newton_iterations as usize,
+        friction: match job.solver.friction {
+            job::FrictionIteration::Newton => FrictionIteration::Newton,
+            job::FrictionIteration::FixedPoint => FrictionIteration::FixedPoint,
+        },
     }
 }

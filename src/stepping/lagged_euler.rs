@@ -10,7 +10,7 @@
 use super::{
     equations::Scratch,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, failed},
+    newton::{Newton, REMEDY, Task, failed},
 };
 use crate::{
     body::Body,
@@ -182,7 +182,7 @@ impl LaggedEuler {
             Solver::Newton(newton) => {
                 newton.linear_solver.set_constant(&matrix)?;
                 session.agree(newton.linear_solver.linear_solver().set_up())?;
-                newton.choose_scales(session, &body.contacts, &self.right_hand_side)?;
+                newton.choose_scales(session, &body.contacts, &self.right_hand_side, &matrix)?;
             }
         }
         self.matrix = Some((length, matrix));
@@ -326,9 +326,9 @@ impl LaggedEuler {
                     LINEAR_SHARE * tolerance,
                     LINEAR_ITERATIONS,
                 )?;
-                let limits = (tolerance, self.settings);
-                let right_hand_side = &self.right_hand_side;
-                newton.solve(session, body, state, step, matrix, right_hand_side, &mut self.trial, limits)
+                let (right_hand_side, settings) = (&self.right_hand_side, self.settings);
+                let task = Task { step, matrix, right_hand_side, tolerance, settings };
+                newton.solve(session, body, state, task, &mut self.trial)
             }
         }
     }

@@ -7,4 +7,4 @@ mod newton;
 
 pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
-pub use linear_solver::{Preconditioner, SolverSettings};
+pub use linear_solver::{FrictionIteration, Preconditioner, SolverSettings};

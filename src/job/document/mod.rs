@@ -21,7 +21,7 @@ pub use material::{
 };
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
-pub use time::{Accept, Adaptive, Preconditioner, Scheme, Solver, Time};
+pub use time::{Accept, Adaptive, FrictionIteration, Preconditioner, Scheme, Solver, Time};
 
 use std::collections::BTreeMap;
 
