@@ -27,6 +27,15 @@ pub(super) struct Newton {
 
 /// Fixed-point iterations after which a step has failed.
 const FIXED_POINTS: usize = 200;
+/// What is tried with friction where the first attempt fails, each time from the state before the step: other parameters of
+/// the graphs, by these factors, along which the residual may fall where it did not; then a fixed point, which
+/// does not cycle between pressure and friction.
+const RETRIES: [(f64, FrictionIteration); 4] = [
+    (30.0, FrictionIteration::Newton),
+    (1.0 / 30.0, FrictionIteration::Newton),
+    (1.0, FrictionIteration::FixedPoint),
+    (30.0, FrictionIteration::FixedPoint),
+];
 /// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
 const STEEPEST: f64 = 0.8;
 const STEEP: f64 = 0.5;
@@ -88,44 +97,41 @@ impl Newton {
         let (step, settings) = (task.step, task.settings);
         let follows = settings.friction == FrictionIteration::Newton;
         let mut falls = largest_falls(session, &body.contacts);
-        self.parametrise(body, &falls, follows);
+        self.parametrise(body, &falls, 1.0, follows);
         branches(body, &state.velocity, &mut self.before)?;
         let mut effort = Effort::default();
         let mut newton_iterations = 0;
         loop {
-            let solved = if follows {
-                match self.newton(session, body, task, trial, &mut effort) {
-                    // The fixed point is slower, but it does not cycle between sticking and sliding.
-                    Ok(Err(_))
-                        if body
-                            .contacts
-                            .iter()
-                            .any(|c| c.friction().is_some_and(|f| f.follows_pressure())) =>
-                    {
-                        self.start_again(body, state, &falls, trial)?;
-                        self.fixed_point(session, body, task, trial, &mut effort)?
-                    }
-                    other => other?,
+            let mut solved = self.attempt(session, body, task, trial, &mut effort)?;
+            let has_friction = body.contacts.iter().any(|contact| contact.friction().is_some());
+            for (factor, iteration) in RETRIES {
+                if solved.is_ok() || !has_friction {
+                    break;
                 }
-            } else {
-                self.fixed_point(session, body, task, trial, &mut effort)?
-            };
+                self.start_again(body, state, trial)?;
+                self.parametrise(body, &falls, factor, iteration == FrictionIteration::Newton && follows);
+                solved = if iteration == FrictionIteration::Newton && follows {
+                    self.newton(session, body, task, trial, &mut effort)?
+                } else {
+                    self.fixed_point(session, body, task, trial, &mut effort)?
+                };
+            }
             newton_iterations += match solved {
                 Ok(iterations) => iterations,
                 Err(words) => return Err(failed(step, &words, REMEDY)),
             };
             let now = largest_falls(session, &body.contacts);
-            if now
+            if body
+                .contacts
                 .iter()
-                .zip(&falls)
-                .zip(&self.scales)
-                .all(|((n, f), s)| *n <= STEEPEST * friction_scale(*s, *f))
+                .zip(&now)
+                .all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale())
             {
                 break;
             }
             // The pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
             falls = now;
-            self.parametrise(body, &falls, follows);
+            self.parametrise(body, &falls, 1.0, follows);
         }
         trial.update_ghosts()?;
         branches(body, trial, &mut self.after)?;
@@ -157,20 +163,35 @@ impl Newton {
         &self,
         body: &mut Body<D, S>,
         falls: &[f64],
+        factor: f64,
         follows: bool,
     ) {
         for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(falls) {
-            contact.scale = scales[0];
-            contact.set_friction(friction_scale(*scales, *fall), follows);
+            contact.scale = (factor * scales[0]).max(2.0 * contact.law.monotonicity_constant());
+            contact.set_friction((factor * scales[1]).max(fall / STEEP), follows);
         }
     }
 
-    /// Goes back to the state before the step, with friction bounds that stay.
+    /// The iteration that the job asks for. Collective.
+    fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        task: Task<'_>,
+        trial: &mut DistributedVector,
+        effort: &mut Effort,
+    ) -> Result<std::result::Result<usize, String>> {
+        match task.settings.friction {
+            FrictionIteration::Newton => self.newton(session, body, task, trial, effort),
+            FrictionIteration::FixedPoint => self.fixed_point(session, body, task, trial, effort),
+        }
+    }
+
+    /// Goes back to the state before the step.
     fn start_again<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
         state: &State,
-        falls: &[f64],
         trial: &mut DistributedVector,
     ) -> Result<()> {
         trial.copy_from(&state.velocity)?;
@@ -178,7 +199,6 @@ impl Newton {
             let traction = traction.owned()?;
             body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
         }
-        self.parametrise(body, falls, false);
         Ok(())
     }
 
@@ -274,11 +294,6 @@ fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>]) -> 
 
 fn positive_or_one(stiffness: f64) -> f64 {
     if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
-}
-
-/// The parameter of friction graphs that fall by so much at most.
-fn friction_scale([_, stiffness]: [f64; 2], fall: f64) -> f64 {
-    stiffness.max(fall / STEEP)
 }
 
 /// Why Newton's method failed, in words. Collective.
