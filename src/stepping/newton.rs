@@ -14,6 +14,10 @@ use crate::{
     state::State,
 };
 
+/// What is tried in turn until a step is solved: whether to search along steps for a decrease of the residual, and how
+/// much stiffer than the body the parameter of the graphs is. Which branches come back depends on both.
+const ATTEMPTS: [(bool, f64); 5] = [(false, 1.0), (false, 10.0), (false, 100.0), (true, 1.0), (true, 10.0)];
+
 /// Newton's method with what it needs.
 pub(super) struct Newton {
     pub snes: Snes,
@@ -64,19 +68,17 @@ impl Newton {
         trial: &mut DistributedVector,
         (tolerance, settings): (f64, SolverSettings),
     ) -> Result<StepOutcome> {
-        body.contacts.iter_mut().zip(&self.scales).for_each(|(contact, scale)| contact.scale = *scale);
         branches(body, &state.velocity, &mut self.before)?;
-        {
-            let mut trial = trial.owned_mut()?;
-            body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
-        }
         self.start.copy_from(trial)?;
         let (mut effort, mut newton_iterations) = (Effort::default(), 0);
-        for last in if self.chosen_search { &[true][..] } else { &[false, true] } {
+        let attempts = if self.chosen_search { &ATTEMPTS[..1] } else { &ATTEMPTS[..] };
+        for (number, &(search, stiffer)) in attempts.iter().enumerate() {
+            let last = number + 1 == attempts.len();
             if !self.chosen_search {
-                self.snes.search_along_steps(*last)?;
+                self.snes.search_along_steps(search)?;
             }
             trial.copy_from(&self.start)?;
+            self.unmap(body, state, stiffer, trial)?;
             effort.sets.clear();
             let mut equations = ContactEquations {
                 matrix,
@@ -85,18 +87,25 @@ impl Newton {
                 scratch: &mut self.scratch,
                 linear_solver: &mut self.linear_solver,
                 session,
-                stop_at_cycles: !last,
+                stop_at_cycles: !last && !search,
                 effort,
             };
             let solved = self.snes.solve(&mut equations, trial, tolerance, settings.newton_iterations);
             effort = equations.effort;
             newton_iterations += effort.sets.len();
-            match session.agree(solved) {
-                Ok(outcome) if outcome.converged() => break,
-                Ok(_) | Err(Error::Failed(_)) if !last => {}
-                Ok(outcome) => return Err(failed(step, &why(&outcome, &effort), REMEDY)),
-                Err(Error::Failed(words)) => return Err(failed(step, &words, REMEDY)),
-                Err(other) => return Err(other),
+            let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+            let fatal = matches!(&solved, Err(error) if !matches!(error, Error::Failed(_)));
+            // All ranks go the same way, whichever of them failed.
+            let [missed, fatal] = session.largest([missed, fatal].map(|flag| f64::from(u8::from(flag))));
+            if missed == 0.0 {
+                break;
+            }
+            if last || fatal > 0.0 {
+                let outcome = session.agree(solved.map_err(|error| match error {
+                    Error::Failed(words) => failed(step, &words, REMEDY),
+                    other => other,
+                }))?;
+                return Err(failed(step, &why(&outcome, &effort), REMEDY));
             }
         }
         {
@@ -124,6 +133,27 @@ impl Newton {
             inclusion_residual: inclusion,
             energy: Energy::default(),
         })
+    }
+
+    /// Turns velocities into unknowns whose parameter is that much stiffer than the body, with the pressures of the
+    /// converged state.
+    fn unmap<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        state: &State,
+        stiffer: f64,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        for (contact, scale) in body.contacts.iter_mut().zip(&self.scales) {
+            contact.scale = stiffer * scale;
+        }
+        if let Some(traction) = &state.contact_traction {
+            let traction = traction.owned()?;
+            body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+        }
+        let mut trial = trial.owned_mut()?;
+        body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
+        Ok(())
     }
 
     /// The largest of all contacts over all ranks. Collective.
