@@ -168,7 +168,7 @@ fn cross_checked<const D: usize, const S: usize>(session: &Session, mesh: &Globa
         let two = other.0.advance(session).unwrap_or_else(|e| panic!("{e}\n{}", other.1));
         let (Some(one), Some(two)) = (one, two) else { break };
         assert_eq!(one.points, two.points, "the same points touch");
-        held = held.max(one.points.sticking);
+        held = held.max(one.points.held);
         let fields = |run: &Simulation<D, S>| {
             let traction = run.state.contact_traction.as_ref().expect("tractions").owned().expect("values");
             [run.state.velocity.owned().expect("values").to_vec(), traction.to_vec()]
