@@ -20,7 +20,7 @@ pub use verdict::{Accepted, Verdict};
 
 use crate::{
     body::Body, effect::Form, error::Result, petsc::DistributedVector, session::Session, state::State,
-    stepping::LaggedEuler,
+    stepping::Stepper,
 };
 use ascent::{Quotient, climb};
 use serde::Serialize;
@@ -53,7 +53,7 @@ impl Certificates {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut LaggedEuler,
+        scheme: &mut Stepper,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.law.monotonicity_constant());
         let viscous = body.has_form_everywhere(Form::Viscosity);
@@ -83,7 +83,7 @@ impl Certificates {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut LaggedEuler,
+        scheme: &mut Stepper,
     ) -> Result<Option<f64>> {
         if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
@@ -96,7 +96,7 @@ fn find<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,
-    scheme: &mut LaggedEuler,
+    scheme: &mut Stepper,
     kind: Kind,
 ) -> Result<f64> {
     let mut pencil = Pencil { body, scheme, kind };
@@ -124,7 +124,7 @@ enum Kind {
 
 struct Pencil<'a, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
-    scheme: &'a mut LaggedEuler,
+    scheme: &'a mut Stepper,
     kind: Kind,
 }
 

@@ -17,7 +17,7 @@ use crate::{
     session::Session,
     space::Geometry,
     state::State,
-    stepping::{Preconditioner, SolverSettings},
+    stepping::{Preconditioner, Scheme, SolverSettings},
     tensor::Vector,
 };
 
@@ -243,6 +243,13 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     let mut velocity = state.velocity.owned_mut()?;
     velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
     Ok(())
+}
+
+/// The job's time scheme.
+pub(super) fn scheme(job: &Job) -> Scheme {
+    match job.time.scheme {
+        job::Scheme::LaggedEuler | job::Scheme::ImplicitEuler | job::Scheme::Bdf2 => Scheme::LaggedEuler,
+    }
 }
 
 /// The job's wishes for the solver.

@@ -116,7 +116,7 @@ fn report<const D: usize, const S: usize>(
             .iter()
             .map(|p| Probe { name: p.name.clone(), point: p.point.clone() })
             .collect(),
-        scheme: "lagged_euler",
+        scheme: scheme.scheme().name(),
         steps,
         newton: inventory.newton,
         preconditioner: preconditioner.name(),

@@ -27,7 +27,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
     lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
     lines.push(format!(
-        "scheme     lagged_euler, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        "scheme     {}, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        scheme.scheme().name(),
         job.time.step,
         job.time.end,
         if scheme.is_nonlinear() { "Newton with line search" } else { "one linear solve a step" },

@@ -1,6 +1,6 @@
 //! What a run allocated for its effects, as facts a test can hold against the job.
 
-use crate::{body::Body, session::Session, stepping::LaggedEuler};
+use crate::{body::Body, session::Session, stepping::Stepper};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ impl Inventory {
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
-        scheme: &LaggedEuler,
+        scheme: &Stepper,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
         for history in body.effects.iter().flat_map(|e| e.histories()) {

@@ -13,7 +13,7 @@ use crate::{
     output::history::Totals,
     session::Session,
     state::State,
-    stepping::{LaggedEuler, StepOutcome},
+    stepping::{StepOutcome, Stepper},
 };
 
 /// A step that ends within this share of a step of the end ends there.
@@ -26,7 +26,7 @@ pub struct Simulation<const D: usize, const S: usize> {
     /// Its converged state.
     pub state: State,
     /// The scheme.
-    pub scheme: LaggedEuler,
+    pub scheme: Stepper,
     /// What adds up over the steps.
     pub totals: Totals,
     time: Time,

@@ -20,7 +20,7 @@ use crate::{
     },
     session::Session,
     state::State,
-    stepping::{LaggedEuler, StepOutcome},
+    stepping::{StepOutcome, Stepper},
 };
 use std::{
     path::Path,
@@ -132,7 +132,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     job: &'a Job,
     body: Body<D, S>,
     state: State,
-    scheme: LaggedEuler,
+    scheme: Stepper,
     certificates: Certificates,
     totals: Totals,
     outputs: Outputs<D>,
@@ -290,7 +290,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             nodes: mesh.total_nodes,
             unknowns: self.body.unknowns(self.session),
             effects: self.body.effect_names(),
-            scheme: "lagged_euler",
+            scheme: self.scheme.scheme().name(),
             preconditioner: self.scheme.preconditioner().name(),
             steps: self.state.step,
             time: self.state.time,

@@ -4,7 +4,11 @@ mod equations;
 mod lagged_euler;
 mod linear_solver;
 mod newton;
+mod scheme;
+mod step_solver;
+mod stepper;
 
 pub use equations::{ContactEquations, Effort, Scratch};
-pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
 pub use linear_solver::{Preconditioner, SolverSettings};
+pub use scheme::Scheme;
+pub use stepper::{StepClock, StepOutcome, Stepper};

@@ -1,0 +1,168 @@
+//! The matrix of a step with its solver.
+
+use super::{
+    equations::Scratch,
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
+    newton::{Newton, REMEDY, failed},
+    stepper::StepOutcome,
+};
+use crate::{
+    body::Body,
+    effect::Step,
+    error::{Error, Result},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes},
+    session::Session,
+    state::State,
+};
+
+/// Linear solves stop at this share of what the step needs.
+const LINEAR_SHARE: f64 = 0.3;
+/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
+const LINEAR_REDUCTION: f64 = 1e-3;
+
+/// The solver of a linear or of a nonlinear step: only the one that is needed exists.
+enum Solver {
+    Linear(Ksp),
+    Newton(Box<Newton>),
+}
+
+/// The matrix for steps of one length, and what solves with it.
+pub(super) struct StepSolver {
+    settings: SolverSettings,
+    matrix: Option<(f64, Matrix)>,
+    solver: Solver,
+}
+
+impl StepSolver {
+    /// Chooses the solver; the matrix comes with [`StepSolver::prepare`]. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        let unknowns = body.mesh.total_nodes * D;
+        let preconditioner = settings.preconditioner.resolve(D, unknowns);
+        let solver = if body.contacts.is_empty() {
+            let mut ksp = Ksp::new("")?;
+            preconditioner.configure(&mut ksp, session.ranks(), unknowns)?;
+            ksp.start_from_solution()?;
+            ksp.apply_options()?;
+            Solver::Linear(ksp)
+        } else {
+            let mut snes = Snes::new("", &state.velocity, D)?;
+            snes.apply_options()?;
+            let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
+            preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
+            linear_solver.linear_solver().apply_options()?;
+            let scratch = Scratch::new(&state.velocity, &body.contacts)?;
+            let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
+            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+        };
+        Ok(Self { settings: SolverSettings { preconditioner, ..settings }, matrix: None, solver })
+    }
+
+    /// Whether steps are solved by Newton's method.
+    pub fn is_nonlinear(&self) -> bool {
+        matches!(self.solver, Solver::Newton(_))
+    }
+
+    /// The preconditioner in use.
+    pub fn preconditioner(&self) -> Preconditioner {
+        self.settings.preconditioner
+    }
+
+    /// Whether the matrix is that of this length.
+    pub fn is_prepared_for(&self, length: f64) -> bool {
+        self.matrix.as_ref().is_some_and(|(known, _)| *known == length)
+    }
+
+    /// Assembles the matrix of this length and sets its preconditioner up; `like` is laid out as velocities are. Collective.
+    pub fn prepare<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        length: f64,
+        like: &DistributedVector,
+    ) -> Result<()> {
+        self.matrix = None;
+        let rows = session.agree(body.matrix(session, length))?;
+        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        drop(rows);
+        if self.settings.preconditioner == Preconditioner::Gamg {
+            let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
+            matrix.attach_rigid_motions(D, coordinates)?;
+        }
+        match &mut self.solver {
+            Solver::Linear(ksp) => {
+                ksp.set_matrix(&matrix)?;
+                session.agree(ksp.set_up())?;
+            }
+            Solver::Newton(newton) => {
+                session.agree(newton.linear_solver.set_constant(&matrix))?;
+                newton.choose_scales(session, &body.contacts, like)?;
+            }
+        }
+        self.matrix = Some((length, matrix));
+        Ok(())
+    }
+
+    /// `y = K x`. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let Some((_, matrix)) = &self.matrix else {
+            return Err(Error::Internal("a product was asked for before the matrix was assembled".into()));
+        };
+        matrix.multiply(x, y)
+    }
+
+    /// Applies the preconditioner. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        match &mut self.solver {
+            Solver::Linear(ksp) => ksp.precondition(r, z),
+            Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
+        }
+    }
+
+    /// Solves a step from the velocity in `trial`, and leaves the new one there. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        right_hand_side: &DistributedVector,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        let norm = right_hand_side.norm()?;
+        if !norm.is_finite() {
+            return Err(failed(
+                step,
+                "the forces are not finite",
+                "check loads and initial values; use smaller steps",
+            ));
+        }
+        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE);
+        let Some((_, matrix)) = &self.matrix else {
+            return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
+        };
+        match &mut self.solver {
+            Solver::Linear(ksp) => {
+                ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
+                let outcome = session.agree(ksp.solve(right_hand_side, trial))?;
+                if !outcome.converged() {
+                    return Err(failed(step, outcome.words(), REMEDY));
+                }
+                Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
+            }
+            Solver::Newton(newton) => {
+                newton.linear_solver.set_tolerances(
+                    LINEAR_REDUCTION,
+                    LINEAR_SHARE * tolerance,
+                    LINEAR_ITERATIONS,
+                )?;
+                let limits = (tolerance, self.settings);
+                newton.solve(session, body, state, step, matrix, right_hand_side, trial, limits)
+            }
+        }
+    }
+}
