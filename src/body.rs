@@ -1,5 +1,7 @@
 //! A body on a mesh with all that acts on it: what a run advances in time.
 
+mod implicit;
+
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step},
     error::Result,
@@ -88,7 +90,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
-        let nodal = Nodal { displacement: x, velocity: x, previous_velocity: x };
+        let nodal = Nodal { displacement: x, previous_displacement: x, velocity: x, previous_velocity: x };
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
                 for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
@@ -171,6 +173,11 @@ fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
     let displacement = state.displacement.local()?;
     let velocity = state.velocity.local()?;
     let previous_velocity = state.previous_velocity.local()?;
-    body(Nodal { displacement: &displacement, velocity: &velocity, previous_velocity: &previous_velocity });
+    body(Nodal {
+        displacement: &displacement,
+        previous_displacement: &displacement,
+        velocity: &velocity,
+        previous_velocity: &previous_velocity,
+    });
     Ok(())
 }

@@ -6,6 +6,7 @@ mod hardening;
 mod isotropic;
 mod maxwell;
 mod perzyna;
+mod return_mapping;
 mod viscoplasticity;
 
 pub use by_material::ByMaterial;
@@ -14,4 +15,5 @@ pub use hardening::Hardening;
 pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};
 pub use maxwell::Maxwell;
 pub use perzyna::{Metric, Perzyna};
+pub use return_mapping::{Returned, Tangent};
 pub use viscoplasticity::Viscoplasticity;
