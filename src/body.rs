@@ -2,6 +2,8 @@
 
 mod implicit;
 
+pub use implicit::Cells;
+
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step},
     error::Result,

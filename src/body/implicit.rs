@@ -2,12 +2,28 @@
 
 use super::Body;
 use crate::{
-    effect::{Blend, Energy, Step, Tangents},
-    space::{Batch, Needs, Nodal},
+    effect::{Blend, Contact, Effect, Energy, Step, Tangents},
+    mesh::Mesh,
+    space::{Batch, Geometry, Needs, Nodal},
     tensor::{Mandel, component, symmetric_part},
 };
 
+/// The cells of a body, apart from its contacts.
+pub struct Cells<'a, const D: usize, const S: usize> {
+    mesh: &'a Mesh<D>,
+    geometry: &'a Geometry<D>,
+    effects: &'a mut [Box<dyn Effect<D, S>>],
+    /// One flag a local component: held by a support.
+    pub fixed: &'a [bool],
+}
+
 impl<const D: usize, const S: usize> Body<D, S> {
+    /// Cells and contacts, to be used side by side.
+    pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
+        let Self { mesh, geometry, effects, fixed, contacts, .. } = self;
+        (Cells { mesh, geometry, effects, fixed }, contacts)
+    }
+
     /// Whether cells flow, so that an implicit step is nonlinear.
     pub fn flows(&self) -> bool {
         self.effects.iter().any(|effect| effect.flows())
@@ -20,7 +36,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Adds the forces of the state that a step starts from to `forces` (with ghosts). Gives the sum of the squares of the
     /// forces of cells, whose rounding no residual can be less than.
-    pub fn add_start_forces(&mut self, blend: Blend, nodal: Nodal<'_>, step: Step, forces: &mut [f64]) -> f64 {
+    pub fn add_start_forces(
+        &mut self,
+        blend: Blend,
+        nodal: Nodal<'_>,
+        step: Step,
+        forces: &mut [f64],
+    ) -> f64 {
         self.effects.iter_mut().for_each(|effect| effect.begin(blend));
         let Some(needs) = self.needs(|p| p.explicit) else { return 0.0 };
         let (mesh, effects) = (&self.mesh, &mut self.effects);
@@ -39,9 +61,25 @@ impl<const D: usize, const S: usize> Body<D, S> {
         squares
     }
 
+    /// Energies of a solved step that is not yet committed; writes trial histories.
+    pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
+        let needs = Needs { strain: true, strain_before: true, strain_rate: true, ..Needs::default() };
+        let effects = &mut self.effects;
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            effects.iter_mut().for_each(|effect| effect.add_implicit_energy(step, batch, energy));
+        });
+    }
+}
+
+impl<const D: usize, const S: usize> Cells<'_, D, S> {
     /// Adds the forces of what flow takes from the stress at this displacement to `forces` (both with ghosts); writes trial
     /// histories and, where they are wanted, the derivatives.
-    pub fn add_flow(&mut self, displacement: &[f64], mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
+    pub fn add_flow(
+        &mut self,
+        displacement: &[f64],
+        mut tangents: Option<&mut Tangents>,
+        forces: &mut [f64],
+    ) {
         let nodal = Nodal {
             displacement,
             previous_displacement: displacement,
@@ -49,8 +87,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
             previous_velocity: displacement,
         };
         let needs = Needs { strain: true, ..Needs::default() };
-        let (mesh, effects) = (&self.mesh, &mut self.effects);
-        Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+        let (mesh, effects) = (self.mesh, &mut self.effects);
+        Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             let mut any = false;
             for effect in effects.iter_mut().filter(|e| e.flows()) {
                 any |= effect.add_flow(batch, tangents.as_deref_mut());
@@ -58,15 +96,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
             if any {
                 batch.scatter(mesh, forces);
             }
-        });
-    }
-
-    /// Energies of a solved step that is not yet committed; writes trial histories.
-    pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
-        let needs = Needs { strain: true, strain_before: true, strain_rate: true, ..Needs::default() };
-        let effects = &mut self.effects;
-        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-            effects.iter_mut().for_each(|effect| effect.add_implicit_energy(step, batch, energy));
         });
     }
 

@@ -62,6 +62,7 @@ impl Certificates {
             monotonicity_constant: falls.reduce(f64::max),
             ..Self::default()
         };
+        let scheme_is_implicit = scheme.scheme().is_implicit();
         let mut find = |kind: Kind| find(session, body, state, scheme, kind);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
@@ -71,7 +72,7 @@ impl Certificates {
                 known.theta = Some(if falling { find(Kind::Theta)? } else { 0.0 });
             }
         }
-        if body.has_form(Form::Elasticity) {
+        if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let waves = 1.0 / find(Kind::ExplicitStep)?;
             known.explicit_step_bound = Some(body.flow_step_bound().map_or(waves, |flow| waves.min(flow)));
         }

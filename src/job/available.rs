@@ -8,8 +8,6 @@ const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
     ("contact.*.friction.tresca", None, "Tresca friction is"),
     ("contact.*.friction.coulomb", None, "Coulomb friction is"),
     ("contact.*.friction.slip_weakening", None, "slip weakening friction is"),
-    ("time.scheme", Some("implicit_euler"), "the scheme \"implicit_euler\" is"),
-    ("time.scheme", Some("bdf2"), "the scheme \"bdf2\" is"),
     ("time.adaptive", None, "adaptive time stepping is"),
 ];
 

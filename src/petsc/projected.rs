@@ -28,6 +28,7 @@ pub struct ProjectedKsp {
     shell: sys::Mat,
     complement: sys::MatNullSpace,
     tolerances: (f64, f64, usize),
+    symmetric: bool,
 }
 
 /// How a solve on a subspace ended.
@@ -53,6 +54,7 @@ impl ProjectedKsp {
             shell: ptr::null_mut(),
             complement: ptr::null_mut(),
             tolerances: (1e-5, 0.0, 10_000),
+            symmetric: true,
         };
         // SAFETY: the handle owns one reference each to the shell matrix and the null space from their creation on; the
         // shell is only multiplied inside `solve`, which sets its context.
@@ -80,6 +82,11 @@ impl ProjectedKsp {
     /// The solver inside, to choose method, preconditioner and tolerances.
     pub fn linear_solver(&mut self) -> &mut Ksp {
         &mut self.ksp
+    }
+
+    /// Says whether the operators are symmetric; they are unless this says otherwise. Others are left to GMRES.
+    pub fn set_symmetric(&mut self, symmetric: bool) {
+        self.symmetric = symmetric;
     }
 
     /// Stops at `relative * |r|` or at `absolute`, whichever is larger, or after this many iterations.
@@ -136,10 +143,24 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
+        if !self.symmetric {
+            let linear = self.solve_by_gmres(right_hand_side, solution)?;
+            return Ok(ProjectedOutcome { linear, indefinite: false });
+        }
         let first = self.ksp.solve(right_hand_side, solution)?;
         if !INDEFINITE.contains(&first.reason) {
             return Ok(ProjectedOutcome { linear: first, indefinite: false });
         }
+        let second = self.solve_by_gmres(right_hand_side, solution)?;
+        let linear = LinearOutcome { iterations: first.iterations + second.iterations, ..second };
+        Ok(ProjectedOutcome { linear, indefinite: true })
+    }
+
+    fn solve_by_gmres(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<LinearOutcome> {
         if self.fallback.is_none() {
             self.fallback = Some(self.ksp.sharing_preconditioner("indefinite_", "gmres")?);
         }
@@ -147,9 +168,7 @@ impl ProjectedKsp {
         let (relative, absolute, iterations) = self.tolerances;
         let relative = relative.max(absolute / right_hand_side.norm()?).min(relative.max(1e-3));
         fallback.set_tolerances(relative, 0.0, iterations)?;
-        let second = fallback.solve(right_hand_side, solution)?;
-        let linear = LinearOutcome { iterations: first.iterations + second.iterations, ..second };
-        Ok(ProjectedOutcome { linear, indefinite: true })
+        fallback.solve(right_hand_side, solution)
     }
 }
 

@@ -25,7 +25,9 @@ impl Inventory {
         scheme: &Stepper,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        for history in body.effects.iter().flat_map(|e| e.histories()) {
+        for history in
+            body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()))
+        {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }

@@ -2,7 +2,8 @@
 
 use super::{
     StepOutcome,
-    equations::{ContactEquations, Effort, Scratch},
+    equations::{CellForces, ContactEquations, Effort, Scratch},
+    flow::{Flow, FlowStart},
     linear_solver::SolverSettings,
 };
 use crate::{
@@ -27,6 +28,8 @@ pub(super) struct Newton {
     pub after: Vec<u8>,
     /// The parameter of each contact's graphs for the matrix in use.
     pub scales: Vec<f64>,
+    /// What cells that flow need, if there are any.
+    pub flow: Option<Flow>,
 }
 
 impl Newton {
@@ -63,6 +66,7 @@ impl Newton {
         right_hand_side: &DistributedVector,
         trial: &mut DistributedVector,
         (tolerance, settings): (f64, SolverSettings),
+        start: Option<FlowStart<'_>>,
     ) -> Result<StepOutcome> {
         body.contacts.iter_mut().zip(&self.scales).for_each(|(contact, scale)| contact.scale = *scale);
         branches(body, &state.velocity, &mut self.before)?;
@@ -70,9 +74,16 @@ impl Newton {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
+        let (cells, contacts) = body.cells_and_contacts();
+        let mut cells = match (&mut self.flow, start) {
+            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
+            _ => None,
+        };
+        let cells = cells.as_mut().map(|cells| cells as &mut dyn CellForces);
         let mut equations = ContactEquations {
             matrix,
-            contacts: &mut body.contacts,
+            cells,
+            contacts,
             right_hand_side,
             scratch: &mut self.scratch,
             linear_solver: &mut self.linear_solver,

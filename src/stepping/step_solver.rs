@@ -2,6 +2,7 @@
 
 use super::{
     equations::Scratch,
+    flow::{Flow, FlowStart},
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
     newton::{Newton, REMEDY, failed},
     stepper::StepOutcome,
@@ -19,6 +20,16 @@ use crate::{
 const LINEAR_SHARE: f64 = 0.3;
 /// First linear solves of a step reduce their residual by this factor only, while branches may still change.
 const LINEAR_REDUCTION: f64 = 1e-3;
+
+/// What a step brings to its solution.
+pub(super) struct Known<'a> {
+    /// The right-hand side in N.
+    pub forces: &'a DistributedVector,
+    /// The least residual norm in N that means something.
+    pub rounding: f64,
+    /// Where the displacement starts, if stresses are those at the end of the step.
+    pub start: Option<FlowStart<'a>>,
+}
 
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
 enum Solver {
@@ -43,7 +54,8 @@ impl StepSolver {
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
         let preconditioner = settings.preconditioner.resolve(D, unknowns);
-        let solver = if body.contacts.is_empty() {
+        let flows = body.flows();
+        let solver = if body.contacts.is_empty() && !flows {
             let mut ksp = Ksp::new("")?;
             preconditioner.configure(&mut ksp, session.ranks(), unknowns)?;
             ksp.start_from_solution()?;
@@ -55,9 +67,11 @@ impl StepSolver {
             let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
             preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
             linear_solver.linear_solver().apply_options()?;
+            linear_solver.set_symmetric(body.has_symmetric_tangent());
+            let flow = if flows { Some(Flow::new(&state.velocity)?) } else { None };
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales, flow }))
         };
         Ok(Self { settings: SolverSettings { preconditioner, ..settings }, matrix: None, solver })
     }
@@ -130,10 +144,11 @@ impl StepSolver {
         body: &mut Body<D, S>,
         state: &State,
         step: Step,
-        right_hand_side: &DistributedVector,
+        known: Known<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let norm = right_hand_side.norm()?;
+        let Known { forces, rounding, start } = known;
+        let norm = forces.norm()?;
         if !norm.is_finite() {
             return Err(failed(
                 step,
@@ -141,14 +156,14 @@ impl StepSolver {
                 "check loads and initial values; use smaller steps",
             ));
         }
-        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE);
+        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding);
         let Some((_, matrix)) = &self.matrix else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
         match &mut self.solver {
             Solver::Linear(ksp) => {
                 ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
-                let outcome = session.agree(ksp.solve(right_hand_side, trial))?;
+                let outcome = session.agree(ksp.solve(forces, trial))?;
                 if !outcome.converged() {
                     return Err(failed(step, outcome.words(), REMEDY));
                 }
@@ -161,7 +176,7 @@ impl StepSolver {
                     LINEAR_ITERATIONS,
                 )?;
                 let limits = (tolerance, self.settings);
-                newton.solve(session, body, state, step, matrix, right_hand_side, trial, limits)
+                newton.solve(session, body, state, step, matrix, forces, trial, limits, start)
             }
         }
     }

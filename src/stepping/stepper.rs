@@ -3,7 +3,7 @@
 use super::{
     linear_solver::{Preconditioner, SolverSettings},
     scheme::{Method, Scheme},
-    step_solver::StepSolver,
+    step_solver::{Known, StepSolver},
 };
 use crate::{
     body::Body,
@@ -70,6 +70,7 @@ impl Stages {
 
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
+    scheme: Scheme,
     method: Method,
     stages: Stages,
     solver: StepSolver,
@@ -91,7 +92,8 @@ impl Stepper {
         settings: SolverSettings,
     ) -> Result<Self> {
         Ok(Self {
-            method: Method::new(scheme),
+            scheme,
+            method: Method::new(scheme, state)?,
             stages: Stages::register()?,
             solver: StepSolver::new(session, body, state, settings)?,
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
@@ -104,7 +106,7 @@ impl Stepper {
 
     /// The scheme.
     pub fn scheme(&self) -> Scheme {
-        self.method.scheme()
+        self.scheme
     }
 
     /// Whether steps are solved by Newton's method.
@@ -176,12 +178,18 @@ impl Stepper {
         self.write_right_hand_side(session, body, state, step)?;
         self.extrapolate(state, step)?;
         session.agree(prepare_contacts(body, state, step))?;
+        self.method.prepare_contacts(body, state)?;
         drop(stage);
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
-        let mut outcome =
-            self.solver.solve(session, body, state, step, &self.right_hand_side, &mut self.trial)?;
+        let known = Known {
+            forces: &self.right_hand_side,
+            rounding: self.method.rounding(session),
+            start: self.method.flow_start(),
+        };
+        let mut outcome = self.solver.solve(session, body, state, step, known, &mut self.trial)?;
+        self.method.finish(body, state, &self.trial, step)?;
         self.method.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();

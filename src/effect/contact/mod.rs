@@ -14,6 +14,7 @@
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
+mod blend;
 mod point;
 mod unknowns;
 
@@ -138,6 +139,7 @@ impl<const D: usize> Contact<D> {
             let penetration = point.normal_component(displacement) - gap;
             point.context = NodeContext { penetration, step_length: length };
             point.gap_change = gap - before;
+            point.shift = 0.0;
         }
         Ok(())
     }
@@ -299,18 +301,21 @@ impl<const D: usize> Contact<D> {
     /// Energy in J that a step of this length gave away, and the scheme's own term, from velocities at its end.
     ///
     /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
-    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme.
+    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme. What the displacement
+    /// changes by beside `k v` in schemes of two steps is the scheme's, too.
     pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for point in &self.points {
             let v = point.normal_component(velocity);
             let pressure = point.pressure_at(&self.law, velocity);
             let work = length * pressure * v;
-            let before = point.context.penetration + point.gap_change;
-            let after = point.context.penetration + length * v;
+            let before = point.context.penetration - point.shift + point.gap_change;
+            let change = point.context.step_length * v;
+            let after = point.context.penetration + change;
+            let beside = length * v - change - point.shift;
             let stored = self.law.energy(after) - self.law.energy(before);
             let numerical = if matches!(self.law, NormalLaw::Compliance(_)) {
-                stored - pressure * (after - before)
+                stored - pressure * (after - before) - pressure * beside
             } else {
                 0.0
             };
