@@ -15,4 +15,5 @@ mod readers;
 mod regions;
 mod restart;
 mod results;
+mod schemes;
 mod signals;

@@ -110,6 +110,24 @@ fn a_restarted_run_with_each_contact_law_is_the_straight_run_to_the_last_bit() {
 }
 
 #[test]
+fn a_restarted_run_under_each_scheme_is_the_straight_run_to_the_last_bit() {
+    let flow = "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300 } }";
+    let law = "{ compliance = { stiffness = 1000, exponent = 1.5, gap = '0.004 - 0.01*t' } }";
+    for scheme in ["'implicit_euler'", "'bdf2'"] {
+        let make = || {
+            saving()
+                .set("time.scheme", scheme)
+                .set("material.viscoplasticity", flow)
+                .set("contact.0.normal", law)
+        };
+        compare_with_straight(make, 1, scheme);
+        compare_with_straight(make, 3, scheme);
+        let elastic = || make().without("material.viscoplasticity").without("contact");
+        compare_with_straight(elastic, 2, scheme);
+    }
+}
+
+#[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");
@@ -117,8 +135,12 @@ fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
 
 /// Saves on some ranks and goes on on 1, 2, 3 and 4; the last state must be that of a run that was not interrupted.
 fn go_on_on_other_ranks(writers: usize) {
+    go_on_on_other_ranks_under("lagged_euler", writers);
+}
+
+fn go_on_on_other_ranks_under(scheme: &str, writers: usize) {
     // Solved further than by default, so that what is left of the equations does not hide the restart.
-    let case = saving().set("solver.tolerance", "1e-13");
+    let case = saving().set("solver.tolerance", "1e-13").set("time.scheme", &format!("'{scheme}'"));
     case.run_with(1, &["--set", "output.folder='straight'"]).expect(0);
     let straight = Results::of(case.folder().join("straight"));
     interrupt(&case, writers);
@@ -146,6 +168,12 @@ fn a_run_saved_on_two_ranks_goes_on_on_any_number() {
 #[test]
 fn a_run_saved_on_three_ranks_goes_on_on_any_number() {
     go_on_on_other_ranks(3);
+}
+
+#[test]
+fn a_run_of_each_scheme_saved_on_three_ranks_goes_on_on_any_number() {
+    go_on_on_other_ranks_under("implicit_euler", 3);
+    go_on_on_other_ranks_under("bdf2", 3);
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod mpirun;
 mod patch;
 mod petsc_boundary;
 mod scenes;
+mod schemes;
 mod wave;
 
 use clarke::session::Mpi;
@@ -46,6 +47,8 @@ fn scenario() {
         "creep" => creep::all(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
+        "scheme_orders" => schemes::orders(&session),
+        "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
         other => panic!("no scenario {other}"),
     }
