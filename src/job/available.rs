@@ -8,7 +8,6 @@ const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
     ("contact.*.friction.tresca", None, "Tresca friction is"),
     ("contact.*.friction.coulomb", None, "Coulomb friction is"),
     ("contact.*.friction.slip_weakening", None, "slip weakening friction is"),
-    ("time.adaptive", None, "adaptive time stepping is"),
 ];
 
 /// Whether the table or key `path` (without positions in lists), or its choice `word`, is not available yet.

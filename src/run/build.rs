@@ -18,7 +18,7 @@ use crate::{
     session::Session,
     space::Geometry,
     state::State,
-    stepping::{Preconditioner, Scheme, SolverSettings},
+    stepping::{Adaptive, AdaptiveSettings, Preconditioner, Scheme, SolverSettings},
     tensor::Vector,
 };
 
@@ -265,6 +265,18 @@ pub(super) fn scheme(job: &Job) -> Scheme {
         job::Scheme::ImplicitEuler => Scheme::ImplicitEuler,
         job::Scheme::Bdf2 => Scheme::Bdf2,
     }
+}
+
+/// How the job adapts its steps, if it does.
+pub(super) fn adaptive(job: &Job) -> Option<Adaptive> {
+    job.time.adaptive.as_ref().map(|adaptive| {
+        Adaptive::new(AdaptiveSettings {
+            tolerance: adaptive.tolerance,
+            first: job.time.step,
+            smallest: adaptive.smallest_step,
+            largest: adaptive.largest_step,
+        })
+    })
 }
 
 /// The job's wishes for the solver.

@@ -48,7 +48,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
         other => other,
     });
     let mut scheme = session.agree(scheme)?;
-    let prepared = scheme.prepare_length(session, &body, job.time.step).map_err(|error| match error {
+    let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
+    let prepared = scheme.prepare_length(session, &body, longest).map_err(|error| match error {
         Error::Internal(words) => loaded.fault(
             "material",
             format!("the equations of a step can't be solved: {words}"),
@@ -63,7 +64,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     } else {
         None
     };
-    let verdict = certificates.verdict(job.time.step, unique_step, accepted(job));
+    let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict })
 }

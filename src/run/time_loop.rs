@@ -1,17 +1,17 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Clock, Inventory, Scene, Start,
+    Clock, Inventory, Scene, Start, build,
     outputs::{Outputs, Wanted, prepare_folder},
     setup::{Setup, setup},
-    simulation::{SNAP, next_step, totals_at_start},
+    simulation::totals_at_start,
     summary::{PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     body::Body,
     certificate::Certificates,
     error::{Error, Exit, Result},
-    job::{Job, Loaded},
+    job::{Every, Job, Loaded},
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::list,
@@ -20,7 +20,7 @@ use crate::{
     },
     session::Session,
     state::State,
-    stepping::{StepOutcome, Stepper},
+    stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
 };
 use std::{
     path::Path,
@@ -68,8 +68,25 @@ pub(super) fn run<const D: usize, const S: usize>(
     }
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
-    let mut run =
-        Run { session, job, body, state, scheme, certificates, totals, outputs, log, clock, setup, stepping };
+    let mut adaptive = build::adaptive(job);
+    if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
+        adaptive.pace = pace;
+    }
+    let mut run = Run {
+        session,
+        job,
+        body,
+        state,
+        scheme,
+        certificates,
+        adaptive,
+        totals,
+        outputs,
+        log,
+        clock,
+        setup,
+        stepping,
+    };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -134,6 +151,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     state: State,
     scheme: Stepper,
     certificates: Certificates,
+    adaptive: Option<Adaptive>,
     totals: Totals,
     outputs: Outputs<D>,
     log: Log,
@@ -152,10 +170,11 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let step = next_step(&self.state, length, end);
-            let outcome = self.scheme.advance(self.session, &mut self.body, &mut self.state, step)?;
+            let outcome = self.take_step(length, end)?;
             self.totals.add(&outcome);
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
+            let steps_left = steps_between(self.state.time, end, self.state.step_length);
+            let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
             let wish = self.wish(saved_at);
             if let Some(reason) = wish.stop
@@ -169,6 +188,24 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             }
         }
         Ok(Ended::Completed)
+    }
+
+    /// Takes a step of the job's length, or of an adapted one that lands on the next output time. Collective.
+    fn take_step(&mut self, length: f64, end: f64) -> Result<StepOutcome> {
+        let (body, state) = (&mut self.body, &mut self.state);
+        let Some(adaptive) = &mut self.adaptive else {
+            let step = next_step(state, length, end);
+            return self.scheme.advance(self.session, body, state, step);
+        };
+        let target = match self.job.output.fields {
+            Some(Every::Interval(interval)) => {
+                interval * ((state.time / interval * (1.0 + 1e-12)).floor() + 1.0)
+            }
+            _ => end,
+        };
+        let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target.min(end))?;
+        self.totals.pace = Some(adaptive.pace);
+        Ok(outcome)
     }
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
@@ -294,7 +331,8 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             preconditioner: self.scheme.preconditioner().name(),
             steps: self.state.step,
             time: self.state.time,
-            rejected_steps: 0,
+            rejected_steps: self.totals.pace.map_or(0, |pace| pace.rejected),
+            set_ups: self.scheme.set_ups,
             newton_iterations: self.totals.newton_iterations,
             linear_iterations: self.totals.linear_iterations,
             restarted_from,

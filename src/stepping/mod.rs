@@ -1,5 +1,6 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
+mod adaptive;
 mod bdf2;
 mod equations;
 mod flow;
@@ -9,10 +10,13 @@ mod lagged_euler;
 mod linear_solver;
 mod newton;
 mod scheme;
+mod step_length;
 mod step_solver;
 mod stepper;
 
+pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use linear_solver::{Preconditioner, SolverSettings};
 pub use scheme::Scheme;
+pub use step_length::{SNAP, next_step};
 pub use stepper::{StepClock, StepOutcome, Stepper};

@@ -1,13 +1,14 @@
 //! A step as all schemes take it: right-hand side, contact, solution, commit, energy balance.
 
 use super::{
+    adaptive::Norms,
     linear_solver::{Preconditioner, SolverSettings},
     scheme::{Method, Scheme},
     step_solver::{Known, StepSolver},
 };
 use crate::{
     body::Body,
-    effect::{Energy, PointCount, Step},
+    effect::{Energy, Form, PointCount, Step},
     error::Result,
     petsc::{DistributedVector, Stage},
     session::Session,
@@ -78,6 +79,8 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
+    /// Matrices that were assembled, each with its preconditioner.
+    pub set_ups: u64,
     /// Seconds by phase.
     pub clock: StepClock,
 }
@@ -100,6 +103,7 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
+            set_ups: 0,
             clock: StepClock::default(),
         })
     }
@@ -147,6 +151,7 @@ impl Stepper {
         let start = Instant::now();
         let _stage = self.stages.assembly.enter()?;
         self.solver.prepare(session, body, length, &self.right_hand_side)?;
+        self.set_ups += 1;
         self.clock.assembly += start.elapsed();
         if self.clock.first_assembly.is_zero() {
             self.clock.first_assembly = self.clock.assembly;
@@ -172,6 +177,19 @@ impl Stepper {
         state: &mut State,
         step: Step,
     ) -> Result<StepOutcome> {
+        let mut outcome = self.attempt(session, body, state, step)?;
+        self.accept(session, body, state, step, &mut outcome)?;
+        Ok(outcome)
+    }
+
+    /// Solves a step and leaves the state as it was: another attempt may follow. Collective.
+    pub fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
         self.prepare_matrix(session, body, self.method.matrix_length(step))?;
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
@@ -188,7 +206,23 @@ impl Stepper {
             rounding: self.method.rounding(session),
             start: self.method.flow_start(),
         };
-        let mut outcome = self.solver.solve(session, body, state, step, known, &mut self.trial)?;
+        let outcome = self.solver.solve(session, body, state, step, known, &mut self.trial);
+        drop(stage);
+        self.clock.solve += solving.elapsed();
+        outcome
+    }
+
+    /// Commits the step that was attempted last, and completes its outcome. Collective.
+    pub fn accept<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+        outcome: &mut StepOutcome,
+    ) -> Result<()> {
+        let solving = Instant::now();
+        let stage = self.stages.solve.enter()?;
         self.method.finish(body, state, &self.trial, step)?;
         self.method.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
@@ -202,7 +236,51 @@ impl Stepper {
             outcome.energy.work = step.length * load.dot(&state.velocity)?;
         }
         self.clock.balance += balancing.elapsed();
-        Ok(outcome)
+        Ok(())
+    }
+
+    /// The error of the step that was attempted last, and the sizes that it has to be compared with. Collective.
+    pub fn error<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<[Norms; 2]> {
+        self.trial.update_ghosts()?;
+        let trial = self.trial.local()?;
+        let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
+        let is_second = step.previous_length > 0.0;
+        let ratio = if is_second { step.length / step.previous_length } else { 0.0 };
+        let share = if is_second { ratio / (1.0 + ratio) } else { 0.5 };
+        let values = trial.iter().zip(now.iter().zip(before.iter()));
+        let curved: Vec<f64> = values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))).collect();
+        // Displacements, and stresses with them, are one order better in the formula of second order.
+        let (strained, length) = if self.scheme.is_two_step() && is_second {
+            (curved.clone(), self.method.matrix_length(step))
+        } else {
+            (values.map(|(t, (v, _))| 0.5 * (t - v)).collect(), step.length)
+        };
+        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
+        let square = |form: Option<Form>, x: &[f64]| {
+            let Some(form) = form else { return 0.0 };
+            let mut forces = vec![0.0; x.len()];
+            body.add_form(form, x, &mut forces);
+            forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
+        };
+        let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
+        let mine = [
+            square(form, &curved),
+            square(elastic, &strained),
+            square(form, &trial),
+            square(elastic, &trial),
+        ];
+        let [velocity, stress, all_velocity, all_stress] =
+            session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
+        Ok([
+            Norms { velocity, stress: length * stress },
+            Norms { velocity: all_velocity, stress: step.length * all_stress },
+        ])
     }
 
     /// Loads and what the scheme knows of the other forces, zero at held components.

@@ -167,7 +167,9 @@ pub fn random_jobs(session: &Session) {
         _ => balanced::<3, 6>(session, number, ("", scheme), &space),
     };
     for scheme in ["implicit_euler", "bdf2"] {
-        (0..IMPLICIT_JOBS).for_each(|number| drop(run(number, scheme)));
+        for number in 0..IMPLICIT_JOBS {
+            run(number, scheme);
+        }
     }
     for number in 0..JOBS {
         let totals = run(number, "lagged_euler");

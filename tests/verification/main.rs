@@ -47,6 +47,7 @@ fn scenario() {
         "creep" => creep::all(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
+        "scheme_adapted" => schemes::adapted(&session),
         "scheme_orders" => schemes::orders(&session),
         "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
