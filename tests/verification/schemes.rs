@@ -215,7 +215,7 @@ pub fn adapted(session: &Session) {
     while run.advance(session).expect("step").is_some() {
         reference.push(run.state.velocity.owned().expect("velocity").to_vec());
     }
-    let mut of = |overrides: &[String]| {
+    let of = |overrides: &[String]| {
         let (steps, set_ups, error) = largest_error(session, overrides, &reference);
         println!("{overrides:?}: {steps} steps, {set_ups} set-ups, error {error:.2e}");
         (steps, error)
