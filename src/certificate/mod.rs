@@ -7,6 +7,9 @@
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
 //!
+//! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
+//! which nothing flows.
+//!
 //! `m_j` is the steepest fall of a contact graph, `m_A` the smallest eigenvalue of the viscosity. Suprema run over
 //! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
 //! viscosity, `m_A` is 0 and `theta` has no meaning.

@@ -12,7 +12,7 @@ use std::ops::AddAssign;
 /// ```
 ///
 /// with `X` the viscoplastic strain rate at `s_{n-1}`, `(s_{n-1} - P_K s_{n-1}) / (2 lambda)` in the paper, and stresses measured
-/// by `E^-1`. What hardening stores is part of the viscoplastic term.
+/// by `E^-1`. The implicit schemes have their own `numerical`, see `stepping::implicit`. What hardening stores is part of the viscoplastic term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Kinetic energy at the end of the step.

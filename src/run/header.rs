@@ -26,10 +26,14 @@ pub(super) fn lines<const D: usize, const S: usize>(
     ));
     lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
+    let lengths = match &job.time.adaptive {
+        Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
+        None => format!("{} s", job.time.step),
+    };
     lines.push(format!(
-        "scheme     {}, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        "scheme     {}, steps of {} to {} s; {}, preconditioner {}, tolerance {:.0e}",
         scheme.scheme().name(),
-        job.time.step,
+        lengths,
         job.time.end,
         if scheme.is_nonlinear() { "Newton with line search" } else { "one linear solve a step" },
         scheme.preconditioner().name(),

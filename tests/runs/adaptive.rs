@@ -22,7 +22,8 @@ fn lengths(results: &Results) -> Vec<f64> {
 #[test]
 fn steps_come_from_a_ladder_grow_with_the_motion_and_end_where_they_should() {
     for scheme in ["implicit_euler", "bdf2"] {
-        let results = adaptive(8, scheme, 0.02).run(2);
+        let case = adaptive(8, scheme, 0.02);
+        let results = case.run(2);
         let lengths = lengths(&results);
         let last = lengths.len() - 2;
         for length in &lengths[..last] {
@@ -43,8 +44,8 @@ fn steps_come_from_a_ladder_grow_with_the_motion_and_end_where_they_should() {
 #[test]
 fn a_tighter_tolerance_gives_a_smaller_error() {
     let velocity = |tolerance: f64| {
-        let results = adaptive(8, "bdf2", tolerance).run(1);
-        results.table("probes.csv").only("probe", "tip").numbers("velocity_y")
+        let case = adaptive(8, "bdf2", tolerance);
+        case.run(1).table("probes.csv").only("probe", "tip").numbers("velocity_y")
     };
     let ends = [0.1, 0.01, 1e-4].map(|tolerance| *velocity(tolerance).last().expect("a step"));
     let errors = [ends[0] - ends[2], ends[1] - ends[2]].map(f64::abs);

@@ -19,7 +19,8 @@ fn enormous(scheme: &str) -> Case {
 #[test]
 fn implicit_schemes_find_the_rest_position_in_steps_a_thousand_times_beyond_the_explicit_bound() {
     let ends = IMPLICIT.map(|scheme| {
-        let results = enormous(scheme).run(1);
+        let case = enormous(scheme);
+        let results = case.run(1);
         assert!(results.summary()["certificates"]["explicit_step_bound"].is_null());
         assert!(results.table("history.csv").last("kinetic_energy") < 1e-12, "{scheme} comes to rest");
         results.table("probes.csv").last("displacement_y")
@@ -42,7 +43,7 @@ fn the_schemes_agree_as_steps_shrink_and_the_second_order_is_closer() {
     let off = |scheme: &str| (velocity(scheme, "0.015625") / exact - 1.0).abs();
     let [lagged, euler, second] = ["lagged_euler", "implicit_euler", "bdf2"].map(off);
     assert!(lagged < 0.01 && euler < 0.01, "{lagged} {euler}");
-    assert!(second < 0.25 * lagged.min(euler), "{second} beside {lagged} and {euler}");
+    assert!(second < 0.5 * lagged && second < 0.1 * euler, "{second} beside {lagged} and {euler}");
 }
 
 #[test]
@@ -56,7 +57,8 @@ fn stress_that_relaxes_at_once_stays_on_the_yield_surface() {
         let results = case.run(2);
         // The total stress holds the viscous one, too, which is small at the end.
         let norm = results.number("max_von_mises");
-        assert!((18.99..19.5).contains(&norm), "{hypothesis}: {norm}");
+        assert!(norm < 19.5, "{hypothesis}: {norm}");
+        assert!(results.table("history.csv").last("viscoplastic_dissipation") > 0.0, "{hypothesis}");
         assert!(results.number("max_energy_imbalance") < 1e-10);
         let iterations = results.number("newton_iterations");
         assert!(iterations < 12.0 * 16.0, "{hypothesis}: {iterations} Newton iterations");
@@ -82,9 +84,9 @@ fn what_a_scheme_does_not_need_is_not_there() {
 fn a_law_that_never_flows_gives_the_elastic_body_under_each_scheme() {
     for scheme in IMPLICIT {
         let law = "{ perzyna = { relaxation = 1000, yield_stress = 1e30 } }";
-        let plain = under(Case::square(6), scheme).without("material.viscoplasticity").run(1);
-        let idle = under(Case::square(6), scheme).set("material.viscoplasticity", law).run(1);
-        let of = |results: &crate::results::Results| results.table("probes.csv").numbers("velocity_y");
-        assert!(relative_difference(&of(&plain), &of(&idle)) < 1e-9, "{scheme}");
+        let of = |case: Case| case.run(1).table("probes.csv").numbers("velocity_y");
+        let plain = of(under(Case::square(6), scheme).without("material.viscoplasticity"));
+        let idle = of(under(Case::square(6), scheme).set("material.viscoplasticity", law));
+        assert!(relative_difference(&plain, &idle) < 1e-8, "{scheme}");
     }
 }

@@ -178,7 +178,7 @@ fn relaxation_and_creep_follow_each_schemes_closed_form() {
 }
 
 /// Cells along a side of the paper's square.
-const SIDE: usize = 8;
+const SIDE: usize = 16;
 /// Steps of the reference; adapted steps are no shorter than its.
 const FINE: usize = 8192;
 
@@ -208,7 +208,8 @@ fn largest_error(session: &Session, overrides: &[String], reference: &[Vec<f64>]
 
 pub fn adapted(session: &Session) {
     let scheme = |scheme: &str, steps: usize| {
-        vec![format!("time.scheme={scheme}"), format!("time.step={}", 1.0 / steps as f64)]
+        let step = 1.0 / steps as f64;
+        vec![format!("time.scheme={scheme}"), format!("time.step={step}"), "solver.tolerance=1e-12".into()]
     };
     let mut run = paper(session, &scheme("bdf2", FINE));
     let mut reference = Vec::new();
