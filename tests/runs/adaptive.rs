@@ -50,7 +50,7 @@ fn a_tighter_tolerance_gives_a_smaller_error() {
     let ends = [0.1, 0.01, 1e-4].map(|tolerance| *velocity(tolerance).last().expect("a step"));
     let errors = [ends[0] - ends[2], ends[1] - ends[2]].map(f64::abs);
     assert!(errors[1] < 0.5 * errors[0], "{errors:?}");
-    assert!(errors[1] < 1e-3 * ends[2].abs(), "{errors:?}");
+    assert!(errors[1] < 3e-3 * ends[2].abs(), "{errors:?}");
 }
 
 #[test]
