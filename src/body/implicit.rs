@@ -29,11 +29,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().any(|effect| effect.flows())
     }
 
-    /// Whether the derivative of the flow is symmetric in all cells.
-    pub fn has_symmetric_tangent(&self) -> bool {
-        self.effects.iter().all(|effect| effect.has_symmetric_tangent())
-    }
-
     /// Adds the forces of the state that a step starts from to `forces` (with ghosts). Gives the sum of the squares of the
     /// forces of cells, whose rounding no residual can be less than.
     pub fn add_start_forces(
@@ -72,6 +67,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
 }
 
 impl<const D: usize, const S: usize> Cells<'_, D, S> {
+    /// Whether the derivative of the flow is symmetric in all cells.
+    pub fn has_symmetric_tangent(&self) -> bool {
+        self.effects.iter().all(|effect| effect.has_symmetric_tangent())
+    }
+
     /// Adds the forces of what flow takes from the stress at this displacement to `forces` (both with ghosts); writes trial
     /// histories and, where they are wanted, the derivatives.
     pub fn add_flow(

@@ -27,7 +27,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
 
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
-        Phases { matrix: true, explicit: Some(strain), energy: Some(strain), stress: Some(strain) }
+        Phases {
+            matrix: true,
+            explicit: Some(strain),
+            energy: Some(strain),
+            stress: Some(strain),
+            weakens: false,
+        }
     }
 
     fn is_everywhere(&self) -> bool {

@@ -87,7 +87,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
         let none = Needs::default();
-        Phases { matrix: false, explicit: Some(none), energy: Some(strain), stress: Some(none) }
+        Phases { explicit: Some(none), energy: Some(strain), stress: Some(none), ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {

@@ -24,6 +24,7 @@ pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
     flow: &'a mut Flow,
     cells: Cells<'a, D, S>,
     start: FlowStart<'a>,
+    symmetric: bool,
 }
 
 impl Flow {
@@ -38,7 +39,8 @@ impl Flow {
         cells: Cells<'a, D, S>,
         start: FlowStart<'a>,
     ) -> FlowForces<'a, D, S> {
-        FlowForces { flow: self, cells, start }
+        let symmetric = cells.has_symmetric_tangent();
+        FlowForces { flow: self, cells, start, symmetric }
     }
 
     /// Brings the sum of all ranks to `out`, without held components.
@@ -87,6 +89,10 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.displace(velocity)?;
         self.evaluate(true)
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.symmetric
     }
 
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {

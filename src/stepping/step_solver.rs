@@ -1,17 +1,18 @@
 //! The matrix of a step with its solver.
 
 use super::{
+    bounded::{self, Bounded},
     equations::Scratch,
     flow::{Flow, FlowStart},
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, failed},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
+    newton::{Newton, REMEDY, Task, failed},
     stepper::StepOutcome,
 };
 use crate::{
     body::Body,
     effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, has_option},
     session::Session,
     state::State,
 };
@@ -67,11 +68,37 @@ impl StepSolver {
             let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
             preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
             linear_solver.linear_solver().apply_options()?;
-            linear_solver.set_symmetric(body.has_symmetric_tangent());
             let flow = if flows { Some(Flow::new(&state.velocity)?) } else { None };
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales, flow }))
+            let bounded = match settings.method {
+                Method::Newton => None,
+                Method::VariationalInequality => {
+                    session.agree(bounded::refuse(body))?;
+                    if flows {
+                        return Err(Error::Refused(
+                            "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
+                             [time] scheme = \"lagged_euler\""
+                                .into(),
+                        ));
+                    }
+                    Some(Bounded::new(&state.velocity)?)
+                }
+            };
+            linear_solver.set_patience(preconditioner.patience(D));
+            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
+            Solver::Newton(Box::new(Newton {
+                snes,
+                bounded,
+                linear_solver,
+                scratch,
+                before,
+                after,
+                scales,
+                start,
+                chosen_search,
+                flow,
+            }))
         };
         Ok(Self { settings: SolverSettings { preconditioner, ..settings }, matrix: None, solver })
     }
@@ -114,7 +141,8 @@ impl StepSolver {
             }
             Solver::Newton(newton) => {
                 session.agree(newton.linear_solver.set_constant(&matrix))?;
-                newton.choose_scales(session, &body.contacts, like)?;
+                session.agree(newton.linear_solver.linear_solver().set_up())?;
+                newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
         }
         self.matrix = Some((length, matrix));
@@ -175,8 +203,9 @@ impl StepSolver {
                     LINEAR_SHARE * tolerance,
                     LINEAR_ITERATIONS,
                 )?;
-                let limits = (tolerance, self.settings);
-                newton.solve(session, body, state, step, matrix, forces, trial, limits, start)
+                let (right_hand_side, settings) = (forces, self.settings);
+                let task = Task { step, matrix, right_hand_side, tolerance, settings, flow: start };
+                newton.solve(session, body, state, task, trial)
             }
         }
     }
