@@ -220,7 +220,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             outcome.inclusion_residual,
             kinds(outcome),
             self.totals.energy_imbalance,
-            clock_time(self.pace() * (last - step) as f64)
+            super::header::clock_time(self.pace() * (last - step) as f64)
         );
         self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
         if step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last {
@@ -384,16 +384,6 @@ fn kinds(outcome: &StepOutcome) -> String {
     let branches =
         if branches.is_empty() { String::new() } else { format!("branches {}  ", branches.join("/")) };
     branches + &counts.collect::<String>()
-}
-
-/// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.
-fn clock_time(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
-    }
 }
 
 /// What is asked for after a step.
