@@ -1,6 +1,7 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
+mod attempts;
 mod bdf2;
 mod bounded;
 mod equations;

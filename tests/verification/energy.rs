@@ -148,7 +148,13 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
     }
     if draw.between(0.0, 1.0) < 0.7 {
         let contact = contact(draw);
-        if lags && !contact.contains("gauss") && !contact.contains("gap") && weak.between(0.0, 1.0) < 0.8 {
+        let rubs_along_edges = D == 3 && contact.contains("friction");
+        if lags
+            && !rubs_along_edges
+            && !contact.contains("gauss")
+            && !contact.contains("gap")
+            && weak.between(0.0, 1.0) < 0.8
+        {
             job += &contact.replacen("\"bottom\"", "\"bottom\", \"right\"", 1);
             let (stiffness, sliding) = (weak.between(10.0, 200.0), weak.between(0.0, 200.0));
             let (energy, viscosity) = (weak.between(0.0, 1e-4), weak.one_of(&["0", "1e-5", "1e-3"]));
