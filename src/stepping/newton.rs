@@ -36,6 +36,8 @@ pub(super) struct Newton {
     pub flow: Option<Flow>,
 }
 
+/// Weight of the first residual against that of the forces; where it counts, residuals near rounding are asked for.
+const FIRST_PUSH: f64 = 0.01;
 /// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
 const STEEPEST: f64 = 0.8;
 pub(super) const STEEP: f64 = 0.5;
@@ -53,10 +55,10 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// The residual norm in N at which a step is solved, and its share of the first one: where nothing acts but an obstacle
-    /// that moves, its first push is what residuals are small against.
+    /// The residual norm in N at which a step is solved, and the share of the first one that is small enough in any case:
+    /// where next to nothing acts but an obstacle that moves, its first push is what residuals are small against.
     pub fn tolerances(&self) -> (f64, f64) {
-        (self.tolerance, self.settings.tolerance)
+        (self.tolerance, FIRST_PUSH * self.settings.tolerance)
     }
 }
 

@@ -13,16 +13,16 @@
 //! `dv = 0`. Where the normal graph is vertical, `dp` is what the normal equation of the node leaves open: `mu e` times that
 //! equation is taken from the tangential ones ([`Friction::reduce`]).
 
-use super::point::{Point, Unknown};
+use super::{
+    point::{Point, Unknown},
+    tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
+};
 use crate::{
     contact::FrictionLaw,
     error::{Error, Result},
     mesh::Mesh,
     tensor::{Vector, dot, norm},
 };
-
-/// A length below which a direction is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A friction law with its points.
 #[derive(Debug)]
@@ -35,40 +35,6 @@ pub(super) struct Friction<const D: usize> {
     pub points: Vec<TangentialPoint<D>>,
 }
 
-/// The tangential side of a nodal point.
-#[derive(Debug, Clone)]
-pub(super) struct TangentialPoint<const D: usize> {
-    /// Its number among the points of the contact.
-    pub at: usize,
-    pub node: usize,
-    weight: f64,
-    /// Orthonormal; `count` of them are used.
-    tangents: [Vector<D>; D],
-    count: usize,
-    /// The contact pressure in Pa that the bound goes by.
-    pub pressure: f64,
-    /// `q` in Pa at the last evaluation.
-    pub traction: Vector<D>,
-    /// The last linearisation.
-    tangent: Tangent<D>,
-    /// Change of `q` along the last direction.
-    change: Vector<D>,
-}
-
-/// The derivative at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Tangent<const D: usize> {
-    sticks: bool,
-    /// `e`.
-    toward: Vector<D>,
-    /// `c V'` and `c V / |s|`.
-    theta: [f64; 2],
-    /// `g'` and `g / V`.
-    slopes: [f64; 2],
-    /// `mu`: change of the bound with the contact pressure, if it follows that.
-    coefficient: f64,
-}
-
 /// What happens at a point with friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Motion {
@@ -76,12 +42,6 @@ pub(super) enum Motion {
     Slides,
     /// The law's bound follows a pressure that is not there.
     Separated,
-}
-
-impl<const D: usize> Tangent<D> {
-    fn free() -> Self {
-        Self { sticks: false, toward: [0.0; D], theta: [1.0; 2], slopes: [0.0; 2], coefficient: 0.0 }
-    }
 }
 
 impl<const D: usize> Friction<D> {
@@ -348,77 +308,4 @@ impl<const D: usize> Friction<D> {
     pub fn square(&self, nodal: &[f64]) -> f64 {
         self.points.iter().map(|p| p.weight * p.along(nodal).iter().map(|x| x * x).sum::<f64>()).sum()
     }
-}
-
-impl<const D: usize> TangentialPoint<D> {
-    /// Gives up what is not orthogonal to this direction.
-    pub fn give_up(&mut self, direction: &Vector<D>) {
-        let mut along = [0.0; D];
-        for tangent in &self.tangents[..self.count] {
-            let share = dot(tangent, direction);
-            (0..D).for_each(|i| along[i] += share * tangent[i]);
-        }
-        let size = norm(&along);
-        if size > ROUNDING {
-            let along = along.map(|x| x / size);
-            (self.tangents, self.count) = span_without(&self.tangents[..self.count], &[along]);
-        }
-    }
-
-    /// The part of a nodal value along the tangents.
-    fn along(&self, nodal: &[f64]) -> Vector<D> {
-        let value = &nodal[self.node * D..][..D];
-        let mut out = [0.0; D];
-        for tangent in &self.tangents[..self.count] {
-            let along: f64 = (0..D).map(|i| tangent[i] * value[i]).sum();
-            (0..D).for_each(|i| out[i] += along * tangent[i]);
-        }
-        out
-    }
-
-    /// Adds to a nodal value.
-    fn add(&self, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
-        let target = &mut nodal[self.node * D..][..D];
-        (0..D).for_each(|i| target[i] += factor * vector[i]);
-    }
-
-    /// Replaces the part of a nodal value along the tangents.
-    fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
-        let now = self.along(nodal);
-        let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
-        self.add(1.0, &change, nodal);
-    }
-
-    /// Change of the traction at a point that slides, with a change of the velocity and of the pressure.
-    fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
-        let Tangent { toward, slopes, coefficient, .. } = self.tangent;
-        let velocity = self.along(direction);
-        let ahead = dot(&toward, &velocity);
-        std::array::from_fn(|i| {
-            slopes[1] * (velocity[i] - ahead * toward[i])
-                + (slopes[0] * ahead + coefficient * pressed) * toward[i]
-        })
-    }
-}
-
-/// An orthonormal basis of what these orthonormal vectors span, without these orthonormal or zero directions.
-fn span_without<const D: usize>(vectors: &[Vector<D>], directions: &[Vector<D>]) -> ([Vector<D>; D], usize) {
-    let (mut basis, mut count) = ([[0.0; D]; D], 0);
-    for vector in vectors {
-        let mut left = *vector;
-        // Twice, so that what is left is orthogonal to rounding.
-        for _ in 0..2 {
-            for known in directions.iter().chain(&basis[..count]) {
-                let along = dot(known, &left);
-                (0..D).for_each(|i| left[i] -= along * known[i]);
-            }
-        }
-        // Of D vectors, those that lack a dimension of their span can't all be shorter than this.
-        let size = norm(&left);
-        if size > 0.9 / (D as f64).sqrt() {
-            basis[count] = left.map(|x| x / size);
-            count += 1;
-        }
-    }
-    (basis, count)
 }

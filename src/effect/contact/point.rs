@@ -2,6 +2,8 @@
 
 use crate::{
     contact::{NodeContext, NormalLaw, Resolved},
+    mesh::{Mesh, shape::facet_normal},
+    space::facet_rule,
     tensor::{Vector, norm},
 };
 
@@ -196,4 +198,14 @@ impl<const D: usize> Point<D> {
         }
         largest
     }
+}
+
+/// The Gauss points of a facet.
+pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
+    let nodes = mesh.facets[facet as usize];
+    let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+    let measure = norm(&normal);
+    let unit = normal.map(|x| x / measure);
+    let rule = facet_rule::<D>().iter();
+    rule.map(|(place, weight)| Point::new(&nodes, &place[..D], unit, measure * weight, fixed)).collect()
 }
