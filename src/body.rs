@@ -1,5 +1,9 @@
 //! A body on a mesh with all that acts on it: what a run advances in time.
 
+mod implicit;
+
+pub use implicit::Cells;
+
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
@@ -109,7 +113,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
-        let nodal = Nodal { displacement: x, velocity: x, previous_velocity: x };
+        let nodal = Nodal { displacement: x, previous_displacement: x, velocity: x, previous_velocity: x };
         if form == Form::Elasticity {
             self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
         }
@@ -206,7 +210,12 @@ fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
     let displacement = state.displacement.local()?;
     let velocity = state.velocity.local()?;
     let previous_velocity = state.previous_velocity.local()?;
-    body(Nodal { displacement: &displacement, velocity: &velocity, previous_velocity: &previous_velocity });
+    body(Nodal {
+        displacement: &displacement,
+        previous_displacement: &displacement,
+        velocity: &velocity,
+        previous_velocity: &previous_velocity,
+    });
     Ok(())
 }
 

@@ -7,6 +7,8 @@ use crate::{error::Result, mesh::Mesh, petsc::DistributedVector};
 pub struct State {
     /// Displacement in m.
     pub displacement: DistributedVector,
+    /// Displacement before the last step in m; there if the scheme needs it.
+    pub previous_displacement: Option<DistributedVector>,
     /// Velocity in m/s.
     pub velocity: DistributedVector,
     /// Velocity before the last step in m/s.
@@ -29,6 +31,7 @@ impl State {
         let previous_velocity = displacement.like()?;
         Ok(Self {
             displacement,
+            previous_displacement: None,
             velocity,
             previous_velocity,
             contact_traction: None,
@@ -51,6 +54,27 @@ impl State {
         self.time = time;
         self.step += 1;
         self.step_length = step_length;
+        Ok(())
+    }
+
+    /// Takes velocity and displacement of a solved step over. Collective.
+    pub fn commit_both(
+        &mut self,
+        velocity: &DistributedVector,
+        displacement: &DistributedVector,
+        time: f64,
+        step_length: f64,
+    ) -> Result<()> {
+        if let Some(previous) = &mut self.previous_displacement {
+            std::mem::swap(previous, &mut self.displacement);
+        }
+        self.displacement.copy_from(displacement)?;
+        self.displacement.update_ghosts()?;
+        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
+        self.velocity.copy_from(velocity)?;
+        self.velocity.update_ghosts()?;
+        (self.time, self.step_length) = (time, step_length);
+        self.step += 1;
         Ok(())
     }
 }

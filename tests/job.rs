@@ -248,7 +248,7 @@ fn every_key_is_described() {
         "youngs_modulus: a number; above 0; unit Pa; required",
         "example: poisson_ratio = 0.4",
         "default 1e-10",
-        "\"bdf2\": Second order in time. Not available yet.",
+        "\"bdf2\": Second order in time.",
     ] {
         assert!(text.contains(part), "{part} is not in {text}");
     }

@@ -7,6 +7,9 @@
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
 //!
+//! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
+//! which nothing flows.
+//!
 //! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
 //! times the largest pressure of the normal law; where that has no bound the fall is not covered, and said so), `m_A` the smallest eigenvalue of the viscosity. Suprema run over
 //! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
@@ -26,7 +29,7 @@ use crate::{
     petsc::DistributedVector,
     session::Session,
     state::State,
-    stepping::LaggedEuler,
+    stepping::Stepper,
 };
 use ascent::{Quotient, climb};
 use serde::Serialize;
@@ -62,7 +65,7 @@ impl Certificates {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut LaggedEuler,
+        scheme: &mut Stepper,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
         let viscous = body.has_form_everywhere(Form::Viscosity);
@@ -72,6 +75,7 @@ impl Certificates {
             not_covered: not_covered(&body.contacts),
             ..Self::default()
         };
+        let scheme_is_implicit = scheme.scheme().is_implicit();
         let mut find = |kind: Kind| find(session, body, state, scheme, kind);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
@@ -81,7 +85,7 @@ impl Certificates {
                 known.theta = Some(if falling { find(Kind::Theta)? } else { 0.0 });
             }
         }
-        if body.has_form(Form::Elasticity) {
+        if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let waves = 1.0 / find(Kind::ExplicitStep)?;
             known.explicit_step_bound = Some(body.flow_step_bound().map_or(waves, |flow| waves.min(flow)));
         }
@@ -93,7 +97,7 @@ impl Certificates {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut LaggedEuler,
+        scheme: &mut Stepper,
     ) -> Result<Option<f64>> {
         if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
@@ -125,7 +129,7 @@ fn find<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,
-    scheme: &mut LaggedEuler,
+    scheme: &mut Stepper,
     kind: Kind,
 ) -> Result<f64> {
     let mut pencil = Pencil { body, scheme, kind };
@@ -153,7 +157,7 @@ enum Kind {
 
 struct Pencil<'a, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
-    scheme: &'a mut LaggedEuler,
+    scheme: &'a mut Stepper,
     kind: Kind,
 }
 

@@ -1,4 +1,4 @@
-use super::History;
+use super::{Blend, History};
 use crate::space::CellRun;
 use std::borrow::Cow;
 
@@ -10,6 +10,8 @@ pub(super) struct CellHistory<const W: usize> {
     runs: Vec<(CellRun, Option<usize>)>,
     converged: Vec<[f64; W]>,
     trial: Vec<[f64; W]>,
+    /// Name and values before the last step.
+    earlier: Option<(&'static str, Vec<[f64; W]>)>,
 }
 
 impl<const W: usize> CellHistory<W> {
@@ -24,7 +26,30 @@ impl<const W: usize> CellHistory<W> {
                 (*run, start)
             })
             .collect();
-        Self { name, runs, converged: vec![[0.0; W]; kept], trial: vec![[0.0; W]; kept] }
+        Self { name, runs, converged: vec![[0.0; W]; kept], trial: vec![[0.0; W]; kept], earlier: None }
+    }
+
+    /// Keeps the values before the last step, too, under this name.
+    pub fn keep_earlier(&mut self, name: &'static str) {
+        self.earlier = Some((name, self.converged.clone()));
+    }
+
+    /// What an implicit step starts from in a cell of a run that keeps values.
+    #[inline]
+    pub fn start(&self, run: usize, at: usize, blend: Blend) -> [f64; W] {
+        let place = self.runs[run].1.map_or(0, |start| start + at);
+        let recent = &self.converged[place];
+        match &self.earlier {
+            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[place][i])),
+            None => *recent,
+        }
+    }
+
+    /// Writes the trial values of a cell of a run that keeps values.
+    #[inline]
+    pub fn set_trial(&mut self, run: usize, at: usize, values: [f64; W]) {
+        let place = self.runs[run].1.map_or(0, |start| start + at);
+        self.trial[place] = values;
     }
 
     /// Converged values of a run of cells that keeps some.
@@ -49,33 +74,49 @@ impl<const W: usize> CellHistory<W> {
 
     /// Makes the trial values the converged ones.
     pub fn commit(&mut self) {
+        if let Some((_, earlier)) = &mut self.earlier {
+            std::mem::swap(earlier, &mut self.converged);
+        }
         std::mem::swap(&mut self.converged, &mut self.trial);
     }
 
     /// The converged values for files.
     pub fn history(&self) -> History<'_> {
+        self.written(self.name, &self.converged, 2)
+    }
+
+    /// The values before the last step for checkpoints, if they are kept.
+    pub fn earlier_history(&self) -> Option<History<'_>> {
+        self.earlier.as_ref().map(|(name, values)| self.written(name, values, 1))
+    }
+
+    fn written<'a>(&'a self, name: &'static str, values: &'a [[f64; W]], copies: usize) -> History<'a> {
         let cells = self.runs.last().map_or(0, |(run, _)| run.first + run.count);
-        let values = if self.converged.len() == cells {
-            Cow::Borrowed(self.converged.as_flattened())
+        let bytes = copies * size_of_val(values);
+        let values = if values.len() == cells {
+            Cow::Borrowed(values.as_flattened())
         } else {
             let mut all = vec![[0.0; W]; cells];
-            for (number, (run, _)) in self.runs.iter().enumerate() {
-                let kept = self.converged(number);
-                all[run.first..run.first + kept.len()].copy_from_slice(kept);
+            for (run, start) in &self.runs {
+                if let Some(start) = *start {
+                    all[run.first..run.first + run.count].copy_from_slice(&values[start..start + run.count]);
+                }
             }
             Cow::Owned(all.into_flattened())
         };
-        History { name: self.name, width: W, values, bytes: 2 * size_of_val(&self.converged[..]) }
+        History { name, width: W, values, bytes }
     }
 
     /// Takes values over, if they are of this name.
     pub fn restore(&mut self, name: &str, values: &[f64]) {
-        if name != self.name {
-            return;
-        }
+        let target = match &mut self.earlier {
+            _ if name == self.name => &mut self.converged,
+            Some((earlier, kept)) if name == *earlier => kept,
+            _ => return,
+        };
         for (run, start) in &self.runs {
             if let Some(start) = *start {
-                let target = self.converged[start..start + run.count].as_flattened_mut();
+                let target = target[start..start + run.count].as_flattened_mut();
                 target.copy_from_slice(&values[run.first * W..][..run.count * W]);
             }
         }

@@ -12,7 +12,7 @@ use std::ops::AddAssign;
 /// ```
 ///
 /// with `X` the viscoplastic strain rate at `s_{n-1}`, `(s_{n-1} - P_K s_{n-1}) / (2 lambda)` in the paper, and stresses measured
-/// by `E^-1`. What hardening stores is part of the viscoplastic term. Damage `d` scales all terms with `S` or `E` by
+/// by `E^-1`. The implicit schemes have their own `numerical`, see `stepping::implicit`. What hardening stores is part of the viscoplastic term. Damage `d` scales all terms with `S` or `E` by
 /// `1 - d_n` and adds its dissipation `(d_n - d_{n-1}) 1/2 S_{n-1}:E^-1 S_{n-1}`; what adhesion adds stands with
 /// [`super::Adhesion`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

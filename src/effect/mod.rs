@@ -8,11 +8,14 @@ mod contact;
 mod damage;
 mod elastic_stress;
 mod energy;
+mod implicit_elasticity;
 mod inertia;
 mod load;
 mod node_history;
 mod support;
 mod surface;
+mod tangents;
+mod viscoplastic_flow;
 mod viscoplastic_history;
 mod viscous_stress;
 
@@ -21,10 +24,13 @@ pub use contact::{COUNTS, Contact, PointCount, Quadrature, choose_unknowns};
 pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;
+pub use implicit_elasticity::ImplicitElasticity;
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
 pub use support::{Held, Support, fixed_components};
 pub use surface::{SurfaceEffect, SurfaceState};
+pub use tangents::Tangents;
+pub use viscoplastic_flow::ViscoplasticFlow;
 pub use viscoplastic_history::ViscoplasticHistory;
 pub use viscous_stress::ViscousStress;
 
@@ -40,6 +46,31 @@ pub struct Step {
     pub length: f64,
     /// Length of the step before it in s; 0 for the first step.
     pub previous_length: f64,
+}
+
+/// How a step that is implicit in every stress starts: it is one of implicit Euler of another length from a blend of the two
+/// states before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blend {
+    /// `k'` in s: displacement, stress and velocity change by `k'` times their rates at the end.
+    pub length: f64,
+    /// Share of the converged state.
+    pub recent: f64,
+    /// Share of the state before it.
+    pub earlier: f64,
+}
+
+impl Blend {
+    /// Implicit Euler.
+    pub fn euler(length: f64) -> Self {
+        Self { length, recent: 1.0, earlier: 0.0 }
+    }
+
+    /// The blend of two values.
+    #[inline(always)]
+    pub fn of(self, recent: f64, earlier: f64) -> f64 {
+        self.recent * recent + self.earlier * earlier
+    }
 }
 
 /// Phases of a run in which an effect has work to do.
@@ -102,6 +133,30 @@ pub trait Effect<const D: usize, const S: usize> {
     /// weakens weakens the batch as its trial history has it.
     fn add_explicit(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
 
+    /// Takes in how an implicit step starts.
+    fn begin(&mut self, _blend: Blend) {}
+
+    /// Whether its stress at the end of an implicit step is no linear function of the velocity, so that
+    /// [`Effect::add_flow`] has something to add.
+    fn flows(&self) -> bool {
+        false
+    }
+
+    /// Adds minus the stress that flow takes from that of the constant matrix in an implicit step, given the strain at its
+    /// end; writes the trial history and, where they are wanted, the derivatives by the velocity. Gives whether it added.
+    fn add_flow(&mut self, _batch: &mut Batch<D, S>, _tangents: Option<&mut Tangents>) -> bool {
+        false
+    }
+
+    /// Whether the derivatives of [`Effect::add_flow`] are symmetric.
+    fn has_symmetric_tangent(&self) -> bool {
+        true
+    }
+
+    /// Adds the energies of an implicit step that was solved and not yet committed: what flow takes up, and the scheme's
+    /// own terms of the elastic energy. Given the strains before and after it and the strain rate.
+    fn add_implicit_energy(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
+
     /// Adds its energies after the step was committed.
     fn add_energy(&self, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
 
@@ -131,6 +186,11 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// The converged histories that it keeps.
     fn histories(&self) -> Vec<History<'_>> {
+        Vec::new()
+    }
+
+    /// Histories before the last step that it keeps.
+    fn earlier_histories(&self) -> Vec<History<'_>> {
         Vec::new()
     }
 

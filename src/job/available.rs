@@ -4,11 +4,7 @@ use super::report::Fault;
 use super::source::{Node, Value};
 
 /// Path (`*` is any position in a list), the word that is not available (or any), and what it is called.
-const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
-    ("time.scheme", Some("implicit_euler"), "the scheme \"implicit_euler\" is"),
-    ("time.scheme", Some("bdf2"), "the scheme \"bdf2\" is"),
-    ("time.adaptive", None, "adaptive time stepping is"),
-];
+const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[];
 
 /// Whether the table or key `path` (without positions in lists), or its choice `word`, is not available yet.
 pub fn is_unavailable(path: &str, word: Option<&str>) -> bool {

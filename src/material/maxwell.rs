@@ -51,12 +51,18 @@ impl Maxwell {
         out
     }
 
-    /// The fastest relaxation in 1/s: largest eigenvalue of `-G`.
-    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+    /// The eigenvalues of `-G` in 1/s: on multiples of the identity, and on the rest.
+    pub(super) fn decay_rates<const S: usize>(&self) -> [f64; 2] {
         let n = normal_components::<S>() as f64;
         let across = self.elasticity.shear * self.deviatoric;
         let along = self.deviatoric * (1.0 - n / 3.0) + n * self.volumetric;
-        across.max((self.elasticity.shear + n * self.elasticity.volumetric) * along)
+        [(self.elasticity.shear + n * self.elasticity.volumetric) * along, across]
+    }
+
+    /// The fastest relaxation in 1/s: largest eigenvalue of `-G`.
+    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+        let [along, across] = self.decay_rates::<S>();
+        across.max(along)
     }
 }
 

@@ -7,6 +7,7 @@ mod hardening;
 mod isotropic;
 mod maxwell;
 mod perzyna;
+mod return_mapping;
 mod viscoplasticity;
 
 pub use by_material::ByMaterial;
@@ -16,4 +17,5 @@ pub use hardening::Hardening;
 pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};
 pub use maxwell::Maxwell;
 pub use perzyna::{Metric, Perzyna};
+pub use return_mapping::{Returned, Tangent};
 pub use viscoplasticity::Viscoplasticity;

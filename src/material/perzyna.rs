@@ -134,6 +134,13 @@ impl Perzyna {
         }
     }
 
+    /// Inverse eigenvalue of the metric and eigenvalue of `E` in plane stress: on `p`, and on `q` and `r`.
+    pub(super) fn metric_and_elasticity(&self) -> [(f64, f64); 2] {
+        let Isotropic { volumetric, shear } = self.elasticity;
+        let (along, across) = self.inverse_metric();
+        [(along, shear + 2.0 * volumetric), (across, shear)]
+    }
+
     /// `t : t` in the metric of the projection.
     pub fn metric_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
         match self.metric {

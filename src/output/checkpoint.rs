@@ -90,7 +90,16 @@ pub fn save<const D: usize, const S: usize>(
     let traction =
         traction.as_deref().map(|t| Table { name: "contact_traction", set: "nodes", width: D, values: t });
     tables.extend(traction);
-    let of_cells: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+    let previous = state.previous_displacement.as_ref().map(DistributedVector::owned).transpose()?;
+    let previous = previous.as_deref();
+    tables.extend(previous.map(|p| Table {
+        name: "previous_displacement",
+        set: "nodes",
+        width: D,
+        values: p,
+    }));
+    let kept = body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
+    let of_cells: Vec<History> = kept.collect();
     let of_nodes: Vec<History> = body.surface_effects.iter().flat_map(|e| e.histories()).collect();
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
         let table = |h| {
@@ -125,9 +134,15 @@ pub fn restore<const D: usize, const S: usize>(
             checkpoint.read("nodes", body.mesh.total_nodes as u64, &[("contact_traction", D)], &nodes)?;
         fill(traction, &values[0])?;
     }
+    if let Some(previous) = &mut state.previous_displacement {
+        let wanted = [("previous_displacement", D)];
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &wanted, &nodes)?;
+        fill(previous, &values[0])?;
+    }
     let cells = cell_ids(body);
     for effect in &mut body.effects {
-        let kept: Vec<(&str, usize)> = effect.histories().iter().map(|h| (h.name, h.width)).collect();
+        let kept: Vec<(&str, usize)> =
+            effect.histories().iter().chain(&effect.earlier_histories()).map(|h| (h.name, h.width)).collect();
         let values = checkpoint.read("cells", body.mesh.total_cells as u64, &kept, &cells)?;
         for ((name, _), values) in kept.iter().zip(&values) {
             effect.restore(name, values);

@@ -1,7 +1,11 @@
 //! `history.csv`: a row a step.
 
 use super::csv::{CsvFile, number, numbers};
-use crate::{effect::Energy, error::Result, stepping::StepOutcome};
+use crate::{
+    effect::Energy,
+    error::Result,
+    stepping::{Pace, StepOutcome},
+};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -49,6 +53,9 @@ pub struct Totals {
     pub newton_iterations: u64,
     /// Linear iterations.
     pub linear_iterations: u64,
+    /// Where adaptive steps are on their ladder.
+    #[serde(default)]
+    pub pace: Option<Pace>,
 }
 
 impl Totals {

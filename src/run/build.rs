@@ -4,9 +4,9 @@ use crate::{
     body::Body,
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
     effect::{
-        Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load,
-        Quadrature, Support, SurfaceEffect, Traction, ViscoplasticHistory, ViscousStress, choose_unknowns,
-        fixed_components,
+        Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held,
+        ImplicitElasticity, Inertia, Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow,
+        ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
     job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Obstacle, Scalar},
@@ -18,7 +18,9 @@ use crate::{
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{FrictionIteration, Method, Preconditioner, SolverSettings},
+    stepping::{
+        Adaptive, AdaptiveSettings, FrictionIteration, Method, Preconditioner, Scheme, SolverSettings,
+    },
     tensor::Vector,
 };
 
@@ -33,7 +35,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = supports(job, &mesh);
     let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry))?;
+    let effects = session.agree(effects(&materials, &geometry, scheme(job)))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {
@@ -53,6 +55,9 @@ pub(super) fn body<const D: usize, const S: usize>(
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
+    }
+    if scheme(job).is_two_step() {
+        state.previous_displacement = Some(state.displacement.like()?);
     }
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
@@ -89,13 +94,18 @@ fn materials<'a, const D: usize>(
 fn effects<const D: usize, const S: usize>(
     materials: &[&Material],
     geometry: &Geometry<D>,
+    scheme: Scheme,
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
     if let Some(density) = by_material(materials, |m| m.density) {
         effects.push(Box::new(Inertia { density }));
     }
     if let Some(law) = by_material(materials, elastic_law::<S>) {
-        effects.push(Box::new(ElasticStress { law }));
+        effects.push(if scheme.is_implicit() {
+            Box::new(ImplicitElasticity::new(law))
+        } else {
+            Box::new(ElasticStress { law })
+        });
     }
     let viscosity = |v: &job::Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear };
     if let Some(tensor) = by_material(materials, |m| m.viscosity.as_ref().map(viscosity)) {
@@ -103,7 +113,11 @@ fn effects<const D: usize, const S: usize>(
     }
     let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
-        effects.push(Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs)));
+        effects.push(if scheme.is_implicit() {
+            Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs, scheme.is_two_step()))
+        } else {
+            Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs))
+        });
     }
     if let Some(laws) = by_material(materials, damage_law::<S>) {
         effects.push(Box::new(Damage::new(laws, &geometry.runs)));
@@ -312,6 +326,27 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     let mut velocity = state.velocity.owned_mut()?;
     velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
     Ok(())
+}
+
+/// The job's time scheme.
+pub(super) fn scheme(job: &Job) -> Scheme {
+    match job.time.scheme {
+        job::Scheme::LaggedEuler => Scheme::LaggedEuler,
+        job::Scheme::ImplicitEuler => Scheme::ImplicitEuler,
+        job::Scheme::Bdf2 => Scheme::Bdf2,
+    }
+}
+
+/// How the job adapts its steps, if it does.
+pub(super) fn adaptive(job: &Job) -> Option<Adaptive> {
+    job.time.adaptive.as_ref().map(|adaptive| {
+        Adaptive::new(AdaptiveSettings {
+            tolerance: adaptive.tolerance,
+            first: job.time.step,
+            smallest: adaptive.smallest_step,
+            largest: adaptive.largest_step,
+        })
+    })
 }
 
 /// The job's wishes for the solver.

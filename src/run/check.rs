@@ -36,6 +36,7 @@ pub struct Report {
     probes: Vec<Probe>,
     scheme: &'static str,
     steps: u64,
+    adaptive: bool,
     newton: bool,
     preconditioner: &'static str,
     preconditioner_reason: String,
@@ -95,7 +96,8 @@ fn report<const D: usize, const S: usize>(
 ) -> Result<Report> {
     let (job, body, scheme) = (&loaded.job, &ready.body, &ready.scheme);
     let mesh = &body.mesh;
-    let steps = steps_between(0.0, job.time.end, job.time.step);
+    let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
+    let steps = steps_between(0.0, job.time.end, longest);
     let inventory = Inventory::of(session, body, scheme);
     let preconditioner = scheme.preconditioner();
     let asked = build::settings(job).preconditioner;
@@ -116,8 +118,9 @@ fn report<const D: usize, const S: usize>(
             .iter()
             .map(|p| Probe { name: p.name.clone(), point: p.point.clone() })
             .collect(),
-        scheme: "lagged_euler",
+        scheme: scheme.scheme().name(),
         steps,
+        adaptive: job.time.adaptive.is_some(),
         newton: inventory.newton,
         preconditioner: preconditioner.name(),
         preconditioner_reason: asked.reason(D, mesh.total_nodes * D),
@@ -160,7 +163,8 @@ impl Report {
             let names: Vec<&str> = self.probes.iter().map(|p| p.name.as_str()).collect();
             lines.push(format!("probes     {}: inside the body", names.join(", ")));
         }
-        lines.push(format!("steps      {}", self.steps));
+        let least = if self.adaptive { "at least " } else { "" };
+        lines.push(format!("steps      {least}{}", self.steps));
         lines.push(format!("solver     {}: {}", self.preconditioner, self.preconditioner_reason));
         let memory = &self.estimate.memory_bytes;
         let parts = [

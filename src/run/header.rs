@@ -31,9 +31,14 @@ pub(super) fn lines<const D: usize, const S: usize>(
     ));
     lines.push(format!("partition  {} facets cut, imbalance {:.3}", mesh.edge_cut, mesh.imbalance));
     lines.push(format!("effects    {}", body.effect_names().join(", ")));
+    let lengths = match &job.time.adaptive {
+        Some(a) => format!("{} s to {} s, {} s first,", a.smallest_step, a.largest_step, job.time.step),
+        None => format!("{} s", job.time.step),
+    };
     lines.push(format!(
-        "scheme     lagged_euler, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
-        job.time.step,
+        "scheme     {}, steps of {} to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        scheme.scheme().name(),
+        lengths,
         job.time.end,
         match job.solver.method {
             Method::Vinewtonrsls => "PETSc's vinewtonrsls",
@@ -74,4 +79,14 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         summary.peak_memory_bytes as f64 / 1e6
     ));
     log.line(format!("files      {}", folder.display()));
+}
+
+/// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.
+pub(super) fn clock_time(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
 }

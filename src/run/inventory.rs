@@ -1,6 +1,6 @@
 //! What a run allocated for its effects, as facts a test can hold against the job.
 
-use crate::{body::Body, session::Session, stepping::LaggedEuler};
+use crate::{body::Body, session::Session, stepping::Stepper};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -24,11 +24,13 @@ impl Inventory {
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
-        scheme: &LaggedEuler,
+        scheme: &Stepper,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
         let of_nodes = body.surface_effects.iter().flat_map(|e| e.histories());
-        for history in body.effects.iter().flat_map(|e| e.histories()).chain(of_nodes) {
+        let of_cells =
+            body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
+        for history in of_cells.chain(of_nodes) {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }

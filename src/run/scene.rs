@@ -155,6 +155,9 @@ fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
 
 /// A fault if the scheme can't move some material at all.
 fn refuse_empty_matrix<const D: usize>(mesh: &GlobalMesh<D>, loaded: &Loaded) -> Result<()> {
+    if loaded.job.time.scheme != job::Scheme::LaggedEuler {
+        return Ok(());
+    }
     for region in &mesh.regions {
         let material = material_of(&loaded.job, region);
         if material.density.is_none() && material.viscosity.is_none() {
@@ -165,7 +168,7 @@ fn refuse_empty_matrix<const D: usize>(mesh: &GlobalMesh<D>, loaded: &Loaded) ->
                     "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity \
                      nothing determines the velocity{place}"
                 ),
-                "give [material] density or [material.viscosity]",
+                "give [material] density or [material.viscosity], or take an implicit scheme",
             ));
         }
     }

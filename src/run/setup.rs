@@ -11,7 +11,7 @@ use crate::{
     petsc::set_option,
     session::Session,
     state::State,
-    stepping::LaggedEuler,
+    stepping::Stepper,
     tensor::Vector,
 };
 
@@ -19,7 +19,7 @@ use crate::{
 pub(super) struct Setup<const D: usize, const S: usize> {
     pub body: Body<D, S>,
     pub state: State,
-    pub scheme: LaggedEuler,
+    pub scheme: Stepper,
     pub probes: Probes<D>,
     pub certificates: Certificates,
     pub verdict: Verdict,
@@ -38,17 +38,18 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let mesh = distribute(session, scene.map(|s| (s.mesh, s.partition)))?;
     let probes = session.agree(probes(session, &mesh, job))?;
     let (body, state) = build::body::<D, S>(session, job, mesh)?;
-    let scheme =
-        LaggedEuler::new(session, &body, &state, build::settings(job)).map_err(|error| match error {
-            Error::Internal(words) if !job.solver.petsc.is_empty() => loaded.fault(
-                "solver.petsc",
-                words,
-                "PETSc can't use these options: correct them or leave them out",
-            ),
-            other => other,
-        });
+    let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
+    let scheme = scheme.map_err(|error| match error {
+        Error::Internal(words) if !job.solver.petsc.is_empty() => loaded.fault(
+            "solver.petsc",
+            words,
+            "PETSc can't use these options: correct them or leave them out",
+        ),
+        other => other,
+    });
     let mut scheme = session.agree(scheme)?;
-    let prepared = scheme.prepare_length(session, &body, job.time.step).map_err(|error| match error {
+    let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
+    let prepared = scheme.prepare_length(session, &body, longest).map_err(|error| match error {
         Error::Internal(words) => loaded.fault(
             "material",
             format!("the equations of a step can't be solved: {words}"),
@@ -63,7 +64,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     } else {
         None
     };
-    let verdict = certificates.verdict(job.time.step, unique_step, accepted(job));
+    let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict })
 }

@@ -1,6 +1,7 @@
 //! A job in memory: set up and stepped without a file.
 
 use super::{
+    build,
     scene::scene,
     setup::{Setup, setup},
 };
@@ -13,11 +14,8 @@ use crate::{
     output::history::Totals,
     session::Session,
     state::State,
-    stepping::{LaggedEuler, StepOutcome},
+    stepping::{Adaptive, StepOutcome, Stepper, next_step},
 };
-
-/// A step that ends within this share of a step of the end ends there.
-pub(super) const SNAP: f64 = 1e-9;
 
 /// A body with its state and scheme, for programs that look at fields after each step.
 pub struct Simulation<const D: usize, const S: usize> {
@@ -26,10 +24,11 @@ pub struct Simulation<const D: usize, const S: usize> {
     /// Its converged state.
     pub state: State,
     /// The scheme.
-    pub scheme: LaggedEuler,
+    pub scheme: Stepper,
     /// What adds up over the steps.
     pub totals: Totals,
     time: Time,
+    adaptive: Option<Adaptive>,
 }
 
 impl<const D: usize, const S: usize> Simulation<D, S> {
@@ -40,7 +39,8 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         let scene = session.agree(scene)?;
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, scene)?;
         let totals = totals_at_start(session, &body, &state)?;
-        Ok(Self { body, state, scheme, totals, time: loaded.job.time.clone() })
+        let (time, adaptive) = (loaded.job.time.clone(), build::adaptive(&loaded.job));
+        Ok(Self { body, state, scheme, totals, time, adaptive })
     }
 
     /// Takes the next step; `None` at the end time. Collective.
@@ -48,8 +48,14 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         if self.state.time >= self.time.end {
             return Ok(None);
         }
-        let step = next_step(&self.state, self.time.step, self.time.end);
-        let outcome = self.scheme.advance(session, &mut self.body, &mut self.state, step)?;
+        let (body, state) = (&mut self.body, &mut self.state);
+        let outcome = match &mut self.adaptive {
+            Some(adaptive) => adaptive.advance(session, &mut self.scheme, body, state, self.time.end)?,
+            None => {
+                let step = next_step(state, self.time.step, self.time.end);
+                self.scheme.advance(session, body, state, step)?
+            }
+        };
         self.totals.add(&outcome);
         Ok(Some(outcome))
     }
@@ -64,17 +70,4 @@ pub(super) fn totals_at_start<const D: usize, const S: usize>(
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
     let mine = session.agree(body.energy(state, rest))?;
     Ok(Totals::at_start(Energy::from_array(session.sum(mine.to_array()))))
-}
-
-/// The step of `length` from here, cut or stretched to end at `end` where that is near.
-pub(super) fn next_step(state: &State, length: f64, end: f64) -> Step {
-    let previous_length = state.step_length;
-    let time = state.time + length;
-    if (end - time).abs() <= SNAP * length {
-        Step { time: end, length, previous_length }
-    } else if time > end {
-        Step { time: end, length: end - state.time, previous_length }
-    } else {
-        Step { time, length, previous_length }
-    }
 }

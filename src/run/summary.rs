@@ -41,6 +41,8 @@ pub struct Summary {
     pub time: f64,
     /// Steps taken back.
     pub rejected_steps: u64,
+    /// Matrices this run assembled, each with its preconditioner.
+    pub set_ups: u64,
     /// Newton iterations since time 0.
     pub newton_iterations: u64,
     /// Linear iterations since time 0.

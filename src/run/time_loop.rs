@@ -1,17 +1,17 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Clock, Inventory, Scene, Start,
+    Clock, Inventory, Scene, Start, build,
     outputs::{Outputs, Wanted, prepare_folder},
     setup::{Setup, setup},
-    simulation::{SNAP, next_step, totals_at_start},
+    simulation::totals_at_start,
     summary::{PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     body::Body,
     certificate::Certificates,
     error::{Error, Exit, Result},
-    job::{Job, Loaded},
+    job::{Every, Job, Loaded},
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::list,
@@ -20,7 +20,7 @@ use crate::{
     },
     session::Session,
     state::State,
-    stepping::{LaggedEuler, StepOutcome},
+    stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
 };
 use std::{
     path::Path,
@@ -68,8 +68,25 @@ pub(super) fn run<const D: usize, const S: usize>(
     }
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
-    let mut run =
-        Run { session, job, body, state, scheme, certificates, totals, outputs, log, clock, setup, stepping };
+    let mut adaptive = build::adaptive(job);
+    if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
+        adaptive.pace = pace;
+    }
+    let mut run = Run {
+        session,
+        job,
+        body,
+        state,
+        scheme,
+        certificates,
+        adaptive,
+        totals,
+        outputs,
+        log,
+        clock,
+        setup,
+        stepping,
+    };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
 }
@@ -132,8 +149,9 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     job: &'a Job,
     body: Body<D, S>,
     state: State,
-    scheme: LaggedEuler,
+    scheme: Stepper,
     certificates: Certificates,
+    adaptive: Option<Adaptive>,
     totals: Totals,
     outputs: Outputs<D>,
     log: Log,
@@ -152,10 +170,11 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let step = next_step(&self.state, length, end);
-            let outcome = self.scheme.advance(self.session, &mut self.body, &mut self.state, step)?;
+            let outcome = self.take_step(length, end)?;
             self.totals.add(&outcome);
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
+            let steps_left = steps_between(self.state.time, end, self.state.step_length);
+            let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
             let wish = self.wish(saved_at);
             if let Some(reason) = wish.stop
@@ -171,6 +190,24 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         Ok(Ended::Completed)
     }
 
+    /// Takes a step of the job's length, or of an adapted one that lands on the next output time. Collective.
+    fn take_step(&mut self, length: f64, end: f64) -> Result<StepOutcome> {
+        let (body, state) = (&mut self.body, &mut self.state);
+        let Some(adaptive) = &mut self.adaptive else {
+            let step = next_step(state, length, end);
+            return self.scheme.advance(self.session, body, state, step);
+        };
+        let target = match self.job.output.fields {
+            Some(Every::Interval(interval)) => {
+                interval * ((state.time / interval * (1.0 + 1e-12)).floor() + 1.0)
+            }
+            _ => end,
+        };
+        let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target.min(end))?;
+        self.totals.pace = Some(adaptive.pace);
+        Ok(outcome)
+    }
+
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
         let step = self.state.step;
         let words = format!(
@@ -183,7 +220,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             outcome.inclusion_residual,
             kinds(outcome),
             self.totals.energy_imbalance,
-            clock_time(self.pace() * (last - step) as f64)
+            super::header::clock_time(self.pace() * (last - step) as f64)
         );
         self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
         if step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last {
@@ -290,11 +327,12 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             nodes: mesh.total_nodes,
             unknowns: self.body.unknowns(self.session),
             effects: self.body.effect_names(),
-            scheme: "lagged_euler",
+            scheme: self.scheme.scheme().name(),
             preconditioner: self.scheme.preconditioner().name(),
             steps: self.state.step,
             time: self.state.time,
-            rejected_steps: 0,
+            rejected_steps: self.totals.pace.map_or(0, |pace| pace.rejected),
+            set_ups: self.scheme.set_ups,
             newton_iterations: self.totals.newton_iterations,
             linear_iterations: self.totals.linear_iterations,
             restarted_from,
@@ -346,16 +384,6 @@ fn kinds(outcome: &StepOutcome) -> String {
     let branches =
         if branches.is_empty() { String::new() } else { format!("branches {}  ", branches.join("/")) };
     branches + &counts.collect::<String>()
-}
-
-/// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.
-fn clock_time(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
-    }
 }
 
 /// What is asked for after a step.

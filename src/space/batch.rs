@@ -16,6 +16,8 @@ pub const BATCH: usize = 128;
 pub struct Needs {
     /// Strain of the displacement.
     pub strain: bool,
+    /// Strain of the displacement before the step.
+    pub strain_before: bool,
     /// Strain of the velocity.
     pub strain_rate: bool,
     /// Velocity at the cell's nodes.
@@ -31,6 +33,7 @@ impl Needs {
     pub fn or(self, other: Self) -> Self {
         Self {
             strain: self.strain || other.strain,
+            strain_before: self.strain_before || other.strain_before,
             strain_rate: self.strain_rate || other.strain_rate,
             velocity: self.velocity || other.velocity,
             velocity_change: self.velocity_change || other.velocity_change,
@@ -44,6 +47,8 @@ impl Needs {
 pub struct Nodal<'a> {
     /// Displacement in m.
     pub displacement: &'a [f64],
+    /// Displacement before the step in m; read where effects need its strain.
+    pub previous_displacement: &'a [f64],
     /// Velocity in m/s.
     pub velocity: &'a [f64],
     /// Velocity before the last step in m/s.
@@ -84,6 +89,8 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub cells: &'g [Simplex<D>],
     /// Strain of the displacement, one a cell, if needed.
     pub strain: Vec<Mandel<S>>,
+    /// Strain of the displacement before the step, one a cell, if needed.
+    pub strain_before: Vec<Mandel<S>>,
     /// Strain of the velocity in 1/s, one a cell, if needed.
     pub strain_rate: Vec<Mandel<S>>,
     /// Velocity, `D + 1` nodes a cell, if needed.
@@ -115,6 +122,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             first: 0,
             cells: &[],
             strain: vec![[0.0; S]; if needs.strain { BATCH } else { 0 }],
+            strain_before: vec![[0.0; S]; if needs.strain_before { BATCH } else { 0 }],
             strain_rate: vec![[0.0; S]; if needs.strain_rate { BATCH } else { 0 }],
             velocity: vec![[0.0; D]; if needs.velocity { BATCH * (D + 1) } else { 0 }],
             velocity_change: vec![[0.0; D]; if needs.velocity_change { BATCH * (D + 1) } else { 0 }],
@@ -141,6 +149,10 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             if needs.strain {
                 let values = values_at::<D>(nodal.displacement, nodes);
                 self.strain[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
+            }
+            if needs.strain_before {
+                let values = values_at::<D>(nodal.previous_displacement, nodes);
+                self.strain_before[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
             }
             if !(needs.strain_rate || needs.velocity || needs.velocity_change) {
                 continue;

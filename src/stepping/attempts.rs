@@ -1,7 +1,7 @@
 //! The ways in which a step is tried to be solved.
 
 use super::{
-    equations::{ContactEquations, Effort, cycle},
+    equations::{CellForces, ContactEquations, Effort, cycle},
     linear_solver::FrictionIteration,
     newton::{Newton, STEEP, Task},
 };
@@ -162,9 +162,15 @@ impl Newton {
             self.snes.search_along_steps(search == Search::Backtracking)?;
         }
         effort.sets.clear();
+        let (cells, contacts) = body.cells_and_contacts();
+        let mut cells = match (&mut self.flow, task.flow) {
+            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
+            _ => None,
+        };
         let mut equations = ContactEquations {
             matrix: task.matrix,
-            contacts: &mut body.contacts,
+            cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
+            contacts,
             right_hand_side: task.right_hand_side,
             scratch: &mut self.scratch,
             linear_solver: &mut self.linear_solver,
@@ -208,9 +214,15 @@ impl Newton {
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
         let (mut open, mut target, mut behind) = (trial.like()?, trial.like()?, trial.like()?);
+        let (cells, contacts) = body.cells_and_contacts();
+        let mut cells = match (&mut self.flow, task.flow) {
+            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
+            _ => None,
+        };
         let mut equations = ContactEquations {
             matrix: task.matrix,
-            contacts: &mut body.contacts,
+            cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
+            contacts,
             right_hand_side: task.right_hand_side,
             scratch: &mut self.scratch,
             linear_solver: &mut self.linear_solver,

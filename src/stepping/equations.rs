@@ -7,12 +7,29 @@ use crate::{
     session::Session,
 };
 
+/// Forces of the cells beyond `K v`, at velocities without ghost values.
+pub trait CellForces {
+    /// Adds the forces at a velocity.
+    fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
+
+    /// Takes a velocity as the point of linearisation.
+    fn linearise(&mut self, velocity: &DistributedVector) -> Result<()>;
+
+    /// Whether the derivative is symmetric.
+    fn is_symmetric(&self) -> bool;
+
+    /// Adds the change of the forces with a change of the velocity.
+    fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
+}
+
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::effect::Contact`] for the unknown `x`.
 pub struct ContactEquations<'a, const D: usize> {
     /// `K`.
     pub matrix: &'a Matrix,
     /// What makes up `C`.
     pub contacts: &'a mut [Contact<D>],
+    /// What cells add to `K v`, if that is not linear.
+    pub cells: Option<&'a mut dyn CellForces>,
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
     /// What the evaluation needs room for.
@@ -122,6 +139,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
         self.matrix.multiply(velocity, residual)?;
         residual.add_scaled(-1.0, self.right_hand_side)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_forces(velocity, residual)?;
+        }
         add_contact(ghosted, self.contacts, velocity, residual, Contact::add_forces)
     }
 
@@ -132,6 +152,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x));
         }
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        if let Some(cells) = &mut self.cells {
+            cells.linearise(velocity)?;
+        }
         if let Some([values, _]) = ghosted {
             values.copy_from(velocity)?;
             values.update_ghosts()?;
@@ -164,6 +187,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.contacts.iter_mut().for_each(|contact| contact.map_direction(&mut velocity));
         }
         self.matrix.multiply(velocity, result)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_derivative(velocity, result)?;
+        }
         add_contact(ghosted, self.contacts, velocity, result, Contact::add_derivative)
     }
 
@@ -173,9 +199,12 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         direction: &mut DistributedVector,
     ) -> Result<()> {
         let Scratch { velocity, open, ghosted } = &mut *self.scratch;
+        let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
+        let skew = cells.as_ref().is_some_and(|cells| !cells.is_symmetric());
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
             && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
-        let mut operator = Reduced { matrix: self.matrix, contacts: self.contacts, ghosted };
+        let coupled = coupled || skew;
+        let mut operator = Reduced { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
         open.copy_from(residual)?;
         operator.reduce(open)?;
         let outcome = if coupled {
@@ -192,8 +221,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         }
         direction.copy_from(velocity)?;
         if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction().is_some()) {
-            self.matrix.multiply(velocity, open)?;
-            add_contact(operator.ghosted, self.contacts, velocity, open, Contact::add_slopes)?;
+            operator.multiply(velocity, open)?;
             open.scale(-1.0)?;
             open.add_scaled(1.0, residual)?;
         }
@@ -203,15 +231,25 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
-/// `P Q (K + C') P` in velocities, where `P` holds the points on vertical parts of their graphs and `Q` takes the unknown
-/// pressures of sliding points out of the equations: the identity, unless friction follows these.
+/// `P Q (K + F' + C') P` in velocities, where `F` are the forces of cells, `P` holds the points on vertical parts of their
+/// graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
+/// these.
 struct Reduced<'a, const D: usize> {
     matrix: &'a Matrix,
+    cells: Option<&'a mut dyn CellForces>,
     contacts: &'a [Contact<D>],
     ghosted: &'a mut Option<[DistributedVector; 2]>,
 }
 
 impl<const D: usize> Reduced<'_, D> {
+    fn multiply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_derivative(x, y)?;
+        }
+        add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
+    }
+
     /// `x = P Q x`.
     fn reduce(&mut self, x: &mut DistributedVector) -> Result<()> {
         {
@@ -224,8 +262,7 @@ impl<const D: usize> Reduced<'_, D> {
 
 impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.matrix.multiply(x, y)?;
-        add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)?;
+        self.multiply(x, y)?;
         self.reduce(y)
     }
 

@@ -1,12 +1,24 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
+mod adaptive;
 mod attempts;
+mod bdf2;
 mod bounded;
 mod equations;
+mod flow;
+mod implicit;
+mod implicit_euler;
 mod lagged_euler;
 mod linear_solver;
 mod newton;
+mod scheme;
+mod step_length;
+mod step_solver;
+mod stepper;
 
-pub use equations::{ContactEquations, Effort, Scratch};
-pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
+pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
+pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use linear_solver::{FrictionIteration, Method, Preconditioner, SolverSettings};
+pub use scheme::Scheme;
+pub use step_length::{SNAP, next_step};
+pub use stepper::{StepClock, StepOutcome, Stepper};

@@ -5,6 +5,7 @@ use super::{
     attempts::{ATTEMPTS, Search},
     bounded::Bounded,
     equations::{Effort, Scratch},
+    flow::{Flow, FlowStart},
     linear_solver::{FrictionIteration, SolverSettings},
 };
 use crate::{
@@ -31,6 +32,8 @@ pub(super) struct Newton {
     pub start: DistributedVector,
     /// Whether the user chose how to search along steps.
     pub chosen_search: bool,
+    /// What cells that flow need, if there are any.
+    pub flow: Option<Flow>,
 }
 
 /// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
@@ -45,6 +48,8 @@ pub(super) struct Task<'a> {
     pub right_hand_side: &'a DistributedVector,
     pub tolerance: f64,
     pub settings: SolverSettings,
+    /// Where the displacement starts, if stresses are those at the end of the step.
+    pub flow: Option<FlowStart<'a>>,
 }
 
 impl Task<'_> {

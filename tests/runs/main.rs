@@ -1,5 +1,6 @@
 //! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
 
+mod adaptive;
 mod case;
 mod certificates;
 mod check_values;
@@ -16,4 +17,5 @@ mod readers;
 mod regions;
 mod restart;
 mod results;
+mod schemes;
 mod signals;

@@ -93,6 +93,14 @@ fn a_square_under_boomeramg_with_gauss_points_is_the_same_on_any_number_of_ranks
 }
 
 #[test]
+fn a_square_that_flows_under_each_implicit_scheme_is_the_same_on_any_number_of_ranks() {
+    for scheme in ["implicit_euler", "bdf2"] {
+        let make = || Case::square(12).set("time.scheme", &format!("'{scheme}'"));
+        compare(make, scheme);
+    }
+}
+
+#[test]
 fn a_cube_factorised_with_gauss_points_is_the_same_on_any_number_of_ranks() {
     cube("cholesky", "gauss");
 }

@@ -161,6 +161,24 @@ fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() 
 }
 
 #[test]
+fn a_restarted_run_under_each_scheme_is_the_straight_run_to_the_last_bit() {
+    let flow = "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300 } }";
+    let law = "{ compliance = { stiffness = 1000, exponent = 1.5, gap = '0.004 - 0.01*t' } }";
+    for scheme in ["'implicit_euler'", "'bdf2'"] {
+        let make = || {
+            saving()
+                .set("time.scheme", scheme)
+                .set("material.viscoplasticity", flow)
+                .set("contact.0.normal", law)
+        };
+        compare_with_straight(make, 1, scheme);
+        compare_with_straight(make, 3, scheme);
+        let elastic = || make().without("material.viscoplasticity").without("contact");
+        compare_with_straight(elastic, 2, scheme);
+    }
+}
+
+#[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");
@@ -197,6 +215,13 @@ fn a_run_saved_on_two_ranks_goes_on_on_any_number() {
 #[test]
 fn a_run_saved_on_three_ranks_goes_on_on_any_number() {
     go_on_on_other_ranks(saving(), 3, &[]);
+}
+
+#[test]
+fn a_run_of_each_scheme_saved_on_three_ranks_goes_on_on_any_number() {
+    for scheme in ["'implicit_euler'", "'bdf2'"] {
+        go_on_on_other_ranks(saving().set("time.scheme", scheme), 3, &[]);
+    }
 }
 
 #[test]

@@ -111,6 +111,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             }
             let mut equations = ContactEquations {
                 matrix: &matrix,
+                cells: None,
                 contacts: &mut contacts,
                 right_hand_side: &load,
                 scratch: &mut scratch,

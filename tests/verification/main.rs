@@ -20,6 +20,7 @@ mod patch;
 mod petsc_boundary;
 mod random_laws;
 mod scenes;
+mod schemes;
 mod subspace;
 mod wave;
 
@@ -59,6 +60,9 @@ fn scenario() {
         "subspace" => subspace::solve(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
+        "scheme_adapted" => schemes::adapted(&session),
+        "scheme_orders" => schemes::orders(&session),
+        "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
         other => panic!("no scenario {other}"),
     }

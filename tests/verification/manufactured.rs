@@ -79,7 +79,7 @@ fn body_force<const D: usize>(field: &Field<D>, elastic: (f64, f64), i: usize) -
 }
 
 /// The job whose solution is the motion: held on the left, a linear damper below, tractions on all other sides.
-fn job<const D: usize>(hypothesis: &str, quadrature: &str, extra: &str, end: f64, step: f64) -> String {
+pub fn job<const D: usize>(hypothesis: &str, quadrature: &str, extra: &str, end: f64, step: f64) -> String {
     let (field, elastic) = (motion::<D>(), elasticity(hypothesis));
     let mut job = format!("{}[time]\nend = {end}\nstep = {step}\n[material]\n", any_mesh::<D>());
     if D == 2 {

@@ -17,6 +17,7 @@
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
+mod blend;
 mod bounds;
 mod count;
 mod friction;
@@ -138,6 +139,7 @@ impl<const D: usize> Contact<D> {
             let along = point.normal_component(displacement);
             point.context = NodeContext { penetration: along - gap, step_length: length };
             point.penetration_before = along - before;
+            point.shift = 0.0;
         }
         Ok(())
     }
@@ -337,13 +339,15 @@ impl<const D: usize> Contact<D> {
             let v = point.normal_component(velocity);
             let pressure = point.pressure_at(&self.law, velocity);
             let work = length * pressure * v;
-            let after = point.context.penetration + length * v;
+            let change = point.context.step_length * v;
+            let after = point.context.penetration + change;
+            let beside = length * v - change - point.shift;
             // An obstacle that was nowhere appears where the point is.
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let stored = self.law.energy(after) - self.law.energy(before);
             let numerical = match self.law {
                 NormalLaw::Compliance(_) if pressure == 0.0 => stored,
-                NormalLaw::Compliance(_) => stored - pressure * (after - before),
+                NormalLaw::Compliance(_) => stored - pressure * (after - before) - pressure * beside,
                 _ => 0.0,
             };
             sums[0] += point.weight * (work - stored + numerical);

@@ -40,14 +40,14 @@ pub enum Scheme {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// Accepted error of a step, relative to the largest velocity so far.
+    /// Accepted error of a step, relative to the largest velocity and stress so far.
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
-    /// The run fails when a shorter step would be needed.
+    /// No step is shorter: what jumps is then taken with its error, and the run fails when such a step can't be solved.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1e-5)]
     pub smallest_step: f64,
-    /// No step is longer.
+    /// No step is longer. Steps are the first one times powers of two.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub largest_step: f64,
 }

@@ -9,6 +9,7 @@ const MOST_STEPS: f64 = 1e12;
 /// Steps that fit into the time, checkpoints that have an occasion, PETSc options as PETSc spells them.
 pub fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
+    check_scheme(findings);
     check_checkpoint(findings);
     if let Some(Value::Table(options)) = findings.root.find("solver.petsc").map(|node| &node.value) {
         for (key, node) in options {
@@ -55,6 +56,27 @@ fn check_steps(findings: &mut Findings<'_>) {
             "the first step is longer than the largest",
             format!("at most {largest}"),
         );
+    }
+}
+
+/// Effects that take the state before the step go with the scheme that does so.
+fn check_scheme(findings: &mut Findings<'_>) {
+    let scheme = findings.root.read::<String>("time.scheme").unwrap_or_default();
+    if !["implicit_euler", "bdf2"].contains(&scheme.as_str()) {
+        return;
+    }
+    let list = |list: &str, key: &str| -> Vec<String> {
+        (0..findings.root.count(list)).map(|at| format!("{list}.{at}.{key}")).collect()
+    };
+    let mut places = vec!["material.damage".to_owned()];
+    places.extend(list("region", "material.damage"));
+    places.extend(list("contact", "adhesion"));
+    for place in places {
+        if findings.root.find(&place).is_none() {
+            continue;
+        }
+        let message = format!("damage and adhesion are not available with the scheme \"{scheme}\" yet");
+        findings.fault(&place, message, "take scheme = \"lagged_euler\"");
     }
 }
 

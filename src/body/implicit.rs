@@ -1,0 +1,128 @@
+//! What a step asks of a body that is implicit in every stress.
+
+use super::Body;
+use crate::{
+    effect::{Blend, Contact, Effect, Energy, Step, Tangents},
+    mesh::Mesh,
+    space::{Batch, Geometry, Needs, Nodal},
+    tensor::{Mandel, component, symmetric_part},
+};
+
+/// The cells of a body, apart from its contacts.
+pub struct Cells<'a, const D: usize, const S: usize> {
+    mesh: &'a Mesh<D>,
+    geometry: &'a Geometry<D>,
+    effects: &'a mut [Box<dyn Effect<D, S>>],
+    /// One flag a local component: held by a support.
+    pub fixed: &'a [bool],
+}
+
+impl<const D: usize, const S: usize> Body<D, S> {
+    /// Cells and contacts, to be used side by side.
+    pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
+        let Self { mesh, geometry, effects, fixed, contacts, .. } = self;
+        (Cells { mesh, geometry, effects, fixed }, contacts)
+    }
+
+    /// Whether cells flow, so that an implicit step is nonlinear.
+    pub fn flows(&self) -> bool {
+        self.effects.iter().any(|effect| effect.flows())
+    }
+
+    /// Adds the forces of the state that a step starts from to `forces` (with ghosts). Gives the sum of the squares of the
+    /// forces of cells, whose rounding no residual can be less than.
+    pub fn add_start_forces(
+        &mut self,
+        blend: Blend,
+        nodal: Nodal<'_>,
+        step: Step,
+        forces: &mut [f64],
+    ) -> f64 {
+        self.effects.iter_mut().for_each(|effect| effect.begin(blend));
+        let Some(needs) = self.needs(|p| p.explicit) else { return 0.0 };
+        let (mesh, effects) = (&self.mesh, &mut self.effects);
+        let start = Step { length: blend.length, ..step };
+        let mut squares = 0.0;
+        Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
+                effect.add_explicit(start, batch, &mut Energy::default());
+            }
+            for (cell, stress) in batch.cells.iter().zip(&batch.stress) {
+                let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
+                squares += cell.volume * cell.volume * gradients * crate::tensor::dot(stress, stress);
+            }
+            batch.scatter(mesh, forces);
+        });
+        squares
+    }
+
+    /// Energies of a solved step that is not yet committed; writes trial histories.
+    pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
+        let needs = Needs { strain: true, strain_before: true, strain_rate: true, ..Needs::default() };
+        let effects = &mut self.effects;
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            effects.iter_mut().for_each(|effect| effect.add_implicit_energy(step, batch, energy));
+        });
+    }
+}
+
+impl<const D: usize, const S: usize> Cells<'_, D, S> {
+    /// Whether the derivative of the flow is symmetric in all cells.
+    pub fn has_symmetric_tangent(&self) -> bool {
+        self.effects.iter().all(|effect| effect.has_symmetric_tangent())
+    }
+
+    /// Adds the forces of what flow takes from the stress at this displacement to `forces` (both with ghosts); writes trial
+    /// histories and, where they are wanted, the derivatives.
+    pub fn add_flow(
+        &mut self,
+        displacement: &[f64],
+        mut tangents: Option<&mut Tangents>,
+        forces: &mut [f64],
+    ) {
+        let nodal = Nodal {
+            displacement,
+            previous_displacement: displacement,
+            velocity: displacement,
+            previous_velocity: displacement,
+        };
+        let needs = Needs { strain: true, ..Needs::default() };
+        let (mesh, effects) = (self.mesh, &mut self.effects);
+        Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            let mut any = false;
+            for effect in effects.iter_mut().filter(|e| e.flows()) {
+                any |= effect.add_flow(batch, tangents.as_deref_mut());
+            }
+            if any {
+                batch.scatter(mesh, forces);
+            }
+        });
+    }
+
+    /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
+    pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
+        for (number, tangent) in tangents.iter::<S>() {
+            let (cell, nodes) = (&self.geometry.cells[number], self.mesh.cell(number));
+            let mut values = [[0.0; D]; 4];
+            for (value, &node) in values.iter_mut().zip(nodes) {
+                value.copy_from_slice(&velocity[node as usize * D..][..D]);
+            }
+            let rate: Mandel<S> = symmetric_part(&cell.field_gradient(&values[..=D]));
+            let mut stress = [[0.0; D]; D];
+            for (c, row) in tangent.chunks_exact(S).enumerate() {
+                let (i, j, factor) = component::<S>(c);
+                if i < D && j < D {
+                    let value: f64 = row.iter().zip(&rate).map(|(t, e)| t * e).sum();
+                    stress[i][j] = cell.volume * value / factor;
+                    stress[j][i] = stress[i][j];
+                }
+            }
+            for (a, &node) in nodes.iter().enumerate() {
+                let gradient = cell.gradient(a);
+                for i in 0..D {
+                    forces[node as usize * D + i] += crate::tensor::dot(&stress[i], &gradient);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step};
+use crate::{
+    material::ByMaterial,
+    space::{Batch, CellMatrix, Needs, Simplex},
+    tensor::{add_scaled, dot},
+};
+
+/// Elastic stress of the displacement at the end of the step, `E e(u_n)` with `u_n = u~ + k' v_n`: `E e(u~)` is known, and
+/// `k' E` is part of the matrix.
+#[derive(Debug)]
+pub struct ImplicitElasticity {
+    law: ByMaterial<ElasticLaw>,
+    blend: Blend,
+}
+
+impl ImplicitElasticity {
+    /// Elasticity of these materials.
+    pub fn new(law: ByMaterial<ElasticLaw>) -> Self {
+        Self { law, blend: Blend::euler(0.0) }
+    }
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
+    fn name(&self) -> &'static str {
+        "elasticity"
+    }
+
+    fn phases(&self) -> Phases {
+        let strain = Needs { strain: true, ..Needs::default() };
+        Phases {
+            matrix: true,
+            explicit: Some(strain),
+            energy: Some(strain),
+            stress: Some(strain),
+            weakens: false,
+        }
+    }
+
+    fn is_everywhere(&self) -> bool {
+        self.law.is_everywhere()
+    }
+
+    fn add_matrix(&self, material: usize, cell: &Simplex<D>, length: f64, matrix: &mut CellMatrix<D>) {
+        if let Some(law) = self.law.get(material) {
+            matrix.add_isotropic(cell, length * law.tensor.volumetric, length * law.tensor.shear);
+        }
+    }
+
+    fn begin(&mut self, blend: Blend) {
+        self.blend = blend;
+    }
+
+    fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material) else { return };
+        for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
+            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
+        }
+    }
+
+    fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
+        for (at, cell) in batch.cells.iter().enumerate() {
+            let change = add_scaled(&batch.strain[at], -1.0, &batch.strain_before[at]);
+            let beside = add_scaled(&change, -step.length, &batch.strain_rate[at]);
+            let stress = law.tensor.apply(&batch.strain[at]);
+            let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
+            energy.numerical += cell.volume * (dot(&stress, &beside) - jump);
+        }
+    }
+
+    fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
+        for (cell, strain) in batch.cells.iter().zip(&batch.strain) {
+            energy.elastic += 0.5 * cell.volume * dot(strain, &law.tensor.apply(strain));
+        }
+    }
+
+    fn form(&self) -> Option<Form> {
+        Some(Form::Elasticity)
+    }
+
+    fn add_form(&self, batch: &mut Batch<D, S>) {
+        let Some(law) = self.law.get(batch.material) else { return };
+        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
+            *stress = add_scaled(stress, -1.0, &law.tensor.apply(rate));
+        }
+    }
+
+    fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
+        let Some(law) = self.law.get(batch.material) else { return };
+        for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
+            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
+        }
+    }
+}

@@ -1,0 +1,188 @@
+use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory};
+use crate::{
+    material::{ByMaterial, Returned, Tangent, Viscoplasticity},
+    space::{Batch, CellRun, Needs},
+    tensor::{Mandel, add_scaled, dot},
+};
+
+/// Viscoplastic flow at the end of the step: `H_n = H~ + k' G(s_n)` with `s_n = E e(u_n) + H_n`, solved in each cell by the
+/// law's return mapping, and the viscoplastic strain that hardening cells accumulate.
+#[derive(Debug)]
+pub struct ViscoplasticFlow<const S: usize> {
+    laws: ByMaterial<Viscoplasticity>,
+    stress: CellHistory<S>,
+    accumulated: Option<CellHistory<1>>,
+    blend: Blend,
+}
+
+impl<const S: usize> ViscoplasticFlow<S> {
+    /// No history yet, for the cells of these runs whose material has a law; `two_steps` are kept if the scheme blends.
+    pub fn new(laws: ByMaterial<Viscoplasticity>, runs: &[CellRun], two_steps: bool) -> Self {
+        let flows = |material: usize| laws.get(material).is_some();
+        let hardens = |material: usize| laws.get(material).is_some_and(Viscoplasticity::hardens);
+        let mut stress = CellHistory::new("viscoplastic_history", runs, flows);
+        let mut accumulated = laws
+            .laws()
+            .any(Viscoplasticity::hardens)
+            .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
+        if two_steps {
+            stress.keep_earlier("previous_viscoplastic_history");
+            accumulated.iter_mut().for_each(|a| a.keep_earlier("previous_equivalent_viscoplastic_strain"));
+        }
+        Self { laws, stress, accumulated, blend: Blend::euler(0.0) }
+    }
+
+    /// Lets each cell of the batch flow; `visit` gets the cell's place in the batch, the history `H~` of the start, its law,
+    /// the stress without flow and what the mapping found.
+    #[inline(always)]
+    fn advance<const D: usize>(
+        &mut self,
+        batch: &mut Batch<D, S>,
+        mut tangents: Option<&mut Tangents>,
+        mut visit: impl FnMut(&mut Batch<D, S>, usize, &Viscoplasticity, &Mandel<S>, Option<&Returned<S>>),
+    ) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let blend = self.blend;
+        let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
+        for at in 0..batch.cells.len() {
+            let start = self.stress.start(batch.number, at, blend);
+            let trial = add_scaled(&law.elasticity().apply(&batch.strain[at]), 1.0, &start);
+            let [before] = accumulated.as_ref().map_or([0.0], |a| a.start(batch.number, at, blend));
+            let mut tangent = [[0.0; S]; S];
+            let wanted = tangents.is_some().then_some(&mut tangent);
+            let found = law.return_stress(&trial, blend.length, before, wanted);
+            let mut history = start;
+            let mut after = before;
+            if let Some(found) = &found {
+                history = add_scaled(&start, -1.0, &law.elasticity().apply(&found.flow));
+                after = found.accumulated;
+                if let Some(tangents) = &mut tangents {
+                    tangents.push(batch.first + at, &loss(law, &tangent, blend.length));
+                }
+            }
+            self.stress.set_trial(batch.number, at, history);
+            if let Some(accumulated) = &mut accumulated {
+                accumulated.set_trial(batch.number, at, [after]);
+            }
+            visit(batch, at, law, &trial, found.as_ref());
+        }
+    }
+}
+
+/// `(T - I) k' E`: what flow takes from the derivative of the stress by the strain rate.
+fn loss<const S: usize>(law: &Viscoplasticity, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
+    // E is symmetric, so that it may be applied to the rows.
+    std::array::from_fn(|i| {
+        let mut row = tangent[i];
+        row[i] -= 1.0;
+        law.elasticity().apply(&row).map(|value| length * value)
+    })
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
+    fn name(&self) -> &'static str {
+        "viscoplasticity"
+    }
+
+    fn phases(&self) -> Phases {
+        let strain = Needs { strain: true, ..Needs::default() };
+        let none = Needs::default();
+        Phases { explicit: Some(none), energy: Some(strain), stress: Some(none), ..Phases::default() }
+    }
+
+    fn is_everywhere(&self) -> bool {
+        self.laws.is_everywhere()
+    }
+
+    fn begin(&mut self, blend: Blend) {
+        self.blend = blend;
+    }
+
+    fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+        if self.laws.get(batch.material).is_none() {
+            return;
+        }
+        for at in 0..batch.cells.len() {
+            let start = self.stress.start(batch.number, at, self.blend);
+            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &start);
+        }
+    }
+
+    fn flows(&self) -> bool {
+        true
+    }
+
+    fn add_flow(&mut self, batch: &mut Batch<D, S>, tangents: Option<&mut Tangents>) -> bool {
+        let mut any = false;
+        self.advance(batch, tangents, |batch, at, law, _, found| {
+            if let Some(found) = found {
+                batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &law.elasticity().apply(&found.flow));
+                any = true;
+            }
+        });
+        any
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        self.laws.laws().all(Viscoplasticity::has_symmetric_tangent::<S>)
+    }
+
+    fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        if self.laws.get(batch.material).is_none() {
+            return;
+        }
+        let converged: Vec<Mandel<S>> = self.stress.converged(batch.number).to_vec();
+        let blend = self.blend;
+        self.advance(batch, None, |batch, at, law, trial, found| {
+            let elasticity = law.elasticity();
+            let stress = found.map_or(*trial, |found| found.stress);
+            let before = add_scaled(&elasticity.apply(&batch.strain_before[at]), 1.0, &converged[at]);
+            let change = add_scaled(&stress, -1.0, &before);
+            // k times the elastic strain rate: the step's strain without its flow.
+            let mut rate = batch.strain_rate[at].map(|rate| step.length * rate);
+            let volume = batch.cells[at].volume;
+            if let Some(found) = found {
+                let share = step.length / blend.length;
+                rate = add_scaled(&rate, -share, &found.flow);
+                energy.viscoplastic += volume * share * dot(&stress, &found.flow);
+            }
+            let beside = add_scaled(&elasticity.solve(&change), -1.0, &rate);
+            energy.numerical += volume * (dot(&stress, &beside) - 0.5 * elasticity.inverse_square(&change));
+        });
+    }
+
+    fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let elasticity = law.elasticity();
+        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
+            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
+            energy.elastic += 0.5 * batch.cells[at].volume * elasticity.inverse_square(&stress);
+        }
+    }
+
+    fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
+        for (stress, history) in batch.stress.iter_mut().zip(self.stress.converged(batch.number)) {
+            *stress = add_scaled(stress, 1.0, history);
+        }
+    }
+
+    fn commit(&mut self) {
+        self.stress.commit();
+        self.accumulated.iter_mut().for_each(CellHistory::commit);
+    }
+
+    fn histories(&self) -> Vec<History<'_>> {
+        let accumulated = self.accumulated.as_ref().map(CellHistory::history);
+        std::iter::once(self.stress.history()).chain(accumulated).collect()
+    }
+
+    fn earlier_histories(&self) -> Vec<History<'_>> {
+        let accumulated = self.accumulated.as_ref().and_then(CellHistory::earlier_history);
+        self.stress.earlier_history().into_iter().chain(accumulated).collect()
+    }
+
+    fn restore(&mut self, name: &str, values: &[f64]) {
+        self.stress.restore(name, values);
+        self.accumulated.iter_mut().for_each(|history| history.restore(name, values));
+    }
+}

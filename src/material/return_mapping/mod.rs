@@ -1,0 +1,130 @@
+//! Implicit flow: the stress at the end of a step, `s = s* - k E X(s)`, from the stress `s*` that the step would end with
+//! if nothing flowed.
+//!
+//! Each law comes down to one scalar equation, or to none: radial laws in the overstress (`radial`), Perzyna's law in plane
+//! stress in the multiplier of its projection (`plane_stress`), Drucker-Prager and Maxwell in closed form. The tangent
+//! `ds/ds*` is that of the mapping itself (the algorithmic or consistent one), so that Newton's method on whole bodies keeps
+//! its order. As the relaxation tends to 0 the mappings tend to those of rate-independent plasticity.
+//!
+//! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3; E. de Souza Neto, D. Peric, D. Owen,
+//! Computational Methods for Plasticity, 2008, chapters 7 to 11.)
+
+mod linear;
+mod plane_stress;
+mod radial;
+
+use super::{Hardening, Viscoplasticity};
+use crate::tensor::{Mandel, add_scaled};
+
+/// A square matrix over the components of a stress.
+pub type Tangent<const S: usize> = [[f64; S]; S];
+
+/// How a step ends where stress flows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Returned<const S: usize> {
+    /// `s`, the stress at the end in Pa.
+    pub stress: Mandel<S>,
+    /// `k X(s)`, the viscoplastic strain of the step.
+    pub flow: Mandel<S>,
+    /// Accumulated viscoplastic strain at the end.
+    pub accumulated: f64,
+}
+
+impl Viscoplasticity {
+    /// Flows for `length` s from the stress `trial` that would be there without flow; `accumulated` is the viscoplastic
+    /// strain of hardening before. `None` where nothing flows, the tangent being the identity. Where the caller wants it, the
+    /// tangent `ds/ds*` is written.
+    pub fn return_stress<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        tangent: Option<&mut Tangent<S>>,
+    ) -> Option<Returned<S>> {
+        let flow = match self {
+            Self::Perzyna(law) => {
+                let law = Hardening { perzyna: *law, modulus: 0.0 };
+                overstress(&law, trial, length, accumulated, tangent)?
+            }
+            Self::Hardening(law) => overstress(law, trial, length, accumulated, tangent)?,
+            Self::Maxwell(law) => (linear::maxwell(law, trial, length, tangent), 0.0),
+            Self::DruckerPrager(law) => (linear::drucker_prager(law, trial, length, tangent)?, 0.0),
+        };
+        let (flow, growth) = flow;
+        let stress = add_scaled(trial, -1.0, &self.elasticity().apply(&flow));
+        Some(Returned { stress, flow, accumulated: accumulated + growth })
+    }
+
+    /// Whether the tangent times `E` is symmetric, as it is where flow is associated.
+    pub fn has_symmetric_tangent<const S: usize>(&self) -> bool {
+        match self {
+            Self::Perzyna(_) | Self::Hardening(_) => S != 3,
+            Self::Maxwell(_) | Self::DruckerPrager(_) => true,
+        }
+    }
+}
+
+/// Flow of the step and growth of the accumulated strain, outside the yield surface.
+fn overstress<const S: usize>(
+    law: &Hardening,
+    trial: &Mandel<S>,
+    length: f64,
+    accumulated: f64,
+    tangent: Option<&mut Tangent<S>>,
+) -> Option<(Mandel<S>, f64)> {
+    let yield_stress = law.perzyna.yield_stress + law.modulus * accumulated;
+    let norm = crate::tensor::von_mises(trial);
+    if norm <= yield_stress {
+        return None;
+    }
+    let start = (norm, yield_stress);
+    Some(if S == 3 {
+        plane_stress::flow(law, trial, length, start, tangent)
+    } else {
+        radial::flow(law, trial, length, start, tangent)
+    })
+}
+
+/// Adds `factor * a b^T`.
+fn add_product<const S: usize>(tangent: &mut Tangent<S>, factor: f64, a: &Mandel<S>, b: &Mandel<S>) {
+    for i in 0..S {
+        for j in 0..S {
+            tangent[i][j] += factor * a[i] * b[j];
+        }
+    }
+}
+
+/// The root of an increasing function that is negative at `low` and not at `high`, by Newton's method kept inside a bracket.
+/// `function` gives value and derivative.
+fn increasing_root(
+    mut low: f64,
+    mut high: f64,
+    start: f64,
+    mut function: impl FnMut(f64) -> [f64; 2],
+) -> f64 {
+    let mut at = start;
+    for _ in 0..200 {
+        let [value, slope] = function(at);
+        if value > 0.0 {
+            high = at
+        } else {
+            low = at
+        }
+        let newton = at - value / slope;
+        let next = if low < newton && newton < high {
+            newton
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            2.0 * at
+        };
+        if (next - at).abs() <= 2.0 * f64::EPSILON * next.abs() || value == 0.0 {
+            return if value == 0.0 { at } else { next };
+        }
+        at = next;
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests;

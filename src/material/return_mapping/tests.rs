@@ -1,0 +1,238 @@
+use super::*;
+use crate::{
+    material::{DruckerPrager, Elasticity, Hypothesis, Maxwell, Metric, Perzyna},
+    tensor::{dot, von_mises},
+};
+use proptest::prelude::*;
+
+const BODY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.3 };
+const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
+
+fn perzyna(hypothesis: Hypothesis, metric: Metric, exponent: f64) -> Perzyna {
+    let elasticity = BODY.tensor(hypothesis);
+    Perzyna { relaxation: 100.0, yield_stress: 19.0, exponent, elasticity, metric }
+}
+
+fn soil(hypothesis: Hypothesis) -> DruckerPrager {
+    let elasticity = BODY.tensor(hypothesis);
+    DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0, elasticity }
+}
+
+/// Every law under this hypothesis.
+fn laws(hypothesis: Hypothesis) -> Vec<Viscoplasticity> {
+    let mut laws = Vec::new();
+    for metric in METRICS {
+        for exponent in [1.0, 1.6, 3.0] {
+            let perzyna = perzyna(hypothesis, metric, exponent);
+            laws.push(Viscoplasticity::Perzyna(perzyna));
+            laws.push(Viscoplasticity::Hardening(Hardening { perzyna, modulus: 300.0 }));
+        }
+        let free = Perzyna { yield_stress: 0.0, ..perzyna(hypothesis, metric, 1.0) };
+        laws.push(Viscoplasticity::Perzyna(free));
+        laws.push(Viscoplasticity::Hardening(Hardening { perzyna: free, modulus: 300.0 }));
+    }
+    laws.push(Viscoplasticity::Maxwell(Maxwell::new(BODY, hypothesis, 0.5, Some(4.0))));
+    if hypothesis != Hypothesis::PlaneStress {
+        laws.push(Viscoplasticity::DruckerPrager(soil(hypothesis)));
+    }
+    laws
+}
+
+/// `X(s)` and the rate of the accumulated strain.
+fn rates<const S: usize>(law: &Viscoplasticity, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+    match law {
+        Viscoplasticity::Perzyna(law) => {
+            let (rate, growth) = Hardening { perzyna: *law, modulus: 0.0 }.strain_rate(s, 0.0);
+            (rate, growth)
+        }
+        Viscoplasticity::Hardening(law) => law.strain_rate(s, accumulated),
+        Viscoplasticity::Maxwell(law) => (law.strain_rate(s), 0.0),
+        Viscoplasticity::DruckerPrager(law) => (law.strain_rate(s), 0.0),
+    }
+}
+
+fn largest<const S: usize>(s: &Mandel<S>) -> f64 {
+    s.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+fn difference<const S: usize>(a: &Mandel<S>, b: &Mandel<S>) -> f64 {
+    largest(&add_scaled(a, -1.0, b))
+}
+
+/// The stress after many short explicit steps of pseudo-time toward `s = s* - k E X(s)`: slow, and shares nothing with the
+/// mappings.
+fn by_force<const S: usize>(
+    law: &Viscoplasticity,
+    trial: &Mandel<S>,
+    length: f64,
+    accumulated: f64,
+) -> Mandel<S> {
+    let stiff = 1.0 + length * law.fastest_rate::<S>() * 4.0;
+    let (mut s, mut p) = (*trial, accumulated);
+    for _ in 0..200_000 {
+        let (rate, growth) = rates(law, &s, p);
+        let open = add_scaled(&add_scaled(trial, -length, &law.elasticity().apply(&rate)), -1.0, &s);
+        let behind = accumulated + length * growth - p;
+        s = add_scaled(&s, 1.0 / stiff, &open);
+        p += behind / stiff;
+        if largest(&open) < 1e-13 && behind.abs() < 1e-15 {
+            break;
+        }
+    }
+    s
+}
+
+fn check<const S: usize>(hypothesis: Hypothesis, trial: &Mandel<S>, length: f64, accumulated: f64) {
+    for law in laws(hypothesis) {
+        let mut tangent = [[0.0; S]; S];
+        let Some(found) = law.return_stress(trial, length, accumulated, Some(&mut tangent)) else {
+            assert_eq!(rates(&law, trial, accumulated).0, [0.0; S], "{law:?}");
+            continue;
+        };
+        let size = 1.0 + largest(trial);
+        let (rate, growth) = rates(&law, &found.stress, found.accumulated);
+        let flow = rate.map(|r| length * r);
+        let stiff = 1.0 + length * law.fastest_rate::<S>();
+        let error = difference(&flow, &found.flow) * law.elasticity().shear;
+        assert!(error < 1e-12 * size * stiff, "flow of {law:?}: {error:e}, {flow:?}, {:?}", found.flow);
+        if law.hardens() {
+            let error = (accumulated + length * growth - found.accumulated).abs();
+            assert!(error < 1e-14 * size * stiff, "growth of {law:?}: {error:e}");
+        }
+        assert!(dot(&found.stress, &found.flow) >= -1e-12 * size, "dissipation of {law:?}");
+        assert!(von_mises(&found.stress) <= von_mises(trial) * (1.0 + 1e-12) || S == 3);
+
+        let step = 1e-6 * size;
+        for j in 0..S {
+            let moved = |by: f64| {
+                let mut moved = *trial;
+                moved[j] += by;
+                law.return_stress(&moved, length, accumulated, None).map(|r| r.stress)
+            };
+            let (Some(above), Some(below)) = (moved(step), moved(-step)) else { continue };
+            for i in 0..S {
+                let quotient = (above[i] - below[i]) / (2.0 * step);
+                let error = (quotient - tangent[i][j]).abs();
+                assert!(
+                    error < 2e-5,
+                    "tangent {i} {j} of {law:?} at {trial:?}: {} or {quotient}",
+                    tangent[i][j]
+                );
+            }
+        }
+        if law.has_symmetric_tangent::<S>() {
+            let product = |i: usize, j: usize| {
+                let mut unit = [0.0; S];
+                unit[j] = 1.0;
+                dot(&tangent[i], &law.elasticity().apply(&unit))
+            };
+            for i in 0..S {
+                for j in 0..i {
+                    assert!((product(i, j) - product(j, i)).abs() < 1e-9 * 1000.0, "symmetry of {law:?}");
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn mappings_solve_the_implicit_equation_with_its_tangent_and_dissipate(
+        s in proptest::array::uniform6(-100.0f64..100.0),
+        logarithm in -4.0f64..2.0,
+        accumulated in 0.0f64..0.1,
+    ) {
+        let length = 10f64.powf(logarithm);
+        check(Hypothesis::PlaneStress, &[s[0], s[1], s[3]], length, accumulated);
+        check(Hypothesis::PlaneStrain, &[s[0], s[1], s[2], s[3]], length, accumulated);
+        check(Hypothesis::Space, &s, length, accumulated);
+    }
+}
+
+#[test]
+fn mappings_agree_with_a_solution_by_force() {
+    for hypothesis in [Hypothesis::PlaneStress, Hypothesis::PlaneStrain] {
+        for law in laws(hypothesis) {
+            for length in [0.05, 1.0] {
+                let error = if hypothesis == Hypothesis::PlaneStress {
+                    let trial = [60.0, -20.0, 35.0];
+                    let found = law.return_stress(&trial, length, 0.01, None).expect("flow").stress;
+                    difference(&found, &by_force(&law, &trial, length, 0.01))
+                } else {
+                    let trial = [60.0, -20.0, 15.0, 35.0];
+                    let found = law.return_stress(&trial, length, 0.01, None).expect("flow").stress;
+                    difference(&found, &by_force(&law, &trial, length, 0.01))
+                };
+                assert!(error < 1e-9, "{law:?} over {length}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn uniaxial_return_in_space_by_hand() {
+    // q* = 31, Y = 19, k / (3 lambda) = 1/300, 3 G = 1500 / 1.3: dp = 0.04 / (1 + 5 / 1.3), q = 31 - 3 G dp.
+    let law = Viscoplasticity::Perzyna(perzyna(Hypothesis::Space, Metric::Frobenius, 1.0));
+    let found = law.return_stress(&[31.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0, 0.0, None).expect("flow");
+    let growth = 0.04 / (1.0 + 5.0 / 1.3);
+    assert!((von_mises(&found.stress) - (31.0 - 1500.0 / 1.3 * growth)).abs() < 1e-12);
+    assert!((found.flow[0] - growth).abs() < 1e-15 && (found.accumulated - growth).abs() < 1e-15);
+    let trace: f64 = found.stress[..3].iter().sum();
+    assert!((trace - 31.0).abs() < 1e-12, "pressure stays");
+}
+
+#[test]
+fn stress_inside_does_not_flow() {
+    let law = Viscoplasticity::Perzyna(perzyna(Hypothesis::PlaneStress, Metric::Elasticity, 2.0));
+    assert_eq!(law.return_stress(&[18.9, 0.0, 0.0], 1.0, 0.0, None), None);
+    let soil = Viscoplasticity::DruckerPrager(soil(Hypothesis::Space));
+    assert_eq!(soil.return_stress(&[-500.0, -500.0, -500.0, 0.0, 0.0, 0.0], 1.0, 0.0, None), None);
+}
+
+/// The law with another relaxation.
+fn relaxing(law: &Perzyna, relaxation: f64) -> Viscoplasticity {
+    Viscoplasticity::Perzyna(Perzyna { relaxation, ..*law })
+}
+
+#[test]
+fn without_relaxation_time_stress_returns_to_the_yield_surface_as_in_perfect_plasticity() {
+    let plane = [60.0, -20.0, 35.0];
+    for exponent in [1.0, 2.0] {
+        for metric in METRICS {
+            let law = relaxing(&perzyna(Hypothesis::PlaneStress, metric, exponent), 1e-22);
+            let found = law.return_stress(&plane, 1.0, 0.0, None).expect("flow").stress;
+            assert!((von_mises(&found) - 19.0).abs() < 1e-9, "{metric:?}: {found:?}");
+            // Associated flow returns along E: to the closest stress in the metric of the compliance.
+            let closest = perzyna(Hypothesis::PlaneStress, Metric::Compliance, 1.0).project(&plane);
+            assert_eq!(difference(&found, &closest) < 1e-8, metric == Metric::Frobenius, "{metric:?}");
+        }
+        let law = perzyna(Hypothesis::Space, Metric::Compliance, exponent);
+        let trial = [60.0, -20.0, 15.0, 35.0, 7.0, -9.0];
+        let found = relaxing(&law, 1e-22).return_stress(&trial, 1.0, 0.0, None).expect("flow").stress;
+        assert!(difference(&found, &law.project(&trial)) < 1e-9);
+    }
+    let soil = soil(Hypothesis::Space);
+    let stiff = DruckerPrager { relaxation: 1e-12, ..soil };
+    for trial in [[60.0, -20.0, -35.0, 4.0, 5.0, 6.0], [100.0, 90.0, 95.0, 1.0, 2.0, 3.0]] {
+        let found =
+            Viscoplasticity::DruckerPrager(stiff).return_stress(&trial, 1.0, 0.0, None).expect("flow");
+        assert!(difference(&soil.project(&found.stress), &found.stress) < 1e-9, "{found:?}");
+    }
+}
+
+#[test]
+fn slow_relaxation_leaves_the_stress_where_it_was() {
+    for law in laws(Hypothesis::PlaneStress) {
+        let trial = [60.0, -20.0, 35.0];
+        let mut tangent = [[0.0; 3]; 3];
+        let found = law.return_stress(&trial, 1e-12, 0.0, Some(&mut tangent)).expect("flow").stress;
+        assert!(difference(&found, &trial) < 1e-7, "{law:?}");
+        for i in 0..3 {
+            for j in 0..3 {
+                let identity = f64::from(u8::from(i == j));
+                assert!((tangent[i][j] - identity).abs() < 1e-7, "{law:?}");
+            }
+        }
+    }
+}

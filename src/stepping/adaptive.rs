@@ -1,0 +1,249 @@
+//! Steps chosen by their error, from a ladder: powers of two times the first one, so that matrices and preconditioners serve
+//! for many steps.
+//!
+//! The error of a step is the part of the velocity that no straight line through the velocities before has, `k_n / (k_n +
+//! k_{n-1}) (v_n - v_{n-1} - w (v_{n-1} - v_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes
+//! of second order a bound that also holds where contact or flow set in. It counts in the norm of the mass (of the
+//! viscosity, without inertia) beside the largest velocity so far, and the stress it makes in a step in the norm of the
+//! compliance beside the largest stress so far.
+
+use super::{
+    StepOutcome, Stepper,
+    step_length::{SNAP, next_step},
+};
+use crate::{
+    body::Body,
+    effect::Step,
+    error::{Error, Result},
+    session::Session,
+    state::State,
+};
+use serde::{Deserialize, Serialize};
+
+/// Steps of one length between two growths of it.
+const PATIENCE: u32 = 2;
+/// Share of the length that the tolerance allows.
+const SAFETY: f64 = 0.9;
+
+/// What a job says of adaptive steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveSettings {
+    /// Accepted error of a step, relative to the largest velocity and stress.
+    pub tolerance: f64,
+    /// Length in s of the first step tried.
+    pub first: f64,
+    /// Shortest step in s.
+    pub smallest: f64,
+    /// Longest step in s.
+    pub largest: f64,
+}
+
+/// Where on its ladder a run is; saved in checkpoints.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pace {
+    /// Steps are of the first length times two to this power.
+    pub level: i32,
+    /// Steps taken at this level.
+    pub taken: u32,
+    /// Largest norm of the velocity so far.
+    pub velocity: f64,
+    /// Largest norm of the stress so far.
+    pub stress: f64,
+    /// Steps that were taken back.
+    pub rejected: u64,
+}
+
+/// Norms of velocity and stress.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Norms {
+    /// Of the velocity.
+    pub velocity: f64,
+    /// Of the stress.
+    pub stress: f64,
+}
+
+/// Takes steps of adapted length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adaptive {
+    settings: AdaptiveSettings,
+    lowest: i32,
+    highest: i32,
+    /// Where on the ladder it is.
+    pub pace: Pace,
+}
+
+impl Adaptive {
+    /// On the ladder through the first length.
+    pub fn new(settings: AdaptiveSettings) -> Self {
+        let level = |length: f64| (length / settings.first).log2();
+        let (lowest, highest) =
+            ((level(settings.smallest) - 1e-9).ceil(), (level(settings.largest) + 1e-9).floor());
+        Self { settings, lowest: lowest as i32, highest: highest as i32, pace: Pace::default() }
+    }
+
+    /// Length in s of its longest steps.
+    pub fn longest(&self) -> f64 {
+        self.length(self.highest)
+    }
+
+    /// Length in s of a step at this level.
+    fn length(&self, level: i32) -> f64 {
+        self.settings.first * 2f64.powi(level)
+    }
+
+    /// Takes a step that ends at `target` at the latest, and commits it; steps with too large an error or without a solution
+    /// are taken back and tried again shorter. Collective.
+    pub fn advance<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        target: f64,
+    ) -> Result<StepOutcome> {
+        if state.step == 0 {
+            self.look_ahead(session, stepper, body, state, target)?;
+        }
+        loop {
+            let step = next_step(state, self.next_length(state, target), target);
+            match stepper.attempt(session, body, state, step) {
+                Ok(mut outcome) => {
+                    let [error, size] = stepper.error(session, body, state, step)?;
+                    let error = self.relative(error, size);
+                    if error > self.settings.tolerance && self.level_of(step) > self.lowest {
+                        self.reject(step, self.fitting(step, error));
+                        continue;
+                    }
+                    stepper.accept(session, body, state, step, &mut outcome)?;
+                    let stress = (2.0 * outcome.energy.elastic).max(0.0).sqrt();
+                    self.pace.velocity = self.pace.velocity.max(size.velocity);
+                    self.pace.stress = self.pace.stress.max(stress);
+                    self.grow(step, error);
+                    return Ok(outcome);
+                }
+                Err(Error::Failed(_)) if self.level_of(step) > self.lowest => {
+                    self.reject(step, self.level_of(step) - 1);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// At the start nothing tells how large velocity and stress will be: a step of the largest length does, which is then
+    /// taken back.
+    fn look_ahead<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &State,
+        target: f64,
+    ) -> Result<()> {
+        let step = next_step(state, self.longest(), target);
+        match stepper.attempt(session, body, state, step) {
+            Ok(_) => {
+                let [_, size] = stepper.error(session, body, state, step)?;
+                (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
+                Ok(())
+            }
+            Err(Error::Failed(_)) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The length of the next step: at most twice the last one, and half of what is left to the target where a whole one would
+    /// leave a sliver.
+    fn next_length(&self, state: &State, target: f64) -> f64 {
+        let mut level = self.pace.level.clamp(self.lowest, self.highest);
+        while state.step > 0 && level > self.lowest && self.length(level) > 2.000_001 * state.step_length {
+            level -= 1;
+        }
+        let (length, left) = (self.length(level), target - state.time);
+        let leaves_a_sliver = left > (1.0 + SNAP) * length && left < (2.0 - SNAP) * length;
+        if leaves_a_sliver { 0.5 * left } else { length }
+    }
+
+    /// The highest level whose steps are not longer.
+    fn level_of(&self, step: Step) -> i32 {
+        ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
+    }
+
+    fn relative(&self, error: Norms, size: Norms) -> f64 {
+        let share = |error: f64, largest: f64| if error > 0.0 { error / largest } else { 0.0 };
+        let velocity = share(error.velocity, self.pace.velocity.max(size.velocity));
+        velocity.hypot(share(error.stress, self.pace.stress.max(size.stress)))
+    }
+
+    /// The level whose steps would have an error within the tolerance: it falls with the square of the length.
+    fn fitting(&self, step: Step, error: f64) -> i32 {
+        let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
+        let level = (length / self.settings.first).log2().floor();
+        if level.is_finite() { (level as i32).min(self.level_of(step) - 1) } else { self.level_of(step) - 1 }
+    }
+
+    fn reject(&mut self, step: Step, level: i32) {
+        self.pace.rejected += 1;
+        self.pace.taken = 0;
+        self.pace.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
+    }
+
+    /// Goes a level up where twice the length would do, after some steps at this one.
+    fn grow(&mut self, step: Step, error: f64) {
+        let level = self.level_of(step).clamp(self.lowest, self.highest);
+        if step.length < 0.999_999 * self.length(self.pace.level) {
+            // Cut to a time to land on, or on the way up again after that.
+            return;
+        }
+        self.pace.taken += 1;
+        let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
+        if self.pace.taken >= PATIENCE && length >= 2.0 * step.length && level < self.highest {
+            self.pace.level = level + 1;
+            self.pace.taken = 0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adaptive() -> Adaptive {
+        Adaptive::new(AdaptiveSettings { tolerance: 1e-2, first: 0.01, smallest: 0.001, largest: 0.1 })
+    }
+
+    fn step(length: f64) -> Step {
+        Step { time: 1.0, length, previous_length: length }
+    }
+
+    #[test]
+    fn the_ladder_stays_within_its_bounds() {
+        let adaptive = adaptive();
+        assert_eq!((adaptive.lowest, adaptive.highest), (-3, 3));
+        assert!((adaptive.length(-3) - 0.00125).abs() < 1e-17 && (adaptive.length(3) - 0.08).abs() < 1e-16);
+    }
+
+    #[test]
+    fn small_errors_let_steps_double_after_some_patience() {
+        let mut adaptive = adaptive();
+        adaptive.grow(step(0.01), 1e-3);
+        assert_eq!(adaptive.pace.level, 0, "patience");
+        adaptive.grow(step(0.01), 1e-3);
+        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 0));
+        adaptive.grow(step(0.02), 5e-3);
+        adaptive.grow(step(0.02), 5e-3);
+        assert_eq!(adaptive.pace.level, 1, "no room for twice the length");
+        adaptive.grow(step(0.015), 1e-9);
+        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 2), "a cut step says nothing");
+    }
+
+    #[test]
+    fn a_rejected_step_is_tried_again_as_short_as_its_error_asks_for() {
+        let mut adaptive = adaptive();
+        let level = adaptive.fitting(step(0.01), 0.05);
+        assert_eq!(level, -2, "0.01 x 0.9 / sqrt 5 = 0.004");
+        adaptive.reject(step(0.01), level);
+        assert_eq!((adaptive.pace.level, adaptive.pace.rejected), (-2, 1));
+        assert_eq!(adaptive.fitting(step(0.01), f64::NAN), -1);
+    }
+}

@@ -1,0 +1,146 @@
+//! The choice of the time scheme.
+
+use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
+use crate::{
+    body::Body,
+    effect::{Energy, Step},
+    error::Result,
+    petsc::DistributedVector,
+    session::Session,
+    state::State,
+};
+
+/// How a step is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scheme {
+    /// Elastic and viscoplastic stress lag by a step, as in Wang and Cheng (2022).
+    LaggedEuler,
+    /// Every stress at the end of the step.
+    ImplicitEuler,
+    /// Every stress at the end of the step, second order.
+    Bdf2,
+}
+
+impl Scheme {
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LaggedEuler => "lagged_euler",
+            Self::ImplicitEuler => "implicit_euler",
+            Self::Bdf2 => "bdf2",
+        }
+    }
+
+    /// Whether elastic and viscoplastic stress are those at the end of the step.
+    pub fn is_implicit(self) -> bool {
+        self != Self::LaggedEuler
+    }
+
+    /// Whether a step starts from the last two states.
+    pub fn is_two_step(self) -> bool {
+        self == Self::Bdf2
+    }
+}
+
+/// A scheme with what it keeps from one part of a step to the next.
+pub(super) enum Method {
+    LaggedEuler(LaggedEuler),
+    Implicit(Box<Implicit>),
+}
+
+impl Method {
+    pub fn new(scheme: Scheme, state: &State) -> Result<Self> {
+        let implicit = |formula| Ok(Self::Implicit(Box::new(Implicit::new(state, formula)?)));
+        match scheme {
+            Scheme::LaggedEuler => Ok(Self::LaggedEuler(LaggedEuler::default())),
+            Scheme::ImplicitEuler => implicit(implicit_euler::blend),
+            Scheme::Bdf2 => implicit(bdf2::blend),
+        }
+    }
+
+    /// The length for which the matrix of a step is assembled.
+    pub fn matrix_length(&self, step: Step) -> f64 {
+        match self {
+            Self::LaggedEuler(_) => step.length,
+            Self::Implicit(scheme) => scheme.matrix_length(step),
+        }
+    }
+
+    /// Takes in what the step starts from, and adds what is known of its forces to `forces` (with ghosts).
+    pub fn start<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        forces: &mut [f64],
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(scheme) => scheme.start(body, state, step, forces),
+            Self::Implicit(scheme) => scheme.start(body, state, step, forces),
+        }
+    }
+
+    /// Tells contacts that are prepared for the step where it starts.
+    pub fn prepare_contacts<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => Ok(()),
+            Self::Implicit(scheme) => scheme.prepare_contacts(body, state),
+        }
+    }
+
+    /// Where the displacement starts, for cells that flow at the end of the step.
+    pub fn flow_start(&self) -> Option<FlowStart<'_>> {
+        match self {
+            Self::LaggedEuler(_) => None,
+            Self::Implicit(scheme) => Some(scheme.flow_start()),
+        }
+    }
+
+    /// The least residual norm in N that means something. Collective.
+    pub fn rounding(&self, session: &Session) -> f64 {
+        match self {
+            Self::LaggedEuler(_) => 0.0,
+            Self::Implicit(scheme) => scheme.rounding(session),
+        }
+    }
+
+    /// Does what is left to do for a solved step before it is committed. Collective.
+    pub fn finish<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        solved: &DistributedVector,
+        step: Step,
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => Ok(()),
+            Self::Implicit(scheme) => scheme.finish(body, state, solved, step),
+        }
+    }
+
+    /// Takes the solved velocity over into the state. Collective.
+    pub fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => state.commit(solved, step.time, step.length),
+            Self::Implicit(scheme) => scheme.commit(state, solved, step),
+        }
+    }
+
+    /// Energies of the step just committed, over all ranks, without the work of the loads. Collective.
+    pub fn energy<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<Energy> {
+        match self {
+            Self::LaggedEuler(scheme) => scheme.energy(session, body, state, step),
+            Self::Implicit(scheme) => scheme.energy(session, body, state, step),
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! A step as all schemes take it: right-hand side, contact, solution, commit, energy balance.
+
+use super::{
+    adaptive::Norms,
+    linear_solver::{Preconditioner, SolverSettings},
+    scheme::{Method, Scheme},
+    step_solver::{Known, StepSolver},
+};
+use crate::{
+    body::Body,
+    effect::{Energy, Form, PointCount, Step},
+    error::Result,
+    petsc::{DistributedVector, Stage},
+    session::Session,
+    state::State,
+};
+use std::time::{Duration, Instant};
+
+/// What a step cost and how well it was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepOutcome {
+    /// Newton iterations; 0 where a step is linear.
+    pub newton_iterations: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Contact points that changed their branch, over all ranks.
+    pub active_changes: usize,
+    /// Contact points by what happens there, over all ranks.
+    pub points: PointCount,
+    /// Linear systems that were not positive definite, so that GMRES had to solve them.
+    pub indefinite_solves: usize,
+    /// Largest scaled distance to the contact graphs.
+    pub inclusion_residual: f64,
+    /// Energies of the step, over all ranks.
+    pub energy: Energy,
+}
+
+/// Seconds spent by phase.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepClock {
+    /// Explicit stress, history and forces.
+    pub history: Duration,
+    /// Newton and linear solves.
+    pub solve: Duration,
+    /// Energy balance and certificates of the step.
+    pub balance: Duration,
+    /// Matrix assembly and preconditioner, whenever the step length changes.
+    pub assembly: Duration,
+    /// The part of `assembly` before the first step.
+    pub first_assembly: Duration,
+}
+
+/// Stages of PETSc's `-log_view`.
+struct Stages {
+    assembly: Stage,
+    history: Stage,
+    solve: Stage,
+    balance: Stage,
+}
+
+impl Stages {
+    fn register() -> Result<Self> {
+        Ok(Self {
+            assembly: Stage::register("assembly")?,
+            history: Stage::register("history")?,
+            solve: Stage::register("solve")?,
+            balance: Stage::register("balance")?,
+        })
+    }
+}
+
+/// A time scheme with its solver and work vectors.
+pub struct Stepper {
+    scheme: Scheme,
+    method: Method,
+    stages: Stages,
+    solver: StepSolver,
+    load: Option<DistributedVector>,
+    load_is_current: bool,
+    right_hand_side: DistributedVector,
+    trial: DistributedVector,
+    /// Matrices that were assembled, each with its preconditioner.
+    pub set_ups: u64,
+    /// Seconds by phase.
+    pub clock: StepClock,
+}
+
+impl Stepper {
+    /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        scheme: Scheme,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        Ok(Self {
+            scheme,
+            method: Method::new(scheme, state)?,
+            stages: Stages::register()?,
+            solver: StepSolver::new(session, body, state, settings)?,
+            load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
+            load_is_current: false,
+            right_hand_side: state.velocity.like()?,
+            trial: state.velocity.like()?,
+            set_ups: 0,
+            clock: StepClock::default(),
+        })
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Whether steps are solved by Newton's method.
+    pub fn is_nonlinear(&self) -> bool {
+        self.solver.is_nonlinear()
+    }
+
+    /// Whether a vector of nodal loads exists.
+    pub fn has_load(&self) -> bool {
+        self.load.is_some()
+    }
+
+    /// The preconditioner in use.
+    pub fn preconditioner(&self) -> Preconditioner {
+        self.solver.preconditioner()
+    }
+
+    /// Assembles the matrix for a first step of this length. Collective.
+    pub fn prepare_length<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        length: f64,
+    ) -> Result<()> {
+        self.prepare_matrix(session, body, length)
+    }
+
+    /// Assembles the matrix of this length, if the last one was of another. Collective.
+    fn prepare_matrix<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        length: f64,
+    ) -> Result<()> {
+        if self.solver.is_prepared_for(length) {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let _stage = self.stages.assembly.enter()?;
+        self.solver.prepare(session, body, length, &self.right_hand_side)?;
+        self.set_ups += 1;
+        self.clock.assembly += start.elapsed();
+        if self.clock.first_assembly.is_zero() {
+            self.clock.first_assembly = self.clock.assembly;
+        }
+        Ok(())
+    }
+
+    /// `y = K x` with the matrix in use, which must be assembled. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.solver.multiply(x, y)
+    }
+
+    /// Applies the preconditioner of the matrix in use. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.solver.precondition(r, z)
+    }
+
+    /// Takes a step and commits it; on failure the state stays as it was. Collective.
+    pub fn advance<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        let mut outcome = self.attempt(session, body, state, step)?;
+        self.accept(session, body, state, step, &mut outcome)?;
+        Ok(outcome)
+    }
+
+    /// Solves a step and leaves the state as it was: another attempt may follow. Collective.
+    pub fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        self.prepare_matrix(session, body, self.method.matrix_length(step))?;
+        let start = Instant::now();
+        let stage = self.stages.history.enter()?;
+        self.write_right_hand_side(session, body, state, step)?;
+        self.extrapolate(state, step)?;
+        session.agree(prepare_contacts(body, state, step))?;
+        self.method.prepare_contacts(body, state)?;
+        drop(stage);
+        let solving = Instant::now();
+        self.clock.history += solving - start;
+        let stage = self.stages.solve.enter()?;
+        let known = Known {
+            forces: &self.right_hand_side,
+            rounding: self.method.rounding(session),
+            start: self.method.flow_start(),
+        };
+        let outcome = self.solver.solve(session, body, state, step, known, &mut self.trial);
+        drop(stage);
+        self.clock.solve += solving.elapsed();
+        outcome
+    }
+
+    /// Commits the step that was attempted last, and completes its outcome. Collective.
+    pub fn accept<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+        outcome: &mut StepOutcome,
+    ) -> Result<()> {
+        let solving = Instant::now();
+        let stage = self.stages.solve.enter()?;
+        self.method.finish(body, state, &self.trial, step)?;
+        self.method.commit(state, &self.trial, step)?;
+        commit_tractions(body, state)?;
+        body.commit();
+        drop(stage);
+        let balancing = Instant::now();
+        self.clock.solve += balancing - solving;
+        let _stage = self.stages.balance.enter()?;
+        outcome.energy = self.method.energy(session, body, state, step)?;
+        if let Some(load) = &self.load {
+            outcome.energy.work = step.length * load.dot(&state.velocity)?;
+        }
+        self.clock.balance += balancing.elapsed();
+        Ok(())
+    }
+
+    /// The error of the step that was attempted last, and the sizes that it has to be compared with. Collective.
+    pub fn error<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<[Norms; 2]> {
+        self.trial.update_ghosts()?;
+        let trial = self.trial.local()?;
+        let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
+        let is_second = step.previous_length > 0.0;
+        let ratio = if is_second { step.length / step.previous_length } else { 0.0 };
+        let share = if is_second { ratio / (1.0 + ratio) } else { 0.5 };
+        let values = trial.iter().zip(now.iter().zip(before.iter()));
+        let curved: Vec<f64> = values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))).collect();
+        // Displacements, and stresses with them, are one order better in the formula of second order.
+        let (strained, length) = if self.scheme.is_two_step() && is_second {
+            (curved.clone(), self.method.matrix_length(step))
+        } else {
+            (values.map(|(t, (v, _))| 0.5 * (t - v)).collect(), step.length)
+        };
+        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
+        let square = |form: Option<Form>, x: &[f64]| {
+            let Some(form) = form else { return 0.0 };
+            let mut forces = vec![0.0; x.len()];
+            body.add_form(form, x, &mut forces);
+            forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
+        };
+        let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
+        let mine = [
+            square(form, &curved),
+            square(elastic, &strained),
+            square(form, &trial),
+            square(elastic, &trial),
+        ];
+        let [velocity, stress, all_velocity, all_stress] =
+            session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
+        Ok([
+            Norms { velocity, stress: length * stress },
+            Norms { velocity: all_velocity, stress: step.length * all_stress },
+        ])
+    }
+
+    /// Loads and what the scheme knows of the other forces, zero at held components.
+    fn write_right_hand_side<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if let Some(load) = &mut self.load
+            && !self.load_is_current
+        {
+            session.agree(body.write_loads(step.time, load))?;
+            self.load_is_current = body.load.is_steady();
+        }
+        {
+            let mut forces = self.right_hand_side.local_mut()?;
+            forces.fill(0.0);
+            self.method.start(body, state, step, &mut forces)?;
+        }
+        self.right_hand_side.add_ghosts_to_owners()?;
+        if let Some(load) = &self.load {
+            self.right_hand_side.add_scaled(1.0, load)?;
+        }
+        let mut values = self.right_hand_side.owned_mut()?;
+        values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+        Ok(())
+    }
+
+    /// Starts from the velocity extrapolated linearly in time.
+    fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
+        self.trial.copy_from(&state.velocity)?;
+        if step.previous_length > 0.0 && state.step > 1 {
+            let ratio = step.length / step.previous_length;
+            self.trial.add_scaled(ratio, &state.velocity)?;
+            self.trial.add_scaled(-ratio, &state.previous_velocity)?;
+        }
+        Ok(())
+    }
+}
+
+/// Adds what contact released in a committed step.
+pub(super) fn released_by_contact<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+    step: Step,
+    energy: &mut Energy,
+) -> Result<()> {
+    let velocity = state.velocity.local()?;
+    for contact in &body.contacts {
+        let [given, numerical] = contact.release(&velocity, step.length);
+        energy.contact += given;
+        energy.numerical += numerical;
+    }
+    Ok(())
+}
+
+/// Takes in what the step brings to the points of all contacts.
+fn prepare_contacts<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+    step: Step,
+) -> Result<()> {
+    if body.contacts.is_empty() {
+        return Ok(());
+    }
+    let displacement = state.displacement.local()?;
+    for contact in &mut body.contacts {
+        contact.prepare(step.time, step.length, &displacement)?;
+    }
+    if let Some(traction) = &state.contact_traction {
+        let traction = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+    }
+    Ok(())
+}
+
+/// Puts the pressures of the step just taken into the state.
+fn commit_tractions<const D: usize, const S: usize>(body: &Body<D, S>, state: &mut State) -> Result<()> {
+    let Some(traction) = &mut state.contact_traction else { return Ok(()) };
+    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
+    traction.fill(0.0);
+    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! Steps chosen by their error.
+
+use crate::{case::Case, hdf5_file::NumberFile, results::Results};
+
+const FIRST: f64 = 0.0009765625;
+
+fn adaptive(n: usize, scheme: &str, tolerance: f64) -> Case {
+    Case::square(n)
+        .set("time.scheme", &format!("'{scheme}'"))
+        .set("time.step", &format!("{FIRST}"))
+        .set(
+            "time.adaptive",
+            &format!("{{ tolerance = {tolerance}, smallest_step = 3e-6, largest_step = 0.0625 }}"),
+        )
+        .set("output.fields", "{ every = 100000 }")
+}
+
+fn lengths(results: &Results) -> Vec<f64> {
+    results.table("history.csv").numbers("dt")
+}
+
+#[test]
+fn steps_come_from_a_ladder_grow_with_the_motion_and_end_where_they_should() {
+    for scheme in ["implicit_euler", "bdf2"] {
+        let case = adaptive(8, scheme, 0.02);
+        let results = case.run(2);
+        let lengths = lengths(&results);
+        let last = lengths.len() - 2;
+        for length in &lengths[..last] {
+            let level = (length / FIRST).log2();
+            assert_eq!(level, level.round(), "{scheme}: {length}");
+        }
+        assert!(lengths[0] < 0.25 * FIRST && lengths[last - 1] > 16.0 * FIRST, "{scheme}: {lengths:?}");
+        assert!(lengths.windows(2).all(|pair| pair[1] <= 2.000_01 * pair[0]), "{scheme}: {lengths:?}");
+        assert!(lengths.len() < 150, "{scheme}: {} steps", lengths.len());
+        assert_eq!(results.number("time"), 1.0);
+        assert_eq!(results.number("steps") as usize, lengths.len());
+        assert!(results.number("rejected_steps") > 0.0);
+        assert!(results.number("set_ups") < 0.6 * lengths.len() as f64, "{scheme}: matrices are reused");
+        assert!(results.number("max_energy_imbalance") < 1e-9);
+    }
+}
+
+#[test]
+fn a_tighter_tolerance_gives_a_smaller_error() {
+    let velocity = |tolerance: f64| {
+        let case = adaptive(8, "bdf2", tolerance);
+        case.run(1).table("probes.csv").only("probe", "tip").numbers("velocity_y")
+    };
+    let ends = [0.1, 0.01, 1e-4].map(|tolerance| *velocity(tolerance).last().expect("a step"));
+    let errors = [ends[0] - ends[2], ends[1] - ends[2]].map(f64::abs);
+    assert!(errors[1] < 0.5 * errors[0], "{errors:?}");
+    assert!(errors[1] < 3e-3 * ends[2].abs(), "{errors:?}");
+}
+
+#[test]
+fn steps_land_on_output_times() {
+    let case = adaptive(6, "bdf2", 0.05).set("output.fields", "{ interval = 0.3 }");
+    let results = case.run(2);
+    let times = NumberFile::open(&results.path("fields.vtkhdf")).times();
+    assert_eq!(times.len(), 5);
+    for (time, expected) in times.iter().zip([0.0, 0.3, 0.6, 0.9, 1.0]) {
+        assert!((time - expected).abs() < 1e-12, "{times:?}");
+    }
+}
+
+#[test]
+fn steps_that_are_taken_back_leave_nothing_behind() {
+    let hasty = adaptive(8, "bdf2", 0.02);
+    let results = hasty.run(1);
+    assert!(results.number("rejected_steps") > 0.0);
+    let first = lengths(&results)[0];
+    let careful = adaptive(8, "bdf2", 0.02).set("time.step", &format!("{first}"));
+    let other = careful.run(1);
+    assert!(other.number("rejected_steps") < results.number("rejected_steps"));
+    for name in ["probes.csv", "history.csv"] {
+        assert_eq!(results.text(name), other.text(name), "{name}");
+    }
+}
+
+#[test]
+fn an_adaptive_run_that_goes_on_is_the_straight_run_to_the_last_bit() {
+    for ranks in [1, 3] {
+        let case = adaptive(6, "bdf2", 0.05).set("checkpoint.every", "10").set("checkpoint.keep", "20");
+        let straight = case.run(ranks);
+        let before = ["probes.csv", "history.csv"].map(|name| straight.text(name));
+        let rejected = straight.number("rejected_steps");
+        let file = straight.path("checkpoint-20.h5").display().to_string();
+        case.run_with(ranks, &["--restart", &file]).expect(0).says("(step 20");
+        let results = case.results();
+        assert_eq!(before, ["probes.csv", "history.csv"].map(|name| results.text(name)), "{ranks} ranks");
+        assert_eq!(results.number("rejected_steps"), rejected);
+    }
+}
+
+#[test]
+fn a_step_that_cant_be_solved_at_the_smallest_length_ends_the_run() {
+    let case = adaptive(6, "bdf2", 0.05).set("solver.inclusion_tolerance", "1e-30");
+    let outcome = case.run_with(1, &[]).expect(1);
+    outcome.says("failed");
+    assert_eq!(case.results().summary()["status"], "failed");
+}

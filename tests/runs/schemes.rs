@@ -1,0 +1,92 @@
+//! Time schemes in whole runs.
+
+use crate::{case::Case, results::relative_difference};
+
+const IMPLICIT: [&str; 2] = ["implicit_euler", "bdf2"];
+
+fn under(case: Case, scheme: &str) -> Case {
+    case.set("time.scheme", &format!("'{scheme}'"))
+}
+
+/// An elastic body of the paper with a thousand times its largest stable step.
+fn enormous(scheme: &str) -> Case {
+    under(Case::square(8), scheme)
+        .without("material.viscoplasticity")
+        .set("time.step", "120.8")
+        .set("time.end", "2416.0")
+}
+
+#[test]
+fn implicit_schemes_find_the_rest_position_in_steps_a_thousand_times_beyond_the_explicit_bound() {
+    let ends = IMPLICIT.map(|scheme| {
+        let case = enormous(scheme);
+        let results = case.run(1);
+        assert!(results.summary()["certificates"]["explicit_step_bound"].is_null());
+        assert!(results.table("history.csv").last("kinetic_energy") < 1e-12, "{scheme} comes to rest");
+        results.table("probes.csv").last("displacement_y")
+    });
+    assert!((ends[0] / ends[1] - 1.0).abs() < 1e-6, "{ends:?}");
+    let explicit = enormous("lagged_euler").set("solver.accept", "['explicit_stability']");
+    let outcome = explicit.run_with(1, &[]);
+    let blown =
+        outcome.code != 0 || explicit.results().table("history.csv").last("kinetic_energy").abs() > 1e6;
+    assert!(blown, "the lagged scheme blows up");
+}
+
+#[test]
+fn the_schemes_agree_as_steps_shrink_and_the_second_order_is_closer() {
+    let velocity = |scheme: &str, step: &str| {
+        let case = under(Case::square(8), scheme).set("time.step", step);
+        case.run(1).table("probes.csv").last("velocity_y")
+    };
+    let exact = velocity("bdf2", "0.0009765625");
+    let off = |scheme: &str| (velocity(scheme, "0.015625") / exact - 1.0).abs();
+    let [lagged, euler, second] = ["lagged_euler", "implicit_euler", "bdf2"].map(off);
+    assert!(lagged < 0.01 && euler < 0.01, "{lagged} {euler}");
+    assert!(second < 0.5 * lagged && second < 0.1 * euler, "{second} beside {lagged} and {euler}");
+}
+
+#[test]
+fn stress_that_relaxes_at_once_stays_on_the_yield_surface() {
+    for (hypothesis, pull) in [("plane_stress", 6.0), ("plane_strain", 6.6)] {
+        let law = "{ perzyna = { relaxation = 1e-9, yield_stress = 19, metric = 'frobenius' } }";
+        let case = under(Case::square(6), "implicit_euler")
+            .set("material.hypothesis", &format!("'{hypothesis}'"))
+            .set("material.viscoplasticity", law)
+            .set("traction.0.value", &format!("[0, -{pull}]"));
+        let results = case.run(2);
+        // The total stress holds the viscous one, too, which is small at the end.
+        let norm = results.number("max_von_mises");
+        assert!(norm < 19.5, "{hypothesis}: {norm}");
+        assert!(results.table("history.csv").last("viscoplastic_dissipation") > 0.0, "{hypothesis}");
+        assert!(results.number("max_energy_imbalance") < 1e-10);
+        let iterations = results.number("newton_iterations");
+        assert!(iterations < 12.0 * 16.0, "{hypothesis}: {iterations} Newton iterations");
+    }
+}
+
+#[test]
+fn what_a_scheme_does_not_need_is_not_there() {
+    for scheme in IMPLICIT {
+        let elastic = under(Case::square(6), scheme).without("material.viscoplasticity").without("contact");
+        let summary = elastic.run(1).summary();
+        assert_eq!(summary["inventory"]["newton"], false, "a linear step");
+        assert_eq!(summary["inventory"]["history_bytes"], serde_json::json!({}));
+        assert_eq!(summary["newton_iterations"], 0);
+        let flowing = under(Case::square(6), scheme).run(1).summary();
+        let histories = flowing["inventory"]["history_bytes"].as_object().expect("an object").len();
+        assert_eq!(histories, if scheme == "bdf2" { 2 } else { 1 });
+        assert_eq!(flowing["scheme"], scheme);
+    }
+}
+
+#[test]
+fn a_law_that_never_flows_gives_the_elastic_body_under_each_scheme() {
+    for scheme in IMPLICIT {
+        let law = "{ perzyna = { relaxation = 1000, yield_stress = 1e30 } }";
+        let of = |case: Case| case.run(1).table("probes.csv").numbers("velocity_y");
+        let plain = of(under(Case::square(6), scheme).without("material.viscoplasticity"));
+        let idle = of(under(Case::square(6), scheme).set("material.viscoplasticity", law));
+        assert!(relative_difference(&plain, &idle) < 1e-8, "{scheme}");
+    }
+}
