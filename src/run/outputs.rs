@@ -2,16 +2,17 @@
 
 use crate::{
     body::Body,
-    error::{Error, Result},
+    error::Result,
     job::{Every, Job},
     output::{
         checkpoint::{self, Identity},
-        checkpoint_folder::{checkpoint_path, list, prune},
+        checkpoint_folder::{checkpoint_path, prune},
         field_output::FieldOutput,
         history::{History, Totals},
         log::Log,
         probes::Probes,
         profiles::Profiles,
+        whole_file::write_whole,
     },
     session::Session,
     state::State,
@@ -130,7 +131,7 @@ impl<const D: usize> Outputs<D> {
         state: &State,
     ) -> Result<()> {
         let start = Instant::now();
-        if self.fields.last_time().is_none_or(|time| time < state.time) {
+        if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
         }
         session.agree(self.flush())?;
@@ -192,7 +193,7 @@ fn history_and_tables<const D: usize>(
     profiles: &mut Profiles<D>,
 ) -> Result<History> {
     let effective = folder.join("job.toml");
-    std::fs::write(&effective, job.to_toml()?).map_err(|e| Error::unwritable(&effective, e))?;
+    write_whole(&effective, &job.to_toml()?)?;
     if !probes.is_empty() {
         probes.open(folder, step)?;
     }
@@ -214,16 +215,4 @@ fn profiles<const D: usize, const S: usize>(
         .map(|p| (p.on.clone(), job.contact.iter().position(|c| c.on.contains(&p.on))))
         .collect();
     Profiles::new(session, body, &along)
-}
-
-/// Makes the output folder; a new start removes the checkpoints of an earlier run. On one rank.
-pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
-    if !goes_on {
-        for (_, path) in list(folder)? {
-            std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
-            log.line(format!("removed {} of an earlier run", path.display()));
-        }
-    }
-    Ok(())
 }
