@@ -31,7 +31,9 @@ fn kill(case: &Case, running: &mut Running, moment: Moment, whole: Duration, ran
         Moment::Saving => {
             let step = 1 + random.below(16);
             let part = case.folder().join(format!("out/checkpoint-{step}.h5.part"));
-            while !part.exists() && began.elapsed() < 3 * whole && running.goes_on() {}
+            while !part.exists() && began.elapsed() < 3 * whole && running.goes_on() {
+                std::thread::sleep(Duration::from_micros(200));
+            }
             std::thread::sleep(Duration::from_micros(random.below(4000)));
         }
     }
@@ -43,39 +45,43 @@ fn half_written(folder: &Path) -> bool {
     names.iter().any(|name| name.ends_with(".h5.part"))
 }
 
+/// What became of the kills.
+type Counts = BTreeMap<&'static str, usize>;
+
+/// Starts a run, or goes on, and kills it; whether it was still there.
+fn run_and_kill(case: &Case, whole: Duration, random: &mut Random, counts: &mut Counts) -> bool {
+    let moment = if random.below(3) == 0 { Moment::Any } else { Moment::Saving };
+    let out = case.folder().join("out");
+    let saved = || out.exists() && !case.results().checkpoints().is_empty();
+    let mut running = case.start_with(RANKS, if saved() { &["--restart"] } else { &[] });
+    let killed = kill(case, &mut running, moment, whole, random);
+    let outcome = running.wait();
+    if killed {
+        assert!(outcome.code != 0 || case.results().summary()["status"] == "completed");
+        *counts.entry("kills").or_default() += 1;
+        *counts.entry("while a checkpoint was written").or_default() += usize::from(half_written(&out));
+        *counts.entry("before the first checkpoint").or_default() += usize::from(!saved());
+    }
+    killed
+}
+
 #[test]
 fn a_run_killed_at_any_moment_goes_on_to_the_same_result() {
     let began = Instant::now();
     let (straight, _kept) = undisturbed();
     let whole = began.elapsed();
-    let mut random = Random(2026);
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    let mut count = |what: &'static str, so: bool| *counts.entry(what).or_default() += usize::from(so);
-    let wanted = trials(6, 200);
+    let (mut random, mut counts) = (Random(2026), Counts::new());
+    let wanted = trials(4, 200);
     let mut kills = 0;
     while kills < wanted {
         let case = saving();
-        // Up to three kills in a row: the first run, then runs that go on.
-        for _ in 0..=random.below(3) {
-            let moment = if random.below(3) == 0 { Moment::Any } else { Moment::Saving };
-            let out = case.folder().join("out");
-            let saved = out.exists() && !case.results().checkpoints().is_empty();
-            let mut running = case.start_with(RANKS, if saved { &["--restart"] } else { &[] });
-            let killed = kill(&case, &mut running, moment, whole, &mut random);
-            let outcome = running.wait();
-            if !killed {
-                count("came too late", true);
-                continue;
-            }
-            kills += 1;
-            assert!(outcome.code != 0 || case.results().summary()["status"] == "completed");
-            count("kills", true);
-            count("while a checkpoint was written", half_written(&out));
-            count("before the first checkpoint", !out.exists() || case.results().checkpoints().is_empty());
+        // Kills in a row: the first run, then runs that go on.
+        for _ in 0..=random.below(trials(3, 8) as u64) {
+            kills += usize::from(run_and_kill(&case, whole, &mut random, &mut counts));
         }
         let put_aside = finish(&case, &straight, &format!("after {kills} kills"));
-        count("runs that went on", true);
-        count("field files put aside", put_aside);
+        *counts.entry("runs that went on").or_default() += 1;
+        *counts.entry("field files put aside").or_default() += usize::from(put_aside);
+        println!("{counts:?}");
     }
-    println!("{counts:?}");
 }

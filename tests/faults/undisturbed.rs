@@ -10,7 +10,7 @@ const STEPS: u64 = 16;
 
 /// A job that saves after each of its 16 steps and writes fields after each fourth; most of its time goes into files.
 pub fn saving() -> Case {
-    Case::square(24).set("checkpoint.every", "1").set("output.fields", "{every = 4}")
+    Case::square(16).set("checkpoint.every", "1").set("output.fields", "{every = 4}")
 }
 
 /// The same job where nothing happens.
