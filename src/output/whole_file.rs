@@ -27,7 +27,8 @@ mod tests {
         write_whole(&path, "second").expect("replaced");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "second");
         std::fs::create_dir_all(folder.path().join("taken/inside")).expect("folder");
-        let error = write_whole(&folder.path().join("taken"), "text").expect_err("a folder is there").to_string();
+        let error =
+            write_whole(&folder.path().join("taken"), "text").expect_err("a folder is there").to_string();
         assert!(error.contains("cannot write") && error.contains("taken"), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).expect("folder").count(), 2);
     }

@@ -27,7 +27,8 @@ pub(super) struct Deadline {
 impl Deadline {
     /// The limits of this job; a rank that Slurm told the end of the job tells the others. Collective.
     pub fn new(session: &Session, job: &Job, clock: Clock) -> Self {
-        let own = slurm_end(std::env::var(SLURM_END).ok().as_deref()).map_or(f64::INFINITY, |end| end - now());
+        let own =
+            slurm_end(std::env::var(SLURM_END).ok().as_deref()).map_or(f64::INFINITY, |end| end - now());
         let left = -session.largest([-own])[0];
         let checkpoint = job.checkpoint.as_ref();
         Self {

@@ -31,7 +31,9 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
         return refuse("the folder holds results of a job that can't be read any more (its job.toml)".into());
     };
     if !folder.join("run.log").exists() && there.to_toml()? != text {
-        return refuse("the folder holds a job.toml that no run has written, and that would be replaced".into());
+        return refuse(
+            "the folder holds a job.toml that no run has written, and that would be replaced".into(),
+        );
     }
     let mut differing = differing_keys(&there.physics()?, &job.physics()?);
     if there.about != job.about && !goes_on {
@@ -43,7 +45,10 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let more = differing.len().saturating_sub(SHOWN);
     differing.truncate(SHOWN);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    refuse(format!("the folder holds the results of another job; what differs: {}{more}", differing.join(", ")))
+    refuse(format!(
+        "the folder holds the results of another job; what differs: {}{more}",
+        differing.join(", ")
+    ))
 }
 
 /// Makes the output folder; a new start removes the checkpoints of an earlier run. On one rank.

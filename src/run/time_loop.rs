@@ -66,9 +66,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     };
     let wanted = Wanted { identity, probes, goes_on };
     let mut outputs = Outputs::open(session, job, wanted, &body, &state, &mut log)?;
-    if state.step == 0 {
-        outputs.at_start(session, &body, &state)?;
-    }
+    outputs.at_start(session, &body, &state)?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
     let deadline = Deadline::new(session, job, clock);

@@ -13,7 +13,11 @@ fn limited(case: &Case, blocks: usize, only: Option<usize>) -> Outcome {
     let mut command = Command::new("mpirun");
     command.args(["--oversubscribe", "--bind-to", "none"]);
     for rank in 0..RANKS {
-        let limit = if only.is_none_or(|only| only == rank) { format!("ulimit -f {blocks}; ") } else { String::new() };
+        let limit = if only.is_none_or(|only| only == rank) {
+            format!("ulimit -f {blocks}; ")
+        } else {
+            String::new()
+        };
         let script = format!("{limit}exec \"$0\" run \"$1\"");
         command.args(if rank == 0 { &["-n", "1"][..] } else { &[":", "-n", "1"] });
         command.args(["sh", "-c", &script, env!("CARGO_BIN_EXE_solver")]).arg(case.written());
@@ -78,7 +82,8 @@ const LAUNCH: &str = "mpirun --oversubscribe --bind-to none -n 2";
 #[test]
 fn a_full_disk_ends_the_run_and_with_more_room_it_goes_on_to_the_same_result() {
     let (straight, _kept) = undisturbed();
-    let all = ["60k", "200k", "300k", "350k", "450k", "500k", "550k", "600k", "700k", "800k", "900k", "1100k"];
+    let all =
+        ["60k", "200k", "300k", "350k", "450k", "500k", "550k", "600k", "700k", "800k", "900k", "1100k"];
     let sample = ["500k"];
     let tried = if trials(0, 1) == 1 { &all[..] } else { &sample };
     for size in tried {

@@ -34,7 +34,8 @@ fn a_job_nested_100_000_deep_is_refused_in_words() {
     let folder = tempfile::tempdir().expect("folder");
     let file = folder.path().join("deep.toml");
     let deep = 100_000;
-    let (dotted, lists) = (vec!["a"; deep].join("."), format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)));
+    let (dotted, lists) =
+        (vec!["a"; deep].join("."), format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)));
     let tables = format!("x = {}1{}", "{a=".repeat(deep), "}".repeat(deep));
     for text in [lists, tables, format!("{dotted} = 1"), format!("[{dotted}]"), format!("[[{dotted}]]")] {
         std::fs::write(&file, &text).expect("written");

@@ -10,7 +10,10 @@ fn small() -> Case {
 /// Everything in a folder, by name.
 fn contents(case: &Case) -> Vec<(String, Vec<u8>)> {
     let folder = case.folder().join("out");
-    names(&folder).into_iter().map(|name| (name.clone(), fs::read(folder.join(name)).expect("read"))).collect()
+    names(&folder)
+        .into_iter()
+        .map(|name| (name.clone(), fs::read(folder.join(name)).expect("read")))
+        .collect()
 }
 
 #[test]

@@ -45,7 +45,9 @@ fn a_run_saves_its_state_before_its_slurm_job_ends_whichever_rank_knows() {
         let end = now() + 8;
         let outcome = with_end(&case, &end.to_string(), knows).expect(3);
         assert!(now() <= end, "the Slurm job was over");
-        outcome.says("the Slurm job ends in").says("stopping on the end of the Slurm job; go on with --restart");
+        outcome
+            .says("the Slurm job ends in")
+            .says("stopping on the end of the Slurm job; go on with --restart");
         let results = case.results();
         let steps = results.checkpoints()[0];
         assert_eq!(results.summary()["status"], "stopped");

@@ -76,7 +76,8 @@ pub fn fail(name: &str) -> Exit {
         _ => Fault::Assembly,
     };
     let mut loaded = Job::from_text(JOB, "job.toml", Path::new("."), &[]).expect("a job");
-    let mesh = session.is_first().then(|| rectangle([1.0, 1.0], [8, 8], Diagonal::Right, [1.0; 2]).expect("mesh"));
+    let mesh =
+        session.is_first().then(|| rectangle([1.0, 1.0], [8, 8], Diagonal::Right, [1.0; 2]).expect("mesh"));
     let mut simulation = Simulation::<2, 3>::new(&session, &mut loaded, mesh).expect("set up");
     let here = session.rank() + 1 == session.ranks();
     simulation.body.effects.push(Box::new(Faulty { fault, here, calls: 0 }));
@@ -97,10 +98,12 @@ fn expect(fault: &str, code: i32, words: &str, steps: usize) {
     for ranks in [2, 3] {
         let folder = tempfile::tempdir().expect("folder");
         let output = mpirun::start(ranks, &format!("one_rank {fault}"), folder.path());
-        let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let said =
+            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert_eq!(output.status.code(), Some(code), "{fault} on {ranks} ranks\n{said}");
         assert!(said.contains(words), "{said}");
-        let told: Vec<&str> = said.lines().filter(|line| line.contains(&format!("after {steps} steps:"))).collect();
+        let told: Vec<&str> =
+            said.lines().filter(|line| line.contains(&format!("after {steps} steps:"))).collect();
         assert_eq!(told.len(), if code == 4 { 0 } else { ranks }, "{said}");
     }
 }
