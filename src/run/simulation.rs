@@ -16,8 +16,9 @@ use crate::{
     stepping::{LaggedEuler, StepOutcome},
 };
 
-/// A step that ends within this share of a step of the end ends there.
-pub(super) const SNAP: f64 = 1e-9;
+/// A step that ends within this share of a step of the end ends there: the rounding of 100 000 steps adds up to more than
+/// 1e-9 of one.
+pub(super) const SNAP: f64 = 1e-6;
 
 /// A body with its state and scheme, for programs that look at fields after each step.
 pub struct Simulation<const D: usize, const S: usize> {
