@@ -24,7 +24,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps build run test lint install clean
+.PHONY: help deps build run test hard lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
+	@echo 'make hard      what make test samples of faults, many times; random input; a Slurm of its own (an hour; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
 	@echo 'make clean     remove everything that was compiled'
@@ -52,6 +53,13 @@ run: deps
 
 test: deps
 	cargo test --release --locked
+
+# Kills, full disks, damaged files; then bytes for the readers; then Slurm, where root has one to start.
+hard: deps
+	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
+	fuzz/run.sh
+	cargo build --release --locked
+	tests/slurm/run.sh $(binary)
 
 lint: deps
 	cargo fmt --all --check

@@ -3,11 +3,12 @@
 use crate::{
     error::{Error, Exit, Result},
     job::{self, Job, Loaded},
-    output::inspect::inspect,
+    output::{inspect::inspect, parallel_file::given_up},
     run::{self, Clock, Start},
     session::{Mpi, Session},
 };
 use clap::{Args, Parser, Subcommand};
+use mpi::traits::CommunicatorCollectives;
 use std::{
     ffi::OsString,
     io::{IsTerminal, Write},
@@ -96,6 +97,9 @@ struct RunArguments {
     /// Go on from the newest good checkpoint of the output folder, or from this file.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
+    /// Start even where the output folder holds the results of another job, and overwrite them.
+    #[arg(long, conflicts_with = "restart")]
+    force: bool,
 }
 
 /// Runs the command line and gives the exit code.
@@ -211,6 +215,7 @@ fn print(text: &str) {
 
 fn run_job(arguments: &RunArguments) -> Result<Exit> {
     let from = match &arguments.restart {
+        None if arguments.force => Start::Over,
         None => Start::Anew,
         Some(None) => Start::Newest,
         Some(Some(file)) if is_job(file) => {
@@ -249,10 +254,15 @@ fn on_all_ranks(
     let colour = std::io::stderr().is_terminal();
     let loaded = session.agree(Job::load_coloured(job, overrides, colour));
     let result = loaded.and_then(|loaded| work(&session, loaded, clock));
-    Ok(result.unwrap_or_else(|error| {
+    let exit = result.unwrap_or_else(|error| {
         if !matches!(error, Error::Elsewhere { .. }) {
             print_error(&error);
         }
         error.exit()
-    }))
+    });
+    if exit != Exit::Done && given_up() {
+        session.world().barrier();
+        std::process::exit(i32::from(exit as u8));
+    }
+    Ok(exit)
 }

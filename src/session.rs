@@ -164,5 +164,8 @@ fn watch_signals() -> Result<Arc<AtomicUsize>> {
         signal_hook::flag::register_usize(number, Arc::clone(&seen), number.unsigned_abs() as usize)
             .map_err(|e| Error::Internal(format!("cannot watch {signal}: {e}")))?;
     }
+    // A write beyond the limit of a file's size is an error like that of a full disk, not the end of the process.
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
+        .map_err(|e| Error::Internal(format!("cannot watch SIGXFSZ: {e}")))?;
     Ok(seen)
 }

@@ -18,7 +18,7 @@ use crate::agreement::agree;
 use crate::error::{Error, Result};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
-use std::fs::{File, rename};
+use std::fs::{File, remove_file, rename};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -46,8 +46,8 @@ pub struct Table<'a> {
     pub values: &'a [f64],
 }
 
-/// Writes a checkpoint; an older file of this name stays whole until the new one is. Collective, with the same
-/// outcome on all ranks.
+/// Writes a checkpoint; an older file of this name stays whole until the new one is, and nothing is left of one that
+/// can't be written. Collective, with the same outcome on all ranks.
 pub fn write(
     path: &Path,
     communicator: &impl Communicator,
@@ -57,19 +57,34 @@ pub fn write(
 ) -> Result<()> {
     agree(communicator, check(path, sets, tables))?;
     let part = part_name(path);
-    let file = ParallelFile::create_behind(&part, seal::SEAL_BYTES, communicator)?;
+    let written = write_part(&part, communicator, header, sets, tables);
+    let finished = match (&written, communicator.rank()) {
+        (Ok(()), 0) => rename(&part, path)
+            .and_then(|()| File::open(folder_of(path))?.sync_all())
+            .map_err(|error| Error::unwritable(path, error)),
+        (Err(_), 0) => {
+            // On a full disk what could be written stands in the way of everything else; the file may still be open,
+            // so that removing it alone would not make room.
+            let _ = File::create(&part).and_then(|_| remove_file(&part));
+            Ok(())
+        }
+        _ => Ok(()),
+    };
+    written.and(agree(communicator, finished))
+}
+
+fn write_part(
+    part: &Path,
+    communicator: &impl Communicator,
+    header: &[u8],
+    sets: &[RowSet],
+    tables: &[Table],
+) -> Result<()> {
+    let file = ParallelFile::create_behind(part, seal::SEAL_BYTES, communicator)?;
     let written = write_content(&file, communicator, header, sets, tables);
     let closed = file.close();
     written.and(closed)?;
-    seal::seal(&part, communicator)?;
-    let renamed = if communicator.rank() == 0 {
-        rename(&part, path)
-            .and_then(|()| File::open(folder_of(path))?.sync_all())
-            .map_err(|error| Error::unwritable(path, error))
-    } else {
-        Ok(())
-    };
-    agree(communicator, renamed)
+    seal::seal(part, communicator)
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -27,12 +27,23 @@ pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
     Ok(found)
 }
 
-/// Removes all but the newest `keep` checkpoints. On one rank.
+/// Removes all but the newest `keep` checkpoints, and what runs that were killed left half-written. On one rank.
 pub fn prune(folder: &Path, keep: usize) -> Result<()> {
-    for (_, path) in list(folder)?.into_iter().skip(keep) {
+    let old = list(folder)?.into_iter().skip(keep).map(|(_, path)| path);
+    for path in old.chain(half_written(folder)?) {
         std::fs::remove_file(&path).map_err(|error| Error::unwritable(&path, error))?;
     }
     Ok(())
+}
+
+fn half_written(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unreadable = |error| Error::unreadable(folder, error);
+    let names = std::fs::read_dir(folder).map_err(unreadable)?.collect::<std::io::Result<Vec<_>>>();
+    let is_part = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str()?.strip_suffix(".part"));
+        name.and_then(step_of).is_some()
+    };
+    Ok(names.map_err(unreadable)?.into_iter().map(|entry| entry.path()).filter(is_part).collect())
 }
 
 fn step_of(name: &str) -> Option<u64> {
@@ -78,10 +89,18 @@ mod tests {
     }
 
     #[test]
-    fn pruning_keeps_the_newest() {
-        let folder = folder_with(&["checkpoint-1.h5", "checkpoint-2.h5", "checkpoint-10.h5", "job.toml"]);
+    fn pruning_keeps_the_newest_and_nothing_half_written() {
+        let folder = folder_with(&[
+            "checkpoint-1.h5",
+            "checkpoint-2.h5",
+            "checkpoint-10.h5",
+            "checkpoint-7.h5.part",
+            "job.toml",
+            "notes.part",
+        ]);
         prune(folder.path(), 2).expect("prune");
         assert_eq!(steps(folder.path()), [10, 2]);
-        assert!(folder.path().join("job.toml").exists());
+        assert!(!folder.path().join("checkpoint-7.h5.part").exists());
+        assert!(folder.path().join("job.toml").exists() && folder.path().join("notes.part").exists());
     }
 }

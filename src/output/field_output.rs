@@ -54,6 +54,11 @@ impl<const D: usize> FieldOutput<D> {
         }
     }
 
+    /// Whether writing failed before, so that no step can follow.
+    pub fn is_broken(&self) -> bool {
+        self.0.is_broken()
+    }
+
     /// The last time written, if any.
     pub fn last_time(&self) -> Option<f64> {
         self.0.times().last().copied()

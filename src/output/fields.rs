@@ -109,6 +109,11 @@ impl<const D: usize> FieldFile<D> {
         Ok(resumed)
     }
 
+    /// Whether writing failed before, so that no step can follow.
+    pub fn is_broken(&self) -> bool {
+        self.file.is_broken()
+    }
+
     /// Times of the steps in the file, in s.
     pub fn times(&self) -> &[f64] {
         &self.times

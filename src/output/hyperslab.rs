@@ -63,7 +63,8 @@ impl<'file, T: Element> Rows<'file, T> {
     /// Writes this rank's rows from row `first` on; `values` holds whole rows, one after the other.
     pub fn write(&self, first: u64, values: &[T]) -> Result<()> {
         let rows = values.len() / self.width.max(1);
-        self.agreed("write", self.fits(first, rows, values.len()))?;
+        let words = format!("write dataset {}", self.dataset.name());
+        self.file.agreed(&words, self.fits(first, rows, values.len()))?;
         self.transfer("write", rows, |offset, count, list| {
             let piece = &values[offset * self.width..(offset + count) * self.width];
             let (memory, file) = self.select(first + offset as u64, count)?;
@@ -151,7 +152,8 @@ impl<'file, T: Element> Rows<'file, T> {
     }
 
     fn agreed<R>(&self, doing: &str, result: hdf5::Result<R>) -> Result<R> {
-        self.file.agreed(&format!("{doing} dataset {}", self.dataset.name()), result)
+        let words = format!("{doing} dataset {}", self.dataset.name());
+        if doing == "read" { self.file.agreed(&words, result) } else { self.file.written(&words, result) }
     }
 }
 

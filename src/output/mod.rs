@@ -19,4 +19,5 @@ pub mod profiles;
 pub mod redistribution;
 pub mod seal;
 mod stacked_view;
+pub mod whole_file;
 mod xdmf;

@@ -6,19 +6,36 @@
 //!
 //! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
 //! open for writing, so that nobody could open the results of a process that died.
+//!
+//! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
+//! some ranks would fail again, and the others would wait for them for ever. As MPI closes all files of HDF5 when it ends,
+//! a process that gave a file up leaves without (see [`given_up`]).
 
 use super::hyperslab::{Element, Rows};
 use super::stacked_view;
 use crate::agreement::agree;
 use crate::error::{Error, Result};
-use hdf5::plist::dataset_create::AllocTime;
+use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::types::{FixedAscii, TypeDescriptor};
 use hdf5::{Extent, Location, Selection};
 use mpi::collective::SystemOperation;
 use mpi::raw::AsRaw;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives};
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What is most often wrong when a file can't be written.
+const ROOM: &str = "Is the disk full, or a limit reached (quota, ulimit -f)?";
+/// Whether this process gave a file up.
+static GIVEN_UP: AtomicBool = AtomicBool::new(false);
+
+/// Whether a file that could not be written is still open: then the process must end without `MPI_Finalize`. The same on all
+/// ranks that shared the file.
+pub fn given_up() -> bool {
+    GIVEN_UP.load(Ordering::Relaxed)
+}
 
 /// The longest text an attribute holds, in bytes.
 const LONGEST_TEXT: usize = 256;
@@ -26,6 +43,7 @@ const LONGEST_TEXT: usize = 256;
 /// An HDF5 file opened by all ranks of a communicator.
 pub struct ParallelFile {
     file: hdf5::File,
+    broken: Cell<bool>,
     pub(super) communicator: SimpleCommunicator,
     path: PathBuf,
     pub(super) transfer_bytes: usize,
@@ -69,7 +87,7 @@ impl ParallelFile {
     }
 
     fn new(file: hdf5::File, communicator: SimpleCommunicator, path: &Path) -> Self {
-        Self { file, communicator, path: path.into(), transfer_bytes: 1 << 30 }
+        Self { file, broken: Cell::new(false), communicator, path: path.into(), transfer_bytes: 1 << 30 }
     }
 
     /// Sets how many bytes a rank moves in one collective transfer at most (1 GiB unless told; a row is never
@@ -83,13 +101,21 @@ impl ParallelFile {
         &self.path
     }
 
-    /// Hands everything written so far to the operating system.
-    pub fn flush(&self) -> Result<()> {
-        self.agreed("flush", self.file.flush())
+    /// Whether writing failed before: then nothing more must be done with the file. The same on all ranks.
+    pub fn is_broken(&self) -> bool {
+        self.broken.get()
     }
 
-    /// Flushes and closes the file on all ranks.
+    /// Hands everything written so far to the operating system.
+    pub fn flush(&self) -> Result<()> {
+        self.written("flush", self.file.flush())
+    }
+
+    /// Flushes and closes the file on all ranks; one that could not be written is given up.
     pub fn close(self) -> Result<()> {
+        if self.is_broken() {
+            return Ok(());
+        }
         self.flush()?;
         let Self { file, communicator, path, .. } = self;
         agree(&communicator, file.close().map_err(|error| Error::unwritable(&path, error)))
@@ -104,7 +130,7 @@ impl ParallelFile {
 
     /// Makes a group; groups above it that are missing are made too.
     pub fn create_group(&self, name: &str) -> Result<()> {
-        self.agreed(&format!("make group {name}"), self.file.create_group(name).map(drop))
+        self.written(&format!("make group {name}"), self.file.create_group(name).map(drop))
     }
 
     /// Whether there is a group or dataset of this name (`/` apart).
@@ -126,16 +152,21 @@ impl ParallelFile {
 
     /// Removes a dataset or group from the file; its space is not given back.
     pub fn remove(&self, name: &str) -> Result<()> {
-        self.agreed(&format!("remove {name}"), self.file.unlink(name))
+        self.written(&format!("remove {name}"), self.file.unlink(name))
+    }
+
+    /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would leave the others waiting.
+    fn new_dataset<T: Element>(&self) -> hdf5::DatasetBuilderEmpty {
+        self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).fill_time(FillTime::Never)
     }
 
     /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
     pub fn create_rows<T: Element>(&self, name: &str, rows: u64, width: usize) -> Result<Rows<'_, T>> {
         let rows = rows as usize;
-        let empty = self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).no_chunk();
+        let empty = self.new_dataset::<T>().no_chunk();
         let made =
             if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
-        let dataset = self.agreed(&format!("make dataset {name}"), made)?;
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }
 
@@ -147,7 +178,7 @@ impl ParallelFile {
         width: usize,
         chunk_rows: usize,
     ) -> Result<Rows<'_, T>> {
-        let empty = self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early));
+        let empty = self.new_dataset::<T>();
         let growing = Extent { dim: 0, max: None };
         let made = if width == 1 {
             empty.chunk(chunk_rows).shape(growing).create(name)
@@ -155,7 +186,7 @@ impl ParallelFile {
             let fixed = Extent { dim: width, max: Some(width) };
             empty.chunk((chunk_rows, width)).shape((growing, fixed)).create(name)
         };
-        let dataset = self.agreed(&format!("make dataset {name}"), made)?;
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }
 
@@ -174,7 +205,7 @@ impl ParallelFile {
             .virtual_map(".", source, shape, whole.clone(), shape.0 * shape.1, whole)
             .shape(shape.0 * shape.1)
             .create(name);
-        self.agreed(&format!("make view {name}"), made).map(drop)
+        self.written(&format!("make view {name}"), made).map(drop)
     }
 
     /// Makes a dataset that shows the tables `{folder}/0`, `{folder}/1`, ... below each other without storing them
@@ -188,7 +219,7 @@ impl ParallelFile {
         columns: &[usize],
     ) -> Result<()> {
         let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
-        self.agreed(&format!("make view {name}"), made)
+        self.written(&format!("make view {name}"), made)
     }
 
     /// Opens a dataset of one or two dimensions.
@@ -214,7 +245,7 @@ impl ParallelFile {
             Ok(attribute) => attribute.write_scalar(&value),
             Err(_) => object.new_attr::<T>().create(name)?.write_scalar(&value),
         });
-        self.agreed(&format!("set attribute {name} of {object}"), done)
+        self.written(&format!("set attribute {name} of {object}"), done)
     }
 
     /// Adds an attribute that is a list of numbers.
@@ -222,7 +253,7 @@ impl ParallelFile {
         let done = self
             .object(object)
             .and_then(|object| object.new_attr::<T>().shape(values.len()).create(name)?.write_raw(values));
-        self.agreed(&format!("set attribute {name} of {object}"), done)
+        self.written(&format!("set attribute {name} of {object}"), done)
     }
 
     /// Adds an attribute that is a fixed-length ASCII text of at most 256 bytes.
@@ -232,7 +263,7 @@ impl ParallelFile {
             let kind = TypeDescriptor::FixedAscii(text.len().max(1));
             object.new_attr_builder().empty_as(&kind).create(name)?.write_scalar(&value)
         });
-        self.agreed(&format!("set attribute {name} of {object}"), done)
+        self.written(&format!("set attribute {name} of {object}"), done)
     }
 
     /// An attribute that is one number.
@@ -254,6 +285,22 @@ impl ParallelFile {
             Ok(group) => Ok((*group).clone()),
             Err(_) => self.file.dataset(name).map(|dataset| (**dataset).clone()),
         }
+    }
+
+    /// As `agreed`, of something that writes: after a failure the file is given up.
+    pub(super) fn written<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T> {
+        let outcome = self.agreed(doing, result);
+        outcome.map_err(|error| {
+            if !self.broken.replace(true) {
+                // One more reference, never given back, keeps HDF5 from closing the file.
+                std::mem::forget(self.file.clone());
+                GIVEN_UP.store(true, Ordering::Relaxed);
+            }
+            match error {
+                Error::Failed(words) => Error::Failed(format!("{words}. {ROOM}")),
+                other => other,
+            }
+        })
     }
 
     /// The same outcome on all ranks, with words about what was being done.

@@ -2,7 +2,9 @@
 
 mod build;
 mod check;
+mod deadline;
 mod estimate;
+mod folder;
 mod header;
 mod inventory;
 mod outputs;
@@ -39,10 +41,19 @@ pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_
 pub enum Start {
     /// The initial state.
     Anew,
+    /// The initial state, even over the results of another job.
+    Over,
     /// The newest good checkpoint of the output folder.
     Newest,
     /// This checkpoint.
     From(PathBuf),
+}
+
+impl Start {
+    /// Whether the run starts behind an earlier one.
+    fn goes_on(&self) -> bool {
+        matches!(self, Self::Newest | Self::From(_))
+    }
 }
 
 /// When the process began and how long MPI and PETSc took to start.

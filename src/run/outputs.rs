@@ -2,16 +2,17 @@
 
 use crate::{
     body::Body,
-    error::{Error, Result},
+    error::Result,
     job::{Every, Job},
     output::{
         checkpoint::{self, Identity},
-        checkpoint_folder::{checkpoint_path, list, prune},
+        checkpoint_folder::{checkpoint_path, prune},
         field_output::FieldOutput,
         history::{History, Totals},
         log::Log,
         probes::Probes,
         profiles::Profiles,
+        whole_file::write_whole,
     },
     session::Session,
     state::State,
@@ -61,17 +62,21 @@ impl<const D: usize> Outputs<D> {
         let folder = job.output_folder().to_owned();
         let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
+        let fields = FieldOutput::open(session, &folder, body, time, log)?;
+        // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
+        let every = job.output.fields;
+        let is_there = fields.last_time().is_some_and(|last| last >= state.time);
+        let profiles_after =
+            time.map(|time| if due(every, state) && !is_there { time.next_down() } else { time });
         let mut history = None;
         let opened = if session.is_first() {
-            history_and_tables(&folder, job, step, time, &mut probes, &mut profiles)
+            history_and_tables(&folder, job, step, profiles_after, &mut probes, &mut profiles)
                 .map(|h| history = Some(h))
         } else {
             Ok(())
         };
         session.agree(opened)?;
-        let fields = FieldOutput::open(session, &folder, body, time, log)?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
-        let every = job.output.fields;
         Ok(Self { folder, identity, history, probes, profiles, fields, every, keep, spent: start.elapsed() })
     }
 
@@ -93,33 +98,22 @@ impl<const D: usize> Outputs<D> {
         if !self.probes.is_empty() {
             session.agree(self.probes.write(session, &body.mesh, state))?;
         }
-        if self.fields_due(state) {
+        if due(self.every, state) {
             self.write_fields(session, body, state)?;
         }
         self.spent += start.elapsed();
         Ok(())
     }
 
-    fn fields_due(&self, state: &State) -> bool {
-        match self.every {
-            None => false,
-            Some(Every::Every(steps)) => state.step.is_multiple_of(steps),
-            Some(Every::Interval(interval)) => {
-                let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
-                count(state.time) > count(state.time - state.step_length)
-            }
-        }
-    }
-
-    /// Writes the initial state, where fields are wanted along the way and it is not there yet. Collective.
+    /// Writes the state that the run starts from, where its fields are due and not there yet. Collective.
     pub fn at_start<const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
     ) -> Result<()> {
-        let missing = self.every.is_some() && self.fields.last_time().is_none();
-        if missing { self.write_fields(session, body, state) } else { Ok(()) }
+        let missing = self.fields.last_time().is_none_or(|time| time < state.time);
+        if missing && due(self.every, state) { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
     /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
@@ -130,7 +124,7 @@ impl<const D: usize> Outputs<D> {
         state: &State,
     ) -> Result<()> {
         let start = Instant::now();
-        if self.fields.last_time().is_none_or(|time| time < state.time) {
+        if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
         }
         session.agree(self.flush())?;
@@ -183,21 +177,34 @@ impl<const D: usize> Outputs<D> {
     }
 }
 
+/// Whether the fields of this state are to be written: of the initial one always, where fields are wanted along the way.
+fn due(every: Option<Every>, state: &State) -> bool {
+    match every {
+        None => false,
+        Some(_) if state.step == 0 => true,
+        Some(Every::Every(steps)) => state.step.is_multiple_of(steps),
+        Some(Every::Interval(interval)) => {
+            let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
+            count(state.time) > count(state.time - state.step_length)
+        }
+    }
+}
+
 fn history_and_tables<const D: usize>(
     folder: &Path,
     job: &Job,
     step: Option<u64>,
-    time: Option<f64>,
+    profiles_after: Option<f64>,
     probes: &mut Probes<D>,
     profiles: &mut Profiles<D>,
 ) -> Result<History> {
     let effective = folder.join("job.toml");
-    std::fs::write(&effective, job.to_toml()?).map_err(|e| Error::unwritable(&effective, e))?;
+    write_whole(&effective, &job.to_toml()?)?;
     if !probes.is_empty() {
         probes.open(folder, step)?;
     }
     if !profiles.is_empty() {
-        profiles.open(folder, time)?;
+        profiles.open(folder, profiles_after)?;
     }
     History::open(folder, step)
 }
@@ -214,16 +221,4 @@ fn profiles<const D: usize, const S: usize>(
         .map(|p| (p.on.clone(), job.contact.iter().position(|c| c.on.contains(&p.on))))
         .collect();
     Profiles::new(session, body, &along)
-}
-
-/// Makes the output folder; a new start removes the checkpoints of an earlier run. On one rank.
-pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
-    if !goes_on {
-        for (_, path) in list(folder)? {
-            std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
-            log.line(format!("removed {} of an earlier run", path.display()));
-        }
-    }
-    Ok(())
 }

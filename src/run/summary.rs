@@ -4,6 +4,7 @@ use super::{Inventory, VERSION};
 use crate::{
     certificate::Certificates,
     error::{Error, Result},
+    output::whole_file::write_whole,
 };
 use serde::Serialize;
 use std::path::Path;
@@ -79,12 +80,9 @@ pub struct PartitionQuality {
 impl Summary {
     /// Writes the object to the folder, at once. On one rank.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        let path = folder.join("summary.json");
-        let part = folder.join("summary.json.part");
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::Internal(format!("the summary can't be written: {e}")))?;
-        std::fs::write(&part, text + "\n").map_err(|e| Error::unwritable(&part, e))?;
-        std::fs::rename(&part, &path).map_err(|e| Error::unwritable(&path, e))
+        write_whole(&folder.join("summary.json"), &(text + "\n"))
     }
 
     /// The version, for use where the struct is filled.

@@ -2,7 +2,9 @@
 
 use super::{
     Clock, Inventory, Scene, Start, build,
-    outputs::{Outputs, Wanted, prepare_folder},
+    deadline::Deadline,
+    folder::{prepare_folder, refuse_foreign},
+    outputs::{Outputs, Wanted},
     setup::{Setup, setup},
     simulation::totals_at_start,
     summary::{PartitionQuality, Summary, peak_memory},
@@ -39,9 +41,10 @@ pub(super) fn run<const D: usize, const S: usize>(
     clock: Clock,
 ) -> Result<Exit> {
     let job = &loaded.job;
+    session.agree(if session.is_first() { refuse_foreign(job, start) } else { Ok(()) })?;
     let mut ready = setup::<D, S>(session, loaded, scene)?;
     let folder = job.output_folder();
-    let goes_on = *start != Start::Anew;
+    let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
     let restored = session.agree(restored)?;
@@ -63,15 +66,15 @@ pub(super) fn run<const D: usize, const S: usize>(
     };
     let wanted = Wanted { identity, probes, goes_on };
     let mut outputs = Outputs::open(session, job, wanted, &body, &state, &mut log)?;
-    if state.step == 0 {
-        outputs.at_start(session, &body, &state)?;
-    }
+    outputs.at_start(session, &body, &state)?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
     let mut adaptive = build::adaptive(job);
     if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
         adaptive.pace = pace;
     }
+    let deadline = Deadline::new(session, job, clock);
+    deadline.words().iter().for_each(|words| log.line(words));
     let mut run = Run {
         session,
         job,
@@ -84,6 +87,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         outputs,
         log,
         clock,
+        deadline,
         setup,
         stepping,
     };
@@ -109,7 +113,7 @@ fn restore<const D: usize, const S: usize>(
     state: &mut State,
 ) -> Result<Option<Restored>> {
     let candidates = match start {
-        Start::Anew => return Ok(None),
+        Start::Anew | Start::Over => return Ok(None),
         Start::From(path) => vec![path.clone()],
         Start::Newest => session.agree(list(folder))?.into_iter().map(|(_, path)| path).collect(),
     };
@@ -156,6 +160,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     outputs: Outputs<D>,
     log: Log,
     clock: Clock,
+    deadline: Deadline,
     setup: Duration,
     /// When and from which step the steps began.
     stepping: (Instant, u64),
@@ -235,29 +240,24 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 
     /// What the outside or the clock asks for, the same on all ranks. Collective.
-    fn wish(&self, saved_at: Instant) -> Wish {
-        let signal = self.session.stop_requested();
-        let mut clocks = [0.0; 2];
-        let mut by_steps = false;
+    fn wish(&mut self, saved_at: Instant) -> Wish {
+        let signal = self.session.stop_requested().map(|signal| signal.to_string());
+        let late = self.deadline.passed(self.session);
+        let (mut by_steps, mut by_time) = (false, false);
         if let Some(checkpoint) = &self.job.checkpoint {
             by_steps = checkpoint.every.is_some_and(|every| self.state.step.is_multiple_of(every));
-            let due = checkpoint.interval.is_some_and(|seconds| saved_at.elapsed().as_secs_f64() >= seconds);
-            let late = checkpoint
-                .wall_limit
-                .is_some_and(|seconds| self.clock.began.elapsed().as_secs_f64() >= seconds);
-            clocks = self.session.largest([f64::from(u8::from(due)), f64::from(u8::from(late))]);
+            if let Some(seconds) = checkpoint.interval {
+                let due = saved_at.elapsed().as_secs_f64() >= seconds;
+                by_time = self.session.largest([f64::from(u8::from(due))])[0] > 0.0;
+            }
         }
-        let limit = self.job.checkpoint.as_ref().and_then(|c| c.wall_limit).unwrap_or_default();
-        let stop = match signal {
-            Some(signal) => Some(format!("{signal}")),
-            None if clocks[1] > 0.0 => Some(format!("the wall-time limit of {limit} s")),
-            None => None,
-        };
-        Wish { save: by_steps || clocks[0] > 0.0, stop }
+        Wish { save: by_steps || by_time, stop: signal.or(late) }
     }
 
     fn save(&mut self) -> Result<()> {
+        let start = Instant::now();
         let path = self.outputs.checkpoint(self.session, &self.body, &self.state, &self.totals)?;
+        self.deadline.saved(start.elapsed());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
     }

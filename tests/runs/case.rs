@@ -101,7 +101,12 @@ impl Case {
 
     /// Starts the job.
     pub fn start(&self, ranks: usize) -> Running {
-        Running::start(ranks, &self.arguments(&[]))
+        self.start_with(ranks, &[])
+    }
+
+    /// Starts the job with these arguments behind its name.
+    pub fn start_with(&self, ranks: usize, arguments: &[&str]) -> Running {
+        Running::start(ranks, &self.arguments(arguments))
     }
 
     /// Runs the job with these arguments behind its name.

@@ -117,7 +117,8 @@ impl Running {
         Self::spawn(command)
     }
 
-    fn spawn(mut command: Command) -> Self {
+    /// Starts a command that launches the solver.
+    pub fn spawn(mut command: Command) -> Self {
         static NUMBER: AtomicUsize = AtomicUsize::new(0);
         let mark = format!("{}.{}.", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
         let own = tempfile::tempdir().expect("folder");
@@ -145,14 +146,21 @@ impl Running {
 
     /// Sends a signal.
     pub fn signal(&self, signal: &str, target: Target) {
+        assert!(self.try_signal(signal, target), "no process to send a signal to");
+    }
+
+    /// Sends a signal, if the process is there.
+    pub fn try_signal(&self, signal: &str, target: Target) -> bool {
         let process = match target {
-            Target::Launcher => self.launcher.id(),
-            Target::OneRank => {
-                let ranks = self.processes().into_iter().filter(|p| runs_solver(*p));
-                ranks.max().expect("a rank")
-            }
+            Target::Launcher => Some(self.launcher.id()),
+            Target::OneRank => self.processes().into_iter().filter(|p| runs_solver(*p)).max(),
         };
-        assert!(send(signal, process), "no process {process}");
+        process.is_some_and(|process| send(signal, process))
+    }
+
+    /// Whether the run has not ended.
+    pub fn goes_on(&mut self) -> bool {
+        self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
     /// Waits for the end; none of its processes may be left then.

@@ -76,6 +76,11 @@ pub struct Checkpoint {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 84000.0)]
     pub wall_limit: Option<f64>,
+    /// Wall time that is kept free before the end of a Slurm job, besides the longest step and checkpoint so far: then the run
+    /// saves its state and stops with exit code 3; absent: 30 s, at most a tenth of the time left at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 120.0)]
+    pub margin: Option<f64>,
 }
 
 fn keep() -> u32 {

@@ -86,7 +86,7 @@ fn check_checkpoint(findings: &mut Findings<'_>) {
     if present("every") && present("interval") {
         findings.fault("checkpoint.interval", "`interval` beside `every`", "only one of them can hold");
     }
-    if !["every", "interval", "wall_limit"].into_iter().any(present) {
+    if !["every", "interval", "wall_limit", "margin"].into_iter().any(present) {
         let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
         findings.fault("checkpoint", "[checkpoint] does not say when", help);
     }

@@ -27,6 +27,10 @@ pub enum AnyMesh {
 /// Tetrahedra make a mesh of space, otherwise triangles one of the plane. Entities whose cells all run the other way
 /// round are reoriented; nodes without a cell are dropped.
 pub fn read(path: &Path) -> Result<AnyMesh> {
+    let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
+    if !facts.is_file() && !facts.is_dir() {
+        return Err(Error::unreadable(path, "it is a device or a pipe, not a file"));
+    }
     let bytes = std::fs::read(path).map_err(|error| Error::unreadable(path, error))?;
     parse(&bytes).map_err(|error| Error::Refused(format!("{}: {error}", path.display())))
 }

@@ -1,0 +1,29 @@
+//! Any bytes as a Gmsh file: refused in words, or a mesh whose numbers fit together.
+#![no_main]
+
+use clarke::{
+    error::Error,
+    mesh::{
+        GlobalMesh,
+        gmsh::{AnyMesh, parse},
+    },
+};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| match parse(bytes) {
+    Ok(AnyMesh::Two(mesh)) => check(&mesh),
+    Ok(AnyMesh::Three(mesh)) => check(&mesh),
+    Err(Error::Refused(words)) => assert!(!words.is_empty()),
+    Err(other) => panic!("{other:?}"),
+});
+
+fn check<const D: usize>(mesh: &GlobalMesh<D>) {
+    assert!(mesh.cell_count() > 0);
+    assert_eq!(mesh.cell_regions.len(), mesh.cell_count());
+    assert!(mesh.cells.iter().all(|&node| (node as usize) < mesh.nodes.len()));
+    assert!((0..mesh.cell_count()).all(|cell| mesh.measure(cell) > 0.0));
+    assert!(mesh.cell_regions.iter().all(|&region| usize::from(region) < mesh.regions.len()));
+    for boundary in &mesh.boundaries {
+        assert!(boundary.facets.iter().all(|&facet| (facet as usize) < mesh.facets.len()));
+    }
+}

@@ -1,0 +1,116 @@
+//! Disks that are full or can't be written. Small disks need mount namespaces; limits of file sizes do without.
+
+use crate::{
+    case::Case,
+    launch::{Outcome, Running},
+    trials,
+    undisturbed::{RANKS, finish, saving, undisturbed},
+};
+use std::process::Command;
+
+/// Runs the solver whose files may have this many blocks of 512 bytes, on each rank or on one.
+fn limited(case: &Case, blocks: usize, only: Option<usize>) -> Outcome {
+    let mut command = Command::new("mpirun");
+    command.args(["--oversubscribe", "--bind-to", "none"]);
+    for rank in 0..RANKS {
+        let limit = if only.is_none_or(|only| only == rank) {
+            format!("ulimit -f {blocks}; ")
+        } else {
+            String::new()
+        };
+        let script = format!("{limit}exec \"$0\" run \"$1\"");
+        command.args(if rank == 0 { &["-n", "1"][..] } else { &[":", "-n", "1"] });
+        command.args(["sh", "-c", &script, env!("CARGO_BIN_EXE_solver")]).arg(case.written());
+    }
+    // Shared memory of the ranks is a file as well.
+    command.env("OMPI_MCA_btl", "self,tcp");
+    Running::spawn(command).wait()
+}
+
+/// Words of the systems' refusals to write.
+#[track_caller]
+fn assert_says_why(outcome: &Outcome, what: &str) {
+    let said = &outcome.stderr;
+    assert_eq!(outcome.code, 1, "{what}\n{}\n{said}", outcome.stdout);
+    assert!(said.contains("cannot write"), "{what}\n{said}");
+    assert!(said.contains("Is the disk full") || said.contains("File too large"), "{what}\n{said}");
+    let signs = ["Segmentation", "panicked", "MPI_ABORT"];
+    assert!(!signs.iter().any(|sign| said.contains(sign)), "{what}\n{said}");
+}
+
+#[test]
+fn a_file_that_may_not_grow_ends_the_run_with_its_name_and_the_rest_goes_on_to_the_same_result() {
+    let (straight, _kept) = undisturbed();
+    let all = [1, 2, 40, 150, 300, 420, 500, 600, 700, 800, 1000, 1200];
+    let sample = [2, 420];
+    let tried = if trials(0, 1) == 1 { &all[..] } else { &sample };
+    let mut ended = 0;
+    for &blocks in tried {
+        for only in [None, Some(0), Some(1)] {
+            let case = saving();
+            let outcome = limited(&case, blocks, only);
+            let what = format!("{blocks} blocks on {only:?}");
+            if outcome.code != 0 {
+                assert_says_why(&outcome, &what);
+                ended += 1;
+            }
+            finish(&case, &straight, &what);
+        }
+    }
+    println!("{ended} of {} runs could not write", 3 * tried.len());
+    assert!(ended > tried.len());
+}
+
+/// Runs a script in a mount namespace of its own, where a small disk lies on a folder; `None` where that is not allowed.
+fn on_small_disk(case: &Case, size: &str, script: &str) -> Option<Outcome> {
+    let namespace = ["-rm", "sh", "-c"];
+    let allowed = Command::new("unshare").args(namespace).arg("mount -t tmpfs none /mnt").output();
+    if !allowed.is_ok_and(|output| output.status.success()) {
+        println!("no small disk: mount namespaces are not allowed here");
+        return None;
+    }
+    let disk = case.folder().join("out");
+    std::fs::create_dir_all(&disk).expect("folder");
+    let mut command = Command::new("unshare");
+    command.args(namespace).arg(format!("mount -t tmpfs -o size={size} none \"$1\" || exit 99; {script}"));
+    command.arg(env!("CARGO_BIN_EXE_solver")).arg(&disk).arg(case.written()).arg(case.folder().join("kept"));
+    Some(Running::spawn(command).wait())
+}
+
+const LAUNCH: &str = "mpirun --oversubscribe --bind-to none -n 2";
+
+#[test]
+fn a_full_disk_ends_the_run_and_with_more_room_it_goes_on_to_the_same_result() {
+    let (straight, _kept) = undisturbed();
+    let all =
+        ["60k", "200k", "300k", "350k", "450k", "500k", "550k", "600k", "700k", "800k", "900k", "1100k"];
+    let sample = ["500k"];
+    let tried = if trials(0, 1) == 1 { &all[..] } else { &sample };
+    for size in tried {
+        let case = saving();
+        // The run on the small disk; its exit code is said, and what it left is kept.
+        let script = format!("{LAUNCH} \"$0\" run \"$2\"; echo \"ended with $?\"; cp -r \"$1\" \"$3\"");
+        let Some(outcome) = on_small_disk(&case, size, &script) else { return };
+        outcome.expect(0).says("ended with 1").says("cannot write");
+        std::fs::remove_dir_all(case.folder().join("out")).expect("removed");
+        std::fs::rename(case.folder().join("kept"), case.folder().join("out")).expect("kept");
+        finish(&case, &straight, size);
+    }
+}
+
+#[test]
+fn a_folder_that_may_only_be_read_is_named() {
+    let case = saving();
+    let script = format!("mount -o remount,ro \"$1\" && {LAUNCH} \"$0\" run \"$2\"; echo \"ended with $?\"");
+    let Some(outcome) = on_small_disk(&case, "1m", &script) else { return };
+    outcome.expect(0).says("ended with 1").says("cannot write").says("Read-only file system");
+}
+
+#[test]
+fn a_device_that_is_always_full_ends_the_run_in_words() {
+    let case = saving();
+    std::fs::create_dir_all(case.folder().join("out")).expect("folder");
+    std::os::unix::fs::symlink("/dev/full", case.folder().join("out/probes.csv")).expect("link");
+    let outcome = case.run_with(RANKS, &[]).expect(1);
+    outcome.says("out/probes.csv").says("No space left on device");
+}

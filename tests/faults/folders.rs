@@ -1,0 +1,90 @@
+//! Output stays in its folder, and results of another job stay what they are.
+
+use crate::{case::Case, results::names};
+use std::fs;
+
+fn small() -> Case {
+    Case::square(4).set("time.end", "0.25").set("checkpoint.every", "2")
+}
+
+/// Everything in a folder, by name.
+fn contents(case: &Case) -> Vec<(String, Vec<u8>)> {
+    let folder = case.folder().join("out");
+    names(&folder)
+        .into_iter()
+        .map(|name| (name.clone(), fs::read(folder.join(name)).expect("read")))
+        .collect()
+}
+
+#[test]
+fn results_of_another_job_are_not_overwritten_unless_forced() {
+    let case = small();
+    case.run(2);
+    let before = contents(&case);
+    for (change, key) in [
+        ("material.viscosity.shear=51", "material.viscosity.shear"),
+        ("mesh.rectangle.cells=[5, 4]", "mesh.rectangle.cells"),
+        ("about.title='another'", "about"),
+        ("time.step=0.03125", "time.step"),
+    ] {
+        let outcome = case.run_with(2, &["--set", change]).expect(2);
+        outcome.says("the folder holds the results of another job").says(key).says("--force");
+        assert_eq!(contents(&case), before, "{change}");
+    }
+}
+
+#[test]
+fn results_that_were_overwritten_by_force_are_those_of_the_new_job() {
+    let case = small();
+    let change = "material.viscosity.shear=51";
+    case.run(1);
+    case.run_with(1, &["--set", change, "--force"]).expect(0).says("completed");
+    case.run_with(1, &["--set", change]).expect(0);
+    case.run_with(1, &[]).expect(2).says("material.viscosity.shear");
+}
+
+#[test]
+fn the_same_job_runs_again_in_its_folder_with_other_output_and_another_end() {
+    let case = small();
+    case.run(2);
+    case.run(2);
+    case.run_with(1, &["--set", "time.end=0.5", "--set", "output.fields={every=1}"]).expect(0);
+    case.run_with(1, &["--set", "solver.preconditioner=gamg"]).expect(0);
+    // The effective job that a run leaves is the same job.
+    let effective = case.folder().join("out/job.toml");
+    crate::launch::run(2, &["run", &effective.display().to_string()]).expect(0);
+}
+
+#[test]
+fn a_restart_does_not_mix_its_rows_with_those_of_another_job() {
+    let (case, other) = (small(), small().set("material.viscosity.shear", "51"));
+    case.run(1);
+    other.run(1);
+    let before = contents(&other);
+    let from = case.results().path("checkpoint-4.h5").display().to_string();
+    let folder = format!("output.folder='{}'", other.folder().join("out").display());
+    let outcome = case.run_with(1, &["--set", &folder, "--restart", &from]).expect(2);
+    outcome.says("the folder holds the results of another job").says("choose another [output] folder");
+    assert_eq!(contents(&other), before);
+    case.run_with(1, &["--restart", "--force"]).expect(2).says("cannot be used with");
+}
+
+#[test]
+fn a_job_file_written_by_hand_is_not_replaced_by_the_effective_one() {
+    let case = small().set("output.folder", "'.'");
+    let file = case.written();
+    let text = fs::read_to_string(&file).expect("job");
+    let outcome = case.run_with(1, &[]).expect(2);
+    outcome.says("a job.toml that no run has written");
+    assert_eq!(fs::read_to_string(&file).expect("job"), text);
+    assert_eq!(names(case.folder()), ["job.toml"]);
+}
+
+#[test]
+fn a_run_writes_nothing_outside_of_its_folder() {
+    let case = small().set("output.folder", "'deep/down/out'").set("output.fields", "{every = 1}");
+    case.run_with(2, &[]).expect(0);
+    assert_eq!(names(case.folder()), ["deep", "job.toml"]);
+    assert_eq!(names(&case.folder().join("deep")), ["down"]);
+    assert_eq!(names(&case.folder().join("deep/down")), ["out"]);
+}

@@ -1,0 +1,53 @@
+//! Faults lose nothing: killed processes, full disks, damaged files, time limits, foreign folders, hostile input.
+//!
+//! `make test` tries a sample of each, `make hard` many more (`CLARKE_HARD=1`); docs/stability.md has the counts.
+
+#[path = "../runs/case.rs"]
+#[allow(dead_code)]
+mod case;
+mod damage;
+mod disks;
+mod enormous;
+mod folders;
+#[path = "../runs/hdf5_file.rs"]
+#[allow(dead_code)]
+mod hdf5_file;
+mod kills;
+#[path = "../runs/launch.rs"]
+#[allow(dead_code)]
+mod launch;
+mod limits;
+#[path = "../mpirun/mod.rs"]
+#[allow(dead_code)]
+mod mpirun;
+mod one_rank;
+#[path = "../runs/results.rs"]
+#[allow(dead_code)]
+mod results;
+mod undisturbed;
+
+/// The side of the tests that runs under `mpirun`.
+#[test]
+#[ignore = "started by the other tests, under mpirun"]
+fn scenario() {
+    let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
+    let exit = one_rank::fail(name.trim_start_matches("one_rank "));
+    std::process::exit(i32::from(exit as u8));
+}
+
+/// How many of something to try: a sample, or many in `make hard`.
+fn trials(sample: usize, many: usize) -> usize {
+    if std::env::var_os("CLARKE_HARD").is_some() { many } else { sample }
+}
+
+/// Numbers that look random, the same in every run of the tests.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % limit
+    }
+}

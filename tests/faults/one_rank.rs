@@ -1,0 +1,124 @@
+//! A law or the assembly fails on one rank: all ranks end together, with one reason. Files that one rank can't write are
+//! in `disks`, callbacks of Newton's method in `tests/verification/callbacks.rs`.
+
+use crate::mpirun;
+use clarke::{
+    effect::{Effect, Energy, Phases, Step},
+    error::{Error, Exit},
+    job::Job,
+    mesh::generate::{Diagonal, rectangle},
+    run::Simulation,
+    session::{Mpi, Session},
+    space::{Batch, CellMatrix, Needs, Simplex},
+};
+use std::path::Path;
+
+/// What goes wrong on the last rank, at the third step or at the last, shorter one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    Law,
+    Panic,
+    Assembly,
+}
+
+/// An effect without force, until it goes wrong.
+struct Faulty {
+    fault: Fault,
+    here: bool,
+    calls: usize,
+}
+
+impl Effect<2, 3> for Faulty {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn phases(&self) -> Phases {
+        Phases { matrix: true, explicit: Some(Needs::default()), energy: None, stress: None }
+    }
+
+    fn is_everywhere(&self) -> bool {
+        true
+    }
+
+    fn add_matrix(&self, _: usize, _: &Simplex<2>, _: f64, matrix: &mut CellMatrix<2>) {
+        if self.here && self.fault == Fault::Assembly {
+            matrix.blocks[0][0][0][0] = f64::NAN;
+        }
+    }
+
+    fn add_explicit(&mut self, step: Step, batch: &mut Batch<2, 3>, _: &mut Energy) {
+        self.calls += 1;
+        let now = self.here && step.time > 0.11;
+        assert!(!now || self.fault != Fault::Panic, "this law panicked at t = {} s", step.time);
+        if now && self.fault == Fault::Law {
+            batch.stress.iter_mut().for_each(|stress| stress.fill(f64::NAN));
+        }
+    }
+}
+
+const JOB: &str = r#"
+mesh.rectangle = { size = [1.0, 1.0], cells = [8, 8] }
+material = { hypothesis = "plane_stress", density = 1.0, viscosity = { volumetric = 25.0, shear = 50.0 } }
+support = [{ on = ["left"], fix = "all" }]
+traction = [{ on = ["top"], value = [0.0, -10.0] }]
+contact = [{ on = ["bottom"], normal.damped_response = { breakpoints = [0.003, 0.005], slopes = [10, -10, 10] } }]
+time = { end = 0.33, step = 0.05 }
+"#;
+
+/// The side that runs under `mpirun`: says the error of this rank, and gives its exit code.
+pub fn fail(name: &str) -> Exit {
+    let mpi = Mpi::start().expect("MPI");
+    let session: Session = mpi.session().expect("PETSc");
+    let fault = match name {
+        "law" => Fault::Law,
+        "panic" => Fault::Panic,
+        _ => Fault::Assembly,
+    };
+    let mut loaded = Job::from_text(JOB, "job.toml", Path::new("."), &[]).expect("a job");
+    let mesh =
+        session.is_first().then(|| rectangle([1.0, 1.0], [8, 8], Diagonal::Right, [1.0; 2]).expect("mesh"));
+    let mut simulation = Simulation::<2, 3>::new(&session, &mut loaded, mesh).expect("set up");
+    let here = session.rank() + 1 == session.ranks();
+    simulation.body.effects.push(Box::new(Faulty { fault, here, calls: 0 }));
+    let mut steps = 0;
+    let ended = loop {
+        match session.agree(simulation.advance(&session)) {
+            Ok(Some(_)) => steps += 1,
+            other => break other.map(drop),
+        }
+    };
+    let words = ended.as_ref().err().map(Error::to_string).unwrap_or_default();
+    println!("\nrank {} after {steps} steps: {words}", session.rank());
+    ended.map_or_else(|error| error.exit(), |()| Exit::Done)
+}
+
+#[track_caller]
+fn expect(fault: &str, code: i32, words: &str, steps: usize) {
+    for ranks in [2, 3] {
+        let folder = tempfile::tempdir().expect("folder");
+        let output = mpirun::start(ranks, &format!("one_rank {fault}"), folder.path());
+        let said =
+            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{fault} on {ranks} ranks\n{said}");
+        assert!(said.contains(words), "{said}");
+        let told: Vec<&str> =
+            said.lines().filter(|line| line.contains(&format!("after {steps} steps:"))).collect();
+        assert_eq!(told.len(), if code == 4 { 0 } else { ranks }, "{said}");
+    }
+}
+
+#[test]
+fn a_law_that_gives_no_number_on_one_rank_ends_all_ranks_at_the_same_step() {
+    expect("law", 1, "step to t = 1.500000e-1 s", 2);
+}
+
+#[test]
+fn a_law_that_panics_on_one_rank_ends_all_ranks_with_its_message() {
+    expect("panic", 4, "this law panicked at t = 0.15", 2);
+}
+
+#[test]
+fn a_matrix_that_holds_no_number_on_one_rank_ends_all_ranks_at_the_same_step() {
+    expect("assembly", 1, "rank", 6);
+}
