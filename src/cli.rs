@@ -245,7 +245,7 @@ fn on_all_ranks(
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
-    let clock = Clock { began, launched: began.elapsed() };
+    let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
     let colour = std::io::stderr().is_terminal();
     let loaded = session.agree(Job::load_coloured(job, overrides, colour));
     let result = loaded.and_then(|loaded| work(&session, loaded, clock));

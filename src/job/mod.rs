@@ -23,5 +23,8 @@ pub use document::*;
 pub use effective::differing_keys;
 pub use expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub use load::Loaded;
+pub(crate) use describe::describe_kind;
+pub(crate) use load::{Document, normal, read};
 pub(crate) use nearest::nearest;
+pub(crate) use schema::{Kind, schema_of};
 pub use semantic::MeshNames;

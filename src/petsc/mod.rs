@@ -15,7 +15,7 @@ pub mod sys;
 mod vector;
 
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
+pub use library::{Entered, Petsc, Stage, clear_option, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
 pub use snes::{LineSearch, NonlinearOutcome, NonlinearProblem, Snes};
