@@ -26,5 +26,5 @@ pub use load::Loaded;
 pub(crate) use describe::describe_kind;
 pub(crate) use load::{Document, normal, read};
 pub(crate) use nearest::nearest;
-pub(crate) use schema::{Kind, schema_of};
+pub(crate) use schema::{Kind, Schema, schema_of};
 pub use semantic::MeshNames;
