@@ -103,8 +103,8 @@ fn draw(
                 .y_desc("error")
                 .axis_desc_style(("sans-serif", 18))
                 .label_style(("sans-serif", 15))
-                .x_label_formatter(&|value| format!("{value:.0e}"))
-                .y_label_formatter(&|value| format!("{value:.0e}"))
+                .x_label_formatter(&label)
+                .y_label_formatter(&label)
                 .light_line_style(BLACK.mix(0.06))
                 .bold_line_style(BLACK.mix(0.15))
                 .draw()?;
@@ -133,6 +133,18 @@ fn draw(
     Ok(text)
 }
 
+/// The tick's number, at 1, 2 and 5 times powers of ten only.
+fn label(value: &f64) -> String {
+    let text = format!("{value:.2e}");
+    let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
+    match mantissa {
+        "1.00" => format!("1e{power}"),
+        "2.00" => format!("2e{power}"),
+        "5.00" => format!("5e{power}"),
+        _ => String::new(),
+    }
+}
+
 /// Whole decades around all points.
 fn range(curves: &[Curve], pick: impl Fn(&Point) -> f64) -> (f64, f64) {
     let values = || curves.iter().flat_map(|curve| &curve.points).map(&pick);
@@ -149,6 +161,12 @@ mod tests {
     fn the_line_joins_runs_that_no_cheaper_one_beats() {
         let points = [(4.0, 0.1), (1.0, 0.5), (2.0, 0.6), (3.0, 0.2), (3.0, 0.3)];
         assert_eq!(front(&points), [(1.0, 0.5), (3.0, 0.2), (4.0, 0.1)]);
+    }
+
+    #[test]
+    fn ticks_are_named_at_one_two_and_five() {
+        let named = [1.0, 0.2, 30.0, 5e-7].map(|value| label(&value));
+        assert_eq!(named, ["1e0", "2e-1", "", "5e-7"]);
     }
 
     #[test]
