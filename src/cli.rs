@@ -132,9 +132,7 @@ fn dispatch(cli: Cli) -> Result<Exit> {
     match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
-        Some(Command::Describe { table, json }) => {
-            describe(table.as_deref(), json)
-        }
+        Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
         Some(Command::Study { study, overrides, ablate }) => run_study(&study, &overrides, ablate),
         Some(Command::Report { .. }) => Err(Error::Refused("solver report is not available yet".into())),
@@ -153,7 +151,9 @@ fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
         (Some(table), false) => say(&study::describe(Some(table).filter(|table| !table.is_empty()))?),
         (None, false) => say(&job::describe(table)?),
         (None, true) if table.is_none() => say(&job::describe_json()),
-        _ => Err(Error::Refused("--json prints a whole schema: solver describe --json, or describe study --json".into())),
+        _ => Err(Error::Refused(
+            "--json prints a whole schema: solver describe --json, or describe study --json".into(),
+        )),
     }
 }
 

@@ -117,7 +117,11 @@ impl Schema {
     /// The keys of a table.
     pub fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
         let root = self.root;
-        self.get("properties").as_object().into_iter().flatten().map(|(key, value)| (key, resolve(root, value)))
+        self.get("properties")
+            .as_object()
+            .into_iter()
+            .flatten()
+            .map(|(key, value)| (key, resolve(root, value)))
     }
 
     /// The schema of one key of a table.

@@ -129,7 +129,11 @@ impl Walk<'_> {
         path: &str,
     ) -> Option<&'static str> {
         let near = nearest(key, known.iter().copied());
-        let place = if path.is_empty() { format!("at the top of a {}", self.kind.name) } else { format!("in [{path}]") };
+        let place = if path.is_empty() {
+            format!("at the top of a {}", self.kind.name)
+        } else {
+            format!("in [{path}]")
+        };
         let mut fault =
             Fault::new(child.key.clone(), format!("unknown key `{key}` {place}"), "not a key here");
         if let Some(near) = near {

@@ -5,6 +5,8 @@
 use super::{
     document::{Norm, Over, Quantity, Space, Timing},
     execute::{Outcome, execute},
+    in_dimension,
+    measure::Target,
     plan::{Plan, Planned, trim, word},
     record::Record,
     results::{Ablation, EffectResult},
@@ -67,9 +69,9 @@ fn collect(path: &str, value: &Value, schema: Schema, optional: bool, found: &mu
 
 fn document(job: &Job) -> Result<Value> {
     let text = job.to_toml()?;
-    toml::from_str::<toml::Table>(&text)
-        .map(Value::Table)
-        .map_err(|error| Error::Internal(format!("the effective job can't be read back: {}", error.message())))
+    toml::from_str::<toml::Table>(&text).map(Value::Table).map_err(|error| {
+        Error::Internal(format!("the effective job can't be read back: {}", error.message()))
+    })
 }
 
 /// The job without the table or key `path`; refused where it needs it.
@@ -109,12 +111,7 @@ fn remove(value: &mut Value, parts: &[&str]) {
 }
 
 /// Runs the base job whole and without each effect; `None` where it was asked to stop. Collective.
-pub fn ablate(
-    session: &Session,
-    plan: &Plan,
-    say: &dyn Fn(&str),
-    compare: &dyn Fn(usize, &Path, &Path, &[Norm]) -> Result<Vec<Option<f64>>>,
-) -> Result<Option<Ablation>> {
+pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
     let folder = plan.folder.join("ablation");
     let Some(whole) = run(session, &plan.study.timing, "whole", plan.base.clone(), &folder, say)? else {
         return Ok(None);
@@ -151,17 +148,30 @@ pub fn ablate(
                     effect.saved = ablation.seconds.zip(effect.seconds).map(|(all, left)| all - left);
                 }
                 if record.is_complete() && whole.is_complete() {
-                    let changes =
-                        compare(record.dimension, &folder.join(&name), &folder.join("whole"), &norms)?;
-                    effect.change = <[Option<f64>; 3]>::try_from(changes)
-                        .ok()
-                        .map(|changes| changes.map(|change| change.unwrap_or(f64::NAN)));
+                    effect.change =
+                        Some(change(session, record.dimension, &folder.join(&name), &folder, &norms)?);
                 }
             }
         }
         ablation.effects.push(effect);
     }
     Ok(Some(ablation))
+}
+
+/// Relative changes of what is compared, against the whole job. Collective.
+fn change(
+    session: &Session,
+    dimension: usize,
+    run: &Path,
+    folder: &Path,
+    norms: &[Norm; 3],
+) -> Result<[f64; 3]> {
+    let whole = folder.join("whole");
+    let (measured, _) = in_dimension(session, dimension, run, Target::Run(&whole, true), norms)?;
+    let relative = |at: usize| {
+        measured.get(at).map_or(f64::NAN, |m| if m.error == 0.0 { 0.0 } else { m.error / m.size })
+    };
+    Ok(std::array::from_fn(relative))
 }
 
 fn run(

@@ -84,8 +84,7 @@ impl ExactFields {
                     }
                     (Space::V, Values::Nodal(nodal)) => {
                         let exact = symmetric(&gradient(&vector, &point, NEARBY * size));
-                        let here =
-                            mesh.geometry[cell].field_gradient(&mesh.of_corners(nodal, cell)[..=D]);
+                        let here = mesh.geometry[cell].field_gradient(&mesh.of_corners(nodal, cell)[..=D]);
                         (tensor_square(&minus(&symmetric(&here), &exact)), tensor_square(&exact))
                     }
                     (Space::Q, Values::Cells(stress)) => {
@@ -197,11 +196,14 @@ mod tests {
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nothing = Values::Nodal(vec![[0.0; 2]; mesh.nodes.len()]);
         let all = 0..mesh.count();
-        let of = |space| exact.squares(space, Quantity::Velocity, 2.0, (&mesh, &nothing), all.clone()).expect("sum");
+        let of = |space| {
+            exact.squares(space, Quantity::Velocity, 2.0, (&mesh, &nothing), all.clone()).expect("sum")
+        };
         assert!((of(Space::H).error - (4.0 / 9.0 + 0.2)).abs() < 1e-13);
         assert!((of(Space::V).error - 4.0).abs() < 1e-9, "{:?}", of(Space::V));
         let zero = Values::Cells(vec![[0.0; 6]; mesh.count()]);
-        let stress = exact.squares(Space::Q, Quantity::Stress, 0.0, (&mesh, &zero), all.clone()).expect("sum");
+        let stress =
+            exact.squares(Space::Q, Quantity::Stress, 0.0, (&mesh, &zero), all.clone()).expect("sum");
         assert!((stress.error - (1.0 + 4.0 + 2.0 / 3.0)).abs() < 1e-13);
         assert_eq!(exact.column("velocity_y", 0.0, &[3.0, 0.0]), Some(9.0));
         assert_eq!(exact.column("pressure_y", 0.0, &[3.0, 0.0]), None);

@@ -4,6 +4,7 @@
 //! Each rank reads the fields of a run and of the reference whole and integrates over its share of the cells.
 
 mod ablate;
+mod check;
 mod difference;
 mod document;
 mod exact;
@@ -73,11 +74,7 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
     }
     let mut results = assembled(session, plan, reference.as_ref(), &ran)?;
     if with_ablation {
-        let compare = |dimension: usize, run: &Path, whole: &Path, norms: &[Norm]| {
-            let (measured, _) = in_dimension(session, dimension, run, Target::Run(whole, true), norms)?;
-            Ok(measured.iter().map(|m| ErrorResult::new(*m).relative).collect())
-        };
-        match ablate::ablate(session, plan, &say, &compare)? {
+        match ablate::ablate(session, plan, &say)? {
             Some(ablation) => results.ablation = Some(ablation),
             None => return stopped(&say),
         }
@@ -272,10 +269,7 @@ fn order(plan: &Plan, results: &Results, run: usize, norm: usize, refined: &Refi
         refined: refined.what,
         against: results.runs[refined.of].name.clone(),
         observed: observed(coarse, fine, refined.factor)?,
-        expected: match theory {
-            Some(norm) => expected(norm, refined.what, &plan.runs[run].scheme),
-            None => f64::NAN,
-        },
+        expected: theory.map(|norm| expected(norm, refined.what, &plan.runs[run].scheme)),
     })
 }
 
@@ -307,7 +301,9 @@ fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut Res
         let others = plan.runs.iter().enumerate().filter(|(other, run)| {
             same(run, planned) && run.tolerance < planned.tolerance && ran[*other].record.is_complete()
         });
-        let Some((best, tightest)) = others.min_by(|a, b| a.1.tolerance.total_cmp(&b.1.tolerance)) else { continue };
+        let Some((best, tightest)) = others.min_by(|a, b| a.1.tolerance.total_cmp(&b.1.tolerance)) else {
+            continue;
+        };
         if !ran[at].record.is_complete() {
             continue;
         }

@@ -55,7 +55,9 @@ pub fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
         let Some(fine) = &sizes[at] else { return Vec::new() };
         let mut found: Vec<Refinement> = Vec::new();
         for (of, coarse) in sizes[..at].iter().enumerate() {
-            let Some(coarse) = coarse.as_ref().filter(|coarse| coarse.family == fine.family) else { continue };
+            let Some(coarse) = coarse.as_ref().filter(|coarse| coarse.family == fine.family) else {
+                continue;
+            };
             let (mesh, step) = (coarse.mesh / fine.mesh, coarse.step / fine.step);
             let (same_mesh, same_step) = ((mesh - 1.0).abs() < 1e-9, (step - 1.0).abs() < 1e-9);
             let (what, factor) = match (same_mesh, same_step) {
@@ -119,8 +121,13 @@ mod tests {
 
     #[test]
     fn products_have_an_order_in_each_direction_and_families_keep_apart() {
-        let sizes =
-            [size("a", 4.0, 0.5), size("a", 4.0, 0.25), size("a", 8.0, 0.5), size("a", 8.0, 0.25), size("b", 8.0, 0.1)];
+        let sizes = [
+            size("a", 4.0, 0.5),
+            size("a", 4.0, 0.25),
+            size("a", 8.0, 0.5),
+            size("a", 8.0, 0.25),
+            size("b", 8.0, 0.1),
+        ];
         let found = refinements(&sizes);
         assert_eq!(
             found[3],

@@ -37,8 +37,9 @@ pub fn all(folder: &Path, results: &Results) -> Result<Vec<(String, String)>> {
         if by_time.iter().map(|curve| curve.points.len()).sum::<usize>() < 2 {
             continue;
         }
-        let picture = draw(&norm.meaning, &by_time, &by_work)
-            .map_err(|error| Error::Failed(format!("the picture of {} can't be drawn: {error}", norm.name)))?;
+        let picture = draw(&norm.meaning, &by_time, &by_work).map_err(|error| {
+            Error::Failed(format!("the picture of {} can't be drawn: {error}", norm.name))
+        })?;
         let file = format!("work-precision-{}.svg", norm.name);
         let path = folder.join(&file);
         std::fs::write(&path, picture).map_err(|error| Error::unwritable(&path, error))?;
@@ -117,7 +118,8 @@ fn draw(
                 let marks = curve.points.iter().copied();
                 match at % 3 {
                     0 => chart.draw_series(marks.map(|point| Circle::new(point, 5, colour.filled())))?,
-                    1 => chart.draw_series(marks.map(|point| TriangleMarker::new(point, 7, colour.filled())))?,
+                    1 => chart
+                        .draw_series(marks.map(|point| TriangleMarker::new(point, 7, colour.filled())))?,
                     _ => chart.draw_series(marks.map(|point| Cross::new(point, 6, style)))?,
                 };
             }
@@ -184,7 +186,9 @@ mod tests {
             Curve { name: "bdf2".into(), points: vec![(0.03, 0.1)] },
         ];
         let text = draw("max ||v||_H", &curves, &curves).expect("picture");
-        for words in ["<svg", "lagged_euler", "bdf2", "computing time in s", "unknowns x steps", "max ||v||_H"] {
+        for words in
+            ["<svg", "lagged_euler", "bdf2", "computing time in s", "unknowns x steps", "max ||v||_H"]
+        {
             assert!(text.contains(words), "{words}");
         }
     }

@@ -124,7 +124,8 @@ impl Record {
     pub fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
         let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
         let record: Self = serde_json::from_str(&text).ok()?;
-        let sound = |(name, digest): (&String, &String)| file_digest(&folder.join(name)).is_ok_and(|d| d == *digest);
+        let sound =
+            |(name, digest): (&String, &String)| file_digest(&folder.join(name)).is_ok_and(|d| d == *digest);
         let good = record.is_complete()
             && record.digest == digest
             && record.seconds.len() >= repetitions

@@ -106,8 +106,8 @@ pub struct Order {
     pub against: String,
     /// The observed order.
     pub observed: f64,
-    /// The order that theory predicts.
-    pub expected: f64,
+    /// The order that theory predicts, if it predicts one.
+    pub expected: Option<f64>,
 }
 
 /// A run beside the one that differs by a tighter tolerance only.

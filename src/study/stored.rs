@@ -103,7 +103,10 @@ impl<const D: usize> StoredFields<D> {
         times.truncate(usize::try_from(steps).unwrap_or(0));
         let nodes: Vec<Vector<D>> = points.chunks_exact(3).map(|p| std::array::from_fn(|i| p[i])).collect();
         let cells: Vec<u32> = corners.iter().map(|&node| node as u32).collect();
-        if cells.is_empty() || cells.len() % (D + 1) != 0 || cells.iter().any(|&n| n as usize >= nodes.len()) {
+        if cells.is_empty()
+            || !cells.len().is_multiple_of(D + 1)
+            || cells.iter().any(|&n| n as usize >= nodes.len())
+        {
             return Err(Error::Failed(format!("{}: its mesh is damaged; remove the folder", path.display())));
         }
         Ok(Self { mesh: StoredMesh::new(nodes, cells), file, times, path })
@@ -152,7 +155,8 @@ impl<const D: usize> StoredFields<D> {
 
 fn between<const D: usize>(one: &Values<D>, other: &Values<D>, share: f64) -> Values<D> {
     fn mix<const N: usize>(a: &[[f64; N]], b: &[[f64; N]], share: f64) -> Vec<[f64; N]> {
-        let line = |(a, b): (&[f64; N], &[f64; N])| std::array::from_fn(|i| (1.0 - share) * a[i] + share * b[i]);
+        let line =
+            |(a, b): (&[f64; N], &[f64; N])| std::array::from_fn(|i| (1.0 - share) * a[i] + share * b[i]);
         a.iter().zip(b).map(line).collect()
     }
     match (one, other) {

@@ -35,7 +35,8 @@ impl Table {
             let mut line = String::new();
             for (column, cell) in row.iter().enumerate() {
                 let width = width(column);
-                let padded = if column == 0 { format!("  {cell:<width$}") } else { format!("  {cell:>width$}") };
+                let padded =
+                    if column == 0 { format!("  {cell:<width$}") } else { format!("  {cell:>width$}") };
                 line.push_str(&padded);
             }
             out.push_str(line.trim_end());
@@ -48,7 +49,8 @@ impl Table {
     /// As a section of a Markdown document.
     pub fn markdown(&self) -> String {
         let escaped = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
-        let line = |row: &Vec<String>| format!("| {} |\n", row.iter().map(escaped).collect::<Vec<_>>().join(" | "));
+        let line =
+            |row: &Vec<String>| format!("| {} |\n", row.iter().map(escaped).collect::<Vec<_>>().join(" | "));
         let mut out = format!("## {}\n\n", self.title);
         if !self.header.is_empty() {
             out.push_str(&line(&self.header));
@@ -159,8 +161,9 @@ fn error_cells(error: &ErrorResult, symbols: &[&str], published: bool) -> Vec<St
         let order = error.orders.iter().find(|order| order.refined.symbol() == *symbol);
         row.push(optional(order, |order| format!("{:.4}", order.observed)));
     }
-    let theory = error.orders.first().map(|order| order.expected).filter(|order| order.is_finite());
-    row.push(optional(theory, |order| format!("{order}")));
+    let theory: Vec<String> =
+        error.orders.iter().filter_map(|order| order.expected).map(|order| order.to_string()).collect();
+    row.push(if theory.is_empty() { "-".into() } else { theory.join(", ") });
     if published {
         row.push(optional(error.published, |p| format!("{p:.4e}")));
         row.push(optional(error.published_order, |o| format!("{o:.4}")));
@@ -184,7 +187,17 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
 }
 
 fn costs(results: &Results) -> Table {
-    let header = ["run", "unknowns", "steps", "unknowns*steps", "newton", "linear", "total s", "computing s", "solve s"];
+    let header = [
+        "run",
+        "unknowns",
+        "steps",
+        "unknowns*steps",
+        "newton",
+        "linear",
+        "total s",
+        "computing s",
+        "solve s",
+    ];
     let mut table = Table::new("Costs   [wall seconds; computing is without writing files]", &header);
     for run in results.runs.iter().chain(&results.reference) {
         table.rows.push(cost_cells(run));
@@ -193,7 +206,12 @@ fn costs(results: &Results) -> Table {
 }
 
 fn cost_cells(run: &RunResult) -> Vec<String> {
-    let seconds = |pick: fn(&super::record::Seconds) -> f64| optional(run.seconds.as_ref(), |s| format!("{:.3}", pick(s)));
+    let seconds = |pick: fn(&super::record::Seconds) -> f64| {
+        optional(run.seconds.as_ref(), |s| format!("{:.3}", pick(s)))
+    };
+    if run.seconds.is_none() {
+        return std::iter::once(run.name.clone()).chain(vec!["-".into(); 8]).collect();
+    }
     vec![
         run.name.clone(),
         run.unknowns.to_string(),
@@ -211,10 +229,14 @@ fn tolerances(results: &Results) -> Table {
     let names: Vec<&str> = results.norms.iter().map(|norm| norm.name.as_str()).collect();
     let mut header = vec!["run", "tolerance", "computing s"];
     header.extend(&names);
-    let mut table = Table::new("Change by the solver's tolerance, over the error that is left at the tightest", &header);
+    let mut table =
+        Table::new("Change by the solver's tolerance, over the error that is left at the tightest", &header);
     for row in &results.tolerances {
-        let mut cells =
-            vec![row.run.clone(), format!("{:e}", row.tolerance), optional(row.seconds, |s| format!("{s:.3}"))];
+        let mut cells = vec![
+            row.run.clone(),
+            format!("{:e}", row.tolerance),
+            optional(row.seconds, |s| format!("{s:.3}")),
+        ];
         for change in &row.changes {
             cells.push(match change {
                 Some(change) => match change.share_of_error {
@@ -233,7 +255,8 @@ fn tolerances(results: &Results) -> Table {
 
 fn ablation(results: &Results) -> Option<Table> {
     let ablation = results.ablation.as_ref()?;
-    let header = ["without", "computing s", "saved s", "displacement (V)", "velocity (H)", "stress (Q)", "status"];
+    let header =
+        ["without", "computing s", "saved s", "displacement (V)", "velocity (H)", "stress (Q)", "status"];
     let title = "Effects switched off one by one   [relative change of the answer at the end]";
     let mut table = Table::new(title, &header);
     let whole = optional(ablation.seconds, |s| format!("{s:.3}"));
@@ -276,7 +299,10 @@ mod tests {
         let mut table = Table::new("Errors", &["run", "error"]);
         table.rows = vec![vec!["a".into(), "1.5".into()], vec!["long name".into(), "10.25".into()]];
         table.notes = vec!["||v||".into()];
-        assert_eq!(table.text(), "Errors\n  run        error\n  a            1.5\n  long name  10.25\n  ||v||\n");
+        assert_eq!(
+            table.text(),
+            "Errors\n  run        error\n  a            1.5\n  long name  10.25\n  ||v||\n"
+        );
         let markdown = table.markdown();
         assert!(markdown.contains("| run | error |\n| :-- | --: |\n| a | 1.5 |\n"), "{markdown}");
         assert!(markdown.contains("\\|\\|v\\|\\|"), "{markdown}");

@@ -57,7 +57,7 @@ fn csv(results: &Results) -> String {
                 shown(Refined::Mesh),
                 shown(Refined::Step),
                 shown(Refined::Both),
-                number(error.orders.first().map(|order| order.expected)),
+                number(error.orders.first().and_then(|order| order.expected)),
                 number(error.published),
                 number(error.ratio),
                 number(error.published_order),

@@ -39,18 +39,31 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
     let cases = [
         (String::new(), "the study has no runs"),
         (format!("{run}{norm}"), "errors need a reference"),
-        (format!("{run}[reference.run]\n[[norm]]\nof = \"stress\"\nin = \"V\"\nover = \"max\"\n"), "a stress has no norm in v"),
+        (
+            format!("{run}[reference.run]\n[[norm]]\nof = \"stress\"\nin = \"V\"\nover = \"max\"\n"),
+            "a stress has no norm in v",
+        ),
         (format!("{run}[reference.run]\n{norm}published = [1, 2]\n"), "2 published errors for 1 runs"),
-        (format!("{run}{norm}[reference.exact]\ndisplacement = [0, 0]\n"), "[reference.exact] has no velocity"),
-        (format!("{run}{norm}[reference.exact]\nvelocity = [0, 0, 0]\n"), "reference.exact.velocity has 3 components"),
+        (
+            format!("{run}{norm}[reference.exact]\ndisplacement = [0, 0]\n"),
+            "[reference.exact] has no velocity",
+        ),
+        (
+            format!("{run}{norm}[reference.exact]\nvelocity = [0, 0, 0]\n"),
+            "reference.exact.velocity has 3 components",
+        ),
         ("[[run]]\ncells = [4, 4, 4]\n".into(), "3 numbers of cells for a mesh of dimension 2"),
         (format!("{run}name = \"reference\"\n"), "two runs can't have the same name"),
         (
-            format!("{run}[reference.run]\n[[probe]]\nname = \"tip\"\nvalue = \"velocity_x\"\nover = \"end\"\n"),
+            format!(
+                "{run}[reference.run]\n[[probe]]\nname = \"tip\"\nvalue = \"velocity_x\"\nover = \"end\"\n"
+            ),
             "the base job has: middle",
         ),
         (
-            format!("{run}[reference.run]\n[[probe]]\nname = \"middle\"\nvalue = \"velocity_z\"\nover = \"end\"\n"),
+            format!(
+                "{run}[reference.run]\n[[probe]]\nname = \"middle\"\nvalue = \"velocity_z\"\nover = \"end\"\n"
+            ),
             "probes.csv has no column `velocity_z`",
         ),
     ];
