@@ -32,6 +32,11 @@ impl LinearOutcome {
     pub fn words(&self) -> &'static str {
         linear_reason(self.reason)
     }
+
+    /// The outcome of two solves one after the other.
+    pub(super) fn followed_by(self, next: Self) -> Self {
+        Self { iterations: self.iterations + next.iterations, ..next }
+    }
 }
 
 /// PETSc's `KSPConvergedReason` in words.
@@ -120,8 +125,13 @@ impl Ksp {
 
     /// Starts from the values already in the solution.
     pub fn start_from_solution(&mut self) -> Result<()> {
+        self.start(true)
+    }
+
+    /// Starts from the values already in the solution, or from zero.
+    pub(super) fn start(&mut self, from_solution: bool) -> Result<()> {
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, 1) })
+        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, i32::from(from_solution) as sys::PetscBool) })
     }
 
     /// Lets PETSc options override what was set.

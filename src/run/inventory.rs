@@ -7,10 +7,12 @@ use std::collections::BTreeMap;
 /// Sums over all ranks.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Inventory {
-    /// Bytes of each history that effects keep for the cells, trial values included.
+    /// Bytes of each history that effects keep for cells or nodes, trial values included.
     pub history_bytes: BTreeMap<String, u64>,
     /// Quadrature points of all contacts.
     pub contact_points: u64,
+    /// Those of them with friction.
+    pub friction_points: u64,
     /// Whether steps are nonlinear, so that Newton's method exists.
     pub newton: bool,
     /// Whether a vector of nodal loads exists.
@@ -25,14 +27,17 @@ impl Inventory {
         scheme: &LaggedEuler,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        for history in body.effects.iter().flat_map(|e| e.histories()) {
+        let of_nodes = body.surface_effects.iter().flat_map(|e| e.histories());
+        for history in body.effects.iter().flat_map(|e| e.histories()).chain(of_nodes) {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }
         let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();
+        let with_friction: usize = body.contacts.iter().map(|c| c.friction_point_count()).sum();
         Self {
             history_bytes,
             contact_points: session.total(points) as u64,
+            friction_points: session.total(with_friction) as u64,
             newton: scheme.is_nonlinear(),
             load_vector: scheme.has_load(),
         }

@@ -8,15 +8,16 @@
 //! ```
 
 use super::{
+    bounded::{self, Bounded},
     equations::Scratch,
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, failed},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
+    newton::{Newton, REMEDY, Task, failed},
 };
 use crate::{
     body::Body,
     effect::{Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage, has_option},
     session::Session,
     state::State,
 };
@@ -124,7 +125,26 @@ impl LaggedEuler {
             linear_solver.linear_solver().apply_options()?;
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+            let bounded = match settings.method {
+                Method::Newton => None,
+                Method::VariationalInequality => {
+                    session.agree(bounded::refuse(body))?;
+                    Some(Bounded::new(&state.velocity)?)
+                }
+            };
+            linear_solver.set_patience(preconditioner.patience(D));
+            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
+            Solver::Newton(Box::new(Newton {
+                snes,
+                bounded,
+                linear_solver,
+                scratch,
+                before,
+                after,
+                scales,
+                start,
+                chosen_search,
+            }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
@@ -181,7 +201,8 @@ impl LaggedEuler {
             }
             Solver::Newton(newton) => {
                 session.agree(newton.linear_solver.set_constant(&matrix))?;
-                newton.choose_scales(session, &body.contacts, &self.right_hand_side)?;
+                session.agree(newton.linear_solver.linear_solver().set_up())?;
+                newton.choose_scales(session, &body.contacts, &self.right_hand_side, &matrix)?;
             }
         }
         self.matrix = Some((length, matrix));
@@ -325,9 +346,9 @@ impl LaggedEuler {
                     LINEAR_SHARE * tolerance,
                     LINEAR_ITERATIONS,
                 )?;
-                let limits = (tolerance, self.settings);
-                let right_hand_side = &self.right_hand_side;
-                newton.solve(session, body, state, step, matrix, right_hand_side, &mut self.trial, limits)
+                let (right_hand_side, settings) = (&self.right_hand_side, self.settings);
+                let task = Task { step, matrix, right_hand_side, tolerance, settings };
+                newton.solve(session, body, state, task, &mut self.trial)
             }
         }
     }

@@ -67,11 +67,15 @@ pub struct Solver {
     /// step counts as solved whatever its residual is.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub inclusion_tolerance: f64,
+    /// What solves a step with contact.
+    pub method: Method,
     /// How linear systems are preconditioned.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step counts as failed.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
+    /// How friction bounds that follow the contact pressure find it.
+    pub friction: FrictionIteration,
     /// Warnings that should not stop the run.
     pub accept: Vec<Accept>,
     /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
@@ -84,12 +88,26 @@ impl Default for Solver {
         Self {
             tolerance: 1e-10,
             inclusion_tolerance: 1e-6,
+            method: Method::Newton,
             preconditioner: Preconditioner::Auto,
             max_newton_iterations: 50,
+            friction: FrictionIteration::Newton,
             accept: Vec::new(),
             petsc: BTreeMap::new(),
         }
     }
+}
+
+/// What solves a step with contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Newton's method on the contact graphs.
+    #[default]
+    Newton,
+    /// PETSc's solver for variational inequalities, as an independent check: for jobs whose every contact is `unilateral`,
+    /// on boundaries square to the axes. Its PETSc options begin with bounds_.
+    Vinewtonrsls,
 }
 
 /// How linear systems are preconditioned.
@@ -105,6 +123,17 @@ pub enum Preconditioner {
     Gamg,
     /// Hypre's algebraic multigrid.
     Boomeramg,
+}
+
+/// How friction bounds that follow the contact pressure find it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FrictionIteration {
+    /// Within Newton's method, whose linear systems are then not symmetric; the fixed point is the way out where it fails.
+    #[default]
+    Newton,
+    /// Around Newton's method, which sees given bounds, until they no longer change.
+    FixedPoint,
 }
 
 /// A refusal that the user takes upon himself.
