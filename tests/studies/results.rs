@@ -61,7 +61,7 @@ fn a_study_has_the_same_numbers_on_one_two_and_three_ranks() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
     let scene = Scene::new("", "");
     let study = format!(
-        "[base]\njob = {paper:?}\n[[run]]\ncells = [3, 3]\nstep = 0.0625\n[[run]]\ncells = [4, 5]\nstep = 0.0625\n\
+        "[base]\njob = {paper:?}\nset = [\"time.end=0.25\"]\n[[run]]\ncells = [3, 3]\nstep = 0.0625\n[[run]]\ncells = [4, 5]\nstep = 0.0625\n\
          [reference.run]\ncells = [8, 8]\nstep = 0.03125\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"max\"\n\
          published = [0.1, 0.05]\n[[norm]]\nof = \"stress\"\nin = \"Q\"\nover = \"sum\"\n[[probe]]\nname = \"tip\"\n\
          value = \"velocity_y\"\nover = \"max\"\n"
