@@ -66,7 +66,7 @@ fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) 
     kept.map(|row| row[wanted].parse().ok()).collect()
 }
 
-fn extreme(side: &str, mut values: impl Iterator<Item = f64>) -> Option<f64> {
+fn extreme(side: &str, values: impl Iterator<Item = f64>) -> Option<f64> {
     match side {
         "max" => values.reduce(f64::max),
         "min" => values.reduce(f64::min),

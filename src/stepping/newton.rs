@@ -34,6 +34,36 @@ pub(super) struct Newton {
 
 /// Fixed-point iterations after which a step has failed.
 const FIXED_POINTS: usize = 200;
+/// One way to solve a step.
+#[derive(Clone, Copy)]
+struct Attempt {
+    /// Whether to search along steps for a decrease of the residual, or to take them in full.
+    search: bool,
+    /// How much stiffer than the body the parameters of the graphs are: which branches come back depends on it.
+    stiffer: f64,
+    iteration: FrictionIteration,
+}
+
+const fn attempt(search: bool, stiffer: f64, iteration: FrictionIteration) -> Attempt {
+    Attempt { search, stiffer, iteration }
+}
+
+/// What is tried in turn until a step is solved, each time from where the step started.
+///
+/// Full steps first: a new set of branches raises the residual, so that a search would creep where full steps arrive. A
+/// fixed point, at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
+const ATTEMPTS: [Attempt; 10] = [
+    attempt(false, 1.0, FrictionIteration::Newton),
+    attempt(true, 1.0, FrictionIteration::Newton),
+    attempt(false, 10.0, FrictionIteration::Newton),
+    attempt(true, 30.0, FrictionIteration::Newton),
+    attempt(false, 100.0, FrictionIteration::Newton),
+    attempt(true, 1.0 / 30.0, FrictionIteration::Newton),
+    attempt(false, 1.0, FrictionIteration::FixedPoint),
+    attempt(true, 1.0, FrictionIteration::FixedPoint),
+    attempt(false, 30.0, FrictionIteration::FixedPoint),
+    attempt(true, 30.0, FrictionIteration::FixedPoint),
+];
 /// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
 const STEEPEST: f64 = 0.8;
 const STEEP: f64 = 0.5;
@@ -55,6 +85,9 @@ impl Task<'_> {
         (self.tolerance, self.settings.tolerance)
     }
 }
+
+/// Newton iterations; with why they led nowhere, if so.
+type Attempted = std::result::Result<usize, (usize, String)>;
 
 impl Newton {
     /// Chooses the parameters `c` of each contact's graphs. Along the normal: above twice the steepest fall, and as stiff as
@@ -101,9 +134,6 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let (step, settings) = (task.step, task.settings);
-        let follows = settings.friction == FrictionIteration::Newton;
-        let mut falls = largest_falls(session, &body.contacts);
-        self.parametrise(body, &falls, follows);
         branches(body, &state.velocity, &mut self.before)?;
         if let Some(bounded) = &mut self.bounded {
             let contacts = &mut body.contacts;
@@ -121,42 +151,40 @@ impl Newton {
                 (outcome.iterations, &Effort::default()),
             );
         }
+        self.start.copy_from(trial)?;
+        let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
+        let (follows, chosen) = (body.contacts.iter().any(follows), self.chosen_search);
+        let mut attempts = ATTEMPTS.iter().filter(|a| match a.iteration {
+            FrictionIteration::Newton => !follows || settings.friction == FrictionIteration::Newton,
+            FrictionIteration::FixedPoint => follows,
+        });
+        let mut attempts = attempts.by_ref().filter(|a| !chosen || a.search);
+        let mut falls = largest_falls(session, &body.contacts);
         let mut effort = Effort::default();
         let mut newton_iterations = 0;
-        loop {
-            let solved = if follows {
-                match self.newton(session, body, task, trial, &mut effort) {
-                    // The fixed point is slower, but it does not cycle between sticking and sliding.
-                    Ok(Err(_))
-                        if body
-                            .contacts
-                            .iter()
-                            .any(|c| c.friction().is_some_and(|f| f.follows_pressure())) =>
-                    {
-                        self.start_again(body, state, &falls, trial)?;
-                        self.fixed_point(session, body, task, trial, &mut effort)?
-                    }
-                    other => other?,
+        let mut attempt = attempts.next().copied();
+        let mut why = String::new();
+        while let Some(now) = attempt {
+            self.parametrise(body, &falls, now);
+            match self.attempt(session, body, task, now, trial, &mut effort)? {
+                Ok(iterations) => newton_iterations += iterations,
+                Err((iterations, words)) => {
+                    (newton_iterations, why) = (newton_iterations + iterations, words);
+                    attempt = attempts.next().copied();
+                    self.start_again(body, state, trial)?;
+                    continue;
                 }
-            } else {
-                self.fixed_point(session, body, task, trial, &mut effort)?
-            };
-            newton_iterations += match solved {
-                Ok(iterations) => iterations,
-                Err(words) => return Err(failed(step, &words, REMEDY)),
-            };
-            let now = largest_falls(session, &body.contacts);
-            if now
-                .iter()
-                .zip(&falls)
-                .zip(&self.scales)
-                .all(|((n, f), s)| *n <= STEEPEST * friction_scale(*s, *f))
-            {
+            }
+            let steepest = largest_falls(session, &body.contacts);
+            let mut pairs = body.contacts.iter().zip(&steepest);
+            if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
                 break;
             }
             // The pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
-            falls = now;
-            self.parametrise(body, &falls, follows);
+            falls = steepest;
+        }
+        if attempt.is_none() {
+            return Err(failed(step, &why, REMEDY));
         }
         self.judge(session, body, step, trial, settings, (newton_iterations, &effort))
     }
@@ -201,105 +229,110 @@ impl Newton {
         &self,
         body: &mut Body<D, S>,
         falls: &[f64],
-        follows: bool,
+        attempt: Attempt,
     ) {
+        let follows = attempt.iteration == FrictionIteration::Newton;
         for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(falls) {
-            contact.scale = scales[0];
-            contact.set_friction(friction_scale(*scales, *fall), follows);
+            let [normal, tangential] = scales.map(|scale| attempt.stiffer * scale);
+            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
+            contact.set_friction(tangential.max(fall / STEEP), follows);
         }
     }
 
-    /// Goes back to the state before the step, with friction bounds that stay.
+    /// Goes back to where the step started.
     fn start_again<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
         state: &State,
-        falls: &[f64],
         trial: &mut DistributedVector,
     ) -> Result<()> {
-        trial.copy_from(&state.velocity)?;
+        trial.copy_from(&self.start)?;
         if let Some(traction) = &state.contact_traction {
             let traction = traction.owned()?;
             body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
         }
-        self.parametrise(body, falls, false);
         Ok(())
     }
 
-    /// Newton's method on the equations with friction bounds held at pressures that are brought up to date until these
-    /// solve them, too. Gives the iterations, or why it failed. Collective.
-    fn fixed_point<const D: usize, const S: usize>(
+    /// Solves once. A fixed point holds friction bounds at pressures that are brought up to date until these solve the
+    /// equations, too. Collective.
+    fn attempt<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         task: Task<'_>,
+        attempt: Attempt,
         trial: &mut DistributedVector,
         effort: &mut Effort,
-    ) -> Result<std::result::Result<usize, String>> {
+    ) -> Result<Attempted> {
+        if attempt.iteration == FrictionIteration::Newton {
+            return self.newton(session, body, task, attempt.search, trial, effort);
+        }
         let mut sum = 0;
         for _ in 0..FIXED_POINTS {
             body.contacts.iter_mut().for_each(Contact::take_pressures);
-            match self.newton(session, body, task, trial, effort)? {
+            match self.newton(session, body, task, attempt.search, trial, effort)? {
                 // What solves the equations of the last bounds solves those of its own.
                 Ok(0) if sum > 0 => return Ok(Ok(sum)),
                 Ok(iterations) => sum += iterations.max(1),
-                Err(words) => return Ok(Err(words)),
+                Err((iterations, words)) => return Ok(Err((sum + iterations, words))),
             }
         }
-        Ok(Err(format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations")))
+        let words = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
+        Ok(Err((sum, words)))
     }
 
-    /// Newton's method from the velocity in `trial`, and the solution there. Gives the iterations, or why it failed.
-    /// Collective.
+    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
     fn newton<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         task: Task<'_>,
+        search: bool,
         trial: &mut DistributedVector,
         effort: &mut Effort,
-    ) -> Result<std::result::Result<usize, String>> {
+    ) -> Result<Attempted> {
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
-        self.start.copy_from(trial)?;
-        let mut iterations = 0;
-        let mut why = String::new();
-        for last in if self.chosen_search { &[true][..] } else { &[false, true] } {
-            if !self.chosen_search {
-                self.snes.search_along_steps(*last)?;
-            }
-            trial.copy_from(&self.start)?;
-            effort.sets.clear();
-            let mut equations = ContactEquations {
-                matrix: task.matrix,
-                contacts: &mut body.contacts,
-                right_hand_side: task.right_hand_side,
-                scratch: &mut self.scratch,
-                linear_solver: &mut self.linear_solver,
-                session,
-                stop_at_cycles: !last,
-                effort: std::mem::take(effort),
-            };
-            let most = task.settings.newton_iterations;
-            let solved = self.snes.solve(&mut equations, trial, task.tolerances(), most);
-            *effort = equations.effort;
-            iterations += effort.sets.len();
-            why = match session.agree(solved) {
-                Ok(outcome) if outcome.converged() => {
-                    let mut trial = trial.owned_mut()?;
-                    body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
-                    return Ok(Ok(iterations));
-                }
-                Ok(outcome) => words(&outcome, effort),
-                Err(Error::Failed(words)) => words,
-                Err(other) => return Err(other),
-            };
+        if !self.chosen_search {
+            self.snes.search_along_steps(search)?;
         }
-        let mut trial = trial.owned_mut()?;
-        body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
-        Ok(Err(why))
+        effort.sets.clear();
+        let mut equations = ContactEquations {
+            matrix: task.matrix,
+            contacts: &mut body.contacts,
+            right_hand_side: task.right_hand_side,
+            scratch: &mut self.scratch,
+            linear_solver: &mut self.linear_solver,
+            session,
+            stop_at_cycles: !search,
+            effort: std::mem::take(effort),
+        };
+        let most = task.settings.newton_iterations;
+        let solved = self.snes.solve(&mut equations, trial, task.tolerances(), most);
+        *effort = equations.effort;
+        let iterations = effort.sets.len();
+        {
+            let mut trial = trial.owned_mut()?;
+            body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
+        }
+        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+        let fatal = matches!(&solved, Err(error) if !matches!(error, Error::Failed(_)));
+        // All ranks go the same way, whichever of them failed.
+        let [missed, fatal] = session.largest([missed, fatal].map(|flag| f64::from(u8::from(flag))));
+        if missed == 0.0 {
+            return Ok(Ok(iterations));
+        }
+        match session.agree(solved) {
+            Ok(outcome) => Ok(Err((iterations, words(&outcome, effort)))),
+            Err(error) if fatal > 0.0 => Err(error),
+            Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) => {
+                Ok(Err((iterations, words)))
+            }
+            Err(other) => Err(other),
+        }
     }
 
     /// The largest of all contacts over all ranks. Collective.
@@ -332,11 +365,6 @@ fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>]) -> 
 
 fn positive_or_one(stiffness: f64) -> f64 {
     if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
-}
-
-/// The parameter of friction graphs that fall by so much at most.
-fn friction_scale([_, stiffness]: [f64; 2], fall: f64) -> f64 {
-    stiffness.max(fall / STEEP)
 }
 
 /// Why Newton's method failed, in words.

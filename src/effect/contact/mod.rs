@@ -124,6 +124,11 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// `c` in the parameter of the friction graph in Pa s/m; 0 without friction.
+    pub fn friction_scale(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |friction| friction.scale)
+    }
+
     /// Holds the friction bounds at the pressures of now.
     pub fn take_pressures(&mut self) {
         if let Some(friction) = &mut self.friction {
