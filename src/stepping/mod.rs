@@ -1,5 +1,6 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
+mod attempts;
 mod bounded;
 mod equations;
 mod lagged_euler;

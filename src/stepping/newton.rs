@@ -2,15 +2,16 @@
 
 use super::{
     StepOutcome,
+    attempts::{ATTEMPTS, Search},
     bounded::Bounded,
-    equations::{ContactEquations, Effort, Scratch, cycle},
+    equations::{Effort, Scratch},
     linear_solver::{FrictionIteration, SolverSettings},
 };
 use crate::{
     body::Body,
     effect::{COUNTS, Contact, Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
+    petsc::{DistributedVector, Matrix, ProjectedKsp, Snes},
     session::Session,
     state::State,
 };
@@ -32,41 +33,9 @@ pub(super) struct Newton {
     pub chosen_search: bool,
 }
 
-/// Fixed-point iterations after which a step has failed.
-const FIXED_POINTS: usize = 200;
-/// One way to solve a step.
-#[derive(Clone, Copy)]
-struct Attempt {
-    /// Whether to search along steps for a decrease of the residual, or to take them in full.
-    search: bool,
-    /// How much stiffer than the body the parameters of the graphs are: which branches come back depends on it.
-    stiffer: f64,
-    iteration: FrictionIteration,
-}
-
-const fn attempt(search: bool, stiffer: f64, iteration: FrictionIteration) -> Attempt {
-    Attempt { search, stiffer, iteration }
-}
-
-/// What is tried in turn until a step is solved, each time from where the step started.
-///
-/// Full steps first: a new set of branches raises the residual, so that a search would creep where full steps arrive. A
-/// fixed point, at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
-const ATTEMPTS: [Attempt; 10] = [
-    attempt(false, 1.0, FrictionIteration::Newton),
-    attempt(true, 1.0, FrictionIteration::Newton),
-    attempt(false, 10.0, FrictionIteration::Newton),
-    attempt(true, 30.0, FrictionIteration::Newton),
-    attempt(false, 100.0, FrictionIteration::Newton),
-    attempt(true, 1.0 / 30.0, FrictionIteration::Newton),
-    attempt(false, 1.0, FrictionIteration::FixedPoint),
-    attempt(true, 1.0, FrictionIteration::FixedPoint),
-    attempt(false, 30.0, FrictionIteration::FixedPoint),
-    attempt(true, 30.0, FrictionIteration::FixedPoint),
-];
 /// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
 const STEEPEST: f64 = 0.8;
-const STEEP: f64 = 0.5;
+pub(super) const STEEP: f64 = 0.5;
 
 /// The equations of a step and what counts as their solution.
 #[derive(Clone, Copy)]
@@ -85,9 +54,6 @@ impl Task<'_> {
         (self.tolerance, self.settings.tolerance)
     }
 }
-
-/// Newton iterations; with why they led nowhere, if so.
-type Attempted = std::result::Result<usize, (usize, String)>;
 
 impl Newton {
     /// Chooses the parameters `c` of each contact's graphs. Along the normal: above twice the steepest fall, and as stiff as
@@ -158,7 +124,7 @@ impl Newton {
             FrictionIteration::Newton => !follows || settings.friction == FrictionIteration::Newton,
             FrictionIteration::FixedPoint => follows,
         });
-        let mut attempts = attempts.by_ref().filter(|a| !chosen || a.search);
+        let mut attempts = attempts.by_ref().filter(|a| !chosen || a.search == Search::Backtracking);
         let mut falls = largest_falls(session, &body.contacts);
         let mut effort = Effort::default();
         let mut newton_iterations = 0;
@@ -224,117 +190,6 @@ impl Newton {
         })
     }
 
-    /// Sets the parameters of all graphs, those of friction for these falls.
-    fn parametrise<const D: usize, const S: usize>(
-        &self,
-        body: &mut Body<D, S>,
-        falls: &[f64],
-        attempt: Attempt,
-    ) {
-        let follows = attempt.iteration == FrictionIteration::Newton;
-        for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(falls) {
-            let [normal, tangential] = scales.map(|scale| attempt.stiffer * scale);
-            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
-            contact.set_friction(tangential.max(fall / STEEP), follows);
-        }
-    }
-
-    /// Goes back to where the step started.
-    fn start_again<const D: usize, const S: usize>(
-        &self,
-        body: &mut Body<D, S>,
-        state: &State,
-        trial: &mut DistributedVector,
-    ) -> Result<()> {
-        trial.copy_from(&self.start)?;
-        if let Some(traction) = &state.contact_traction {
-            let traction = traction.owned()?;
-            body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
-        }
-        Ok(())
-    }
-
-    /// Solves once. A fixed point holds friction bounds at pressures that are brought up to date until these solve the
-    /// equations, too. Collective.
-    fn attempt<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        task: Task<'_>,
-        attempt: Attempt,
-        trial: &mut DistributedVector,
-        effort: &mut Effort,
-    ) -> Result<Attempted> {
-        if attempt.iteration == FrictionIteration::Newton {
-            return self.newton(session, body, task, attempt.search, trial, effort);
-        }
-        let mut sum = 0;
-        for _ in 0..FIXED_POINTS {
-            body.contacts.iter_mut().for_each(Contact::take_pressures);
-            match self.newton(session, body, task, attempt.search, trial, effort)? {
-                // What solves the equations of the last bounds solves those of its own.
-                Ok(0) if sum > 0 => return Ok(Ok(sum)),
-                Ok(iterations) => sum += iterations.max(1),
-                Err((iterations, words)) => return Ok(Err((sum + iterations, words))),
-            }
-        }
-        let words = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
-        Ok(Err((sum, words)))
-    }
-
-    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
-    fn newton<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        task: Task<'_>,
-        search: bool,
-        trial: &mut DistributedVector,
-        effort: &mut Effort,
-    ) -> Result<Attempted> {
-        {
-            let mut trial = trial.owned_mut()?;
-            body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
-        }
-        if !self.chosen_search {
-            self.snes.search_along_steps(search)?;
-        }
-        effort.sets.clear();
-        let mut equations = ContactEquations {
-            matrix: task.matrix,
-            contacts: &mut body.contacts,
-            right_hand_side: task.right_hand_side,
-            scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
-            session,
-            stop_at_cycles: !search,
-            effort: std::mem::take(effort),
-        };
-        let most = task.settings.newton_iterations;
-        let solved = self.snes.solve(&mut equations, trial, task.tolerances(), most);
-        *effort = equations.effort;
-        let iterations = effort.sets.len();
-        {
-            let mut trial = trial.owned_mut()?;
-            body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
-        }
-        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
-        let fatal = matches!(&solved, Err(error) if !matches!(error, Error::Failed(_)));
-        // All ranks go the same way, whichever of them failed.
-        let [missed, fatal] = session.largest([missed, fatal].map(|flag| f64::from(u8::from(flag))));
-        if missed == 0.0 {
-            return Ok(Ok(iterations));
-        }
-        match session.agree(solved) {
-            Ok(outcome) => Ok(Err((iterations, words(&outcome, effort)))),
-            Err(error) if fatal > 0.0 => Err(error),
-            Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) => {
-                Ok(Err((iterations, words)))
-            }
-            Err(other) => Err(other),
-        }
-    }
-
     /// The largest of all contacts over all ranks. Collective.
     fn inclusion_residual<const D: usize, const S: usize>(
         &self,
@@ -365,12 +220,6 @@ fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>]) -> 
 
 fn positive_or_one(stiffness: f64) -> f64 {
     if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
-}
-
-/// Why Newton's method failed, in words.
-fn words(outcome: &NonlinearOutcome, effort: &Effort) -> String {
-    let words = outcome.words().to_owned();
-    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
 pub(super) const REMEDY: &str =

@@ -1,0 +1,257 @@
+//! The ways in which a step is tried to be solved.
+
+use super::{
+    equations::{ContactEquations, Effort, cycle},
+    linear_solver::FrictionIteration,
+    newton::{Newton, STEEP, Task},
+};
+use crate::{
+    body::Body,
+    effect::Contact,
+    error::{Error, Result},
+    petsc::{DistributedVector, NonlinearOutcome, NonlinearProblem},
+    session::Session,
+    state::State,
+};
+
+/// Fixed-point iterations after which a step has failed.
+const FIXED_POINTS: usize = 200;
+/// One way to solve a step.
+#[derive(Clone, Copy)]
+pub(super) struct Attempt {
+    pub search: Search,
+    /// How much stiffer than the body the parameters of the graphs are: which branches come back depends on it.
+    pub stiffer: f64,
+    pub iteration: FrictionIteration,
+}
+
+/// What keeps Newton's method on its way.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Nothing: all steps in full.
+    FullSteps,
+    /// Every step as far as the residual falls enough.
+    Backtracking,
+    /// Full steps on the way from equations that the start solves to those of the step.
+    Continuation,
+}
+
+const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> Attempt {
+    Attempt { search, stiffer, iteration }
+}
+
+/// What is tried in turn until a step is solved, each time from where the step started.
+///
+/// Full steps first: a new set of branches raises the residual, so that a search would creep where full steps arrive. Where
+/// each step has one solution, it depends continuously on the forces, so that the way there can be cut into pieces. A
+/// fixed point, at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
+pub(super) const ATTEMPTS: [Attempt; 12] = [
+    attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
+    attempt(Search::Backtracking, 1.0, FrictionIteration::Newton),
+    attempt(Search::Continuation, 1.0, FrictionIteration::Newton),
+    attempt(Search::FullSteps, 10.0, FrictionIteration::Newton),
+    attempt(Search::Continuation, 10.0, FrictionIteration::Newton),
+    attempt(Search::Backtracking, 30.0, FrictionIteration::Newton),
+    attempt(Search::FullSteps, 100.0, FrictionIteration::Newton),
+    attempt(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
+    attempt(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
+    attempt(Search::Backtracking, 1.0, FrictionIteration::FixedPoint),
+    attempt(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
+    attempt(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
+];
+/// Share of the way that the first stride of a continuation goes, and below which it gives up.
+const FIRST_STRIDE: f64 = 0.25;
+const LAST_STRIDE: f64 = 1e-6;
+
+/// Newton iterations; with why they led nowhere, if so.
+pub(super) type Attempted = std::result::Result<usize, (usize, String)>;
+
+impl Newton {
+    /// Sets the parameters of all graphs, those of friction for these falls.
+    pub(super) fn parametrise<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        falls: &[f64],
+        attempt: Attempt,
+    ) {
+        let follows = attempt.iteration == FrictionIteration::Newton;
+        for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(falls) {
+            let [normal, tangential] = scales.map(|scale| attempt.stiffer * scale);
+            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
+            contact.set_friction(tangential.max(fall / STEEP), follows);
+        }
+    }
+
+    /// Goes back to where the step started.
+    pub(super) fn start_again<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        state: &State,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        trial.copy_from(&self.start)?;
+        if let Some(traction) = &state.contact_traction {
+            let traction = traction.owned()?;
+            body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+        }
+        Ok(())
+    }
+
+    /// Solves once. A fixed point holds friction bounds at pressures that are brought up to date until these solve the
+    /// equations, too. Collective.
+    pub(super) fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        task: Task<'_>,
+        attempt: Attempt,
+        trial: &mut DistributedVector,
+        effort: &mut Effort,
+    ) -> Result<Attempted> {
+        if attempt.search == Search::Continuation {
+            return self.continuation(session, body, task, trial, effort);
+        }
+        if attempt.iteration == FrictionIteration::Newton {
+            return self.newton(session, body, task, attempt.search, trial, effort);
+        }
+        let mut sum = 0;
+        for _ in 0..FIXED_POINTS {
+            body.contacts.iter_mut().for_each(Contact::take_pressures);
+            match self.newton(session, body, task, attempt.search, trial, effort)? {
+                // What solves the equations of the last bounds solves those of its own.
+                Ok(0) if sum > 0 => return Ok(Ok(sum)),
+                Ok(iterations) => sum += iterations.max(1),
+                Err((iterations, words)) => return Ok(Err((sum + iterations, words))),
+            }
+        }
+        let words = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
+        Ok(Err((sum, words)))
+    }
+
+    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
+    fn newton<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        task: Task<'_>,
+        search: Search,
+        trial: &mut DistributedVector,
+        effort: &mut Effort,
+    ) -> Result<Attempted> {
+        {
+            let mut trial = trial.owned_mut()?;
+            body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
+        }
+        let solved = self.iterate(session, body, task, search, trial, effort)?;
+        let mut trial = trial.owned_mut()?;
+        body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
+        Ok(solved)
+    }
+
+    /// Newton's method from and into the unknowns in `trial`. Collective.
+    fn iterate<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        task: Task<'_>,
+        search: Search,
+        trial: &mut DistributedVector,
+        effort: &mut Effort,
+    ) -> Result<Attempted> {
+        if !self.chosen_search {
+            self.snes.search_along_steps(search == Search::Backtracking)?;
+        }
+        effort.sets.clear();
+        let mut equations = ContactEquations {
+            matrix: task.matrix,
+            contacts: &mut body.contacts,
+            right_hand_side: task.right_hand_side,
+            scratch: &mut self.scratch,
+            linear_solver: &mut self.linear_solver,
+            session,
+            stop_at_cycles: search != Search::Backtracking,
+            effort: std::mem::take(effort),
+        };
+        let most = task.settings.newton_iterations;
+        let solved = self.snes.solve(&mut equations, trial, task.tolerances(), most);
+        *effort = equations.effort;
+        let iterations = effort.sets.len();
+        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+        let fatal = matches!(&solved, Err(error) if !matches!(error, Error::Failed(_)));
+        // All ranks go the same way, whichever of them failed.
+        let [missed, fatal] = session.largest([missed, fatal].map(|flag| f64::from(u8::from(flag))));
+        if missed == 0.0 {
+            return Ok(Ok(iterations));
+        }
+        match session.agree(solved) {
+            Ok(outcome) => Ok(Err((iterations, words(&outcome, effort)))),
+            Err(error) if fatal > 0.0 => Err(error),
+            Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) => {
+                Ok(Err((iterations, words)))
+            }
+            Err(other) => Err(other),
+        }
+    }
+
+    /// Newton's method on equations whose right-hand side goes in strides from what the start solves to that of the step.
+    /// The solution follows along a path of finitely many linear pieces. Collective.
+    fn continuation<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        task: Task<'_>,
+        trial: &mut DistributedVector,
+        effort: &mut Effort,
+    ) -> Result<Attempted> {
+        {
+            let mut trial = trial.owned_mut()?;
+            body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
+        }
+        let (mut open, mut target, mut behind) = (trial.like()?, trial.like()?, trial.like()?);
+        let mut equations = ContactEquations {
+            matrix: task.matrix,
+            contacts: &mut body.contacts,
+            right_hand_side: task.right_hand_side,
+            scratch: &mut self.scratch,
+            linear_solver: &mut self.linear_solver,
+            session,
+            stop_at_cycles: false,
+            effort: std::mem::take(effort),
+        };
+        equations.residual(trial, &mut open)?;
+        *effort = equations.effort;
+        behind.copy_from(trial)?;
+        let (mut reached, mut stride, mut sum) = (0.0, FIRST_STRIDE, 0);
+        while reached < 1.0 {
+            let next = f64::min(reached + stride, 1.0);
+            target.copy_from(task.right_hand_side)?;
+            target.add_scaled(1.0 - next, &open)?;
+            let part = Task { right_hand_side: &target, ..task };
+            match self.iterate(session, body, part, Search::Continuation, trial, effort)? {
+                Ok(iterations) => {
+                    sum += iterations;
+                    reached = next;
+                    stride *= 2.0;
+                    behind.copy_from(trial)?;
+                }
+                Err((iterations, words)) => {
+                    sum += iterations;
+                    stride *= 0.25;
+                    trial.copy_from(&behind)?;
+                    if stride < LAST_STRIDE {
+                        return Ok(Err((sum, words)));
+                    }
+                }
+            }
+        }
+        let mut trial = trial.owned_mut()?;
+        body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
+        Ok(Ok(sum))
+    }
+}
+
+/// Why Newton's method failed, in words.
+fn words(outcome: &NonlinearOutcome, effort: &Effort) -> String {
+    let words = outcome.words().to_owned();
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
+}
