@@ -6,6 +6,7 @@ use crate::{
     output::{inspect::inspect, parallel_file::given_up},
     run::{self, Clock, Start},
     session::{Mpi, Session},
+    study,
 };
 use clap::{Args, Parser, Subcommand};
 use mpi::traits::CommunicatorCollectives;
@@ -62,12 +63,12 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Every key of a job file: meaning, unit, range, default.
+    /// Every key of a job file (of a study file: describe study): meaning, unit, range, default.
     Describe {
         /// Show this table or key only, such as material.elasticity or time.step.
         table: Option<String>,
-        /// Print the JSON Schema of the whole job.
-        #[arg(long, conflicts_with = "table")]
+        /// Print the JSON Schema of the whole job, or of the whole study.
+        #[arg(long)]
         json: bool,
     },
     /// What is in a checkpoint or result file.
@@ -79,6 +80,12 @@ enum Command {
     Study {
         /// The study file.
         study: PathBuf,
+        /// Override a key of the study: timing.repetitions=3.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        overrides: Vec<String>,
+        /// Also run the base job without each of its effects: what each costs and changes.
+        #[arg(long)]
+        ablate: bool,
     },
     /// Pictures and one self-contained HTML page.
     Report {
@@ -129,16 +136,28 @@ fn dispatch(cli: Cli) -> Result<Exit> {
     match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
-        Some(Command::Describe { table, json }) => {
-            say(&if json { job::describe_json() } else { job::describe(table.as_deref())? })
-        }
+        Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
-        Some(Command::Study { .. }) => Err(Error::Refused("solver study is not available yet".into())),
+        Some(Command::Study { study, overrides, ablate }) => run_study(&study, &overrides, ablate),
         Some(Command::Report { .. }) => Err(Error::Refused("solver report is not available yet".into())),
         None => match &cli.run {
             Some(arguments) => run_job(arguments),
             None => Err(Error::Refused("name a job file; see solver --help".into())),
         },
+    }
+}
+
+fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
+    let of_study = table.and_then(|table| table.trim_matches(['[', ']']).strip_prefix("study"));
+    let of_study = of_study.filter(|rest| rest.is_empty() || rest.starts_with('.'));
+    match (of_study.map(|rest| rest.trim_start_matches('.')), json) {
+        (Some(""), true) => say(&study::describe_json()),
+        (Some(table), false) => say(&study::describe(Some(table).filter(|table| !table.is_empty()))?),
+        (None, false) => say(&job::describe(table)?),
+        (None, true) if table.is_none() => say(&job::describe_json()),
+        _ => Err(Error::Refused(
+            "--json prints a whole schema: solver describe --json, or describe study --json".into(),
+        )),
     }
 }
 
@@ -241,20 +260,34 @@ fn check(job: &Path, overrides: &[String], json: bool) -> Result<Exit> {
     })
 }
 
-/// Starts MPI and PETSc, loads a job on all ranks and works on it; the rank with the fault of its own speaks.
+/// Loads a job on all ranks and works on it.
 fn on_all_ranks(
     job: &Path,
     overrides: &[String],
     work: impl FnOnce(&Session, Loaded, Clock) -> Result<Exit>,
 ) -> Result<Exit> {
+    in_session(|session, clock| {
+        let colour = std::io::stderr().is_terminal();
+        let loaded = session.agree(Job::load_coloured(job, overrides, colour))?;
+        work(session, loaded, clock)
+    })
+}
+
+fn run_study(path: &Path, overrides: &[String], ablate: bool) -> Result<Exit> {
+    in_session(|session, _| {
+        let colour = std::io::stderr().is_terminal();
+        let plan = session.agree(study::Plan::load(path, overrides, colour))?;
+        study::study(session, &plan, ablate)
+    })
+}
+
+/// Starts MPI and PETSc and works; the rank with the fault of its own speaks.
+fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit> {
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
-    let clock = Clock { began, launched: began.elapsed() };
-    let colour = std::io::stderr().is_terminal();
-    let loaded = session.agree(Job::load_coloured(job, overrides, colour));
-    let result = loaded.and_then(|loaded| work(&session, loaded, clock));
-    let exit = result.unwrap_or_else(|error| {
+    let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
+    let exit = work(&session, clock).unwrap_or_else(|error| {
         if !matches!(error, Error::Elsewhere { .. }) {
             print_error(&error);
         }

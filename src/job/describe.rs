@@ -4,13 +4,13 @@ use serde_json::Value;
 
 use super::available;
 use super::nearest::nearest;
-use super::schema::{Schema, resolve, schema};
+use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
 
 const WIDTH: usize = 100;
 const NOT_YET: &str = " Not available yet.";
 
-/// A table of the job and its keys.
+/// A table of the document and its keys.
 struct Table {
     /// Keys joined by dots.
     path: String,
@@ -21,16 +21,15 @@ struct Table {
     meaning: String,
 }
 
-const OPENING: &str = "\
-A job is a TOML file of the tables below. [table] stands once, [[table]] any number of times. A table that is absent
-is an effect that is not simulated. Lengths, forces and times are in SI units; paths are relative to the job file.
-
-";
-
 /// Every key of the tables at or below `table` (of all if `None`), or the one key it names: meaning, unit, range, default,
 /// example.
 pub fn describe(table: Option<&str>) -> Result<String> {
-    let all = tables();
+    describe_kind(Kind::job(), table)
+}
+
+/// As [`describe`], of another kind of document.
+pub fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
+    let all = tables(kind);
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
     if let Some((path, key)) = wanted.rsplit_once('.') {
         let found = all.iter().find(|table| table.path == path);
@@ -49,24 +48,24 @@ pub fn describe(table: Option<&str>) -> Result<String> {
         })
         .collect();
     if shown.is_empty() {
-        return Err(unknown_table(wanted, &all));
+        return Err(unknown_table(kind, wanted, &all));
     }
-    let opening = if wanted.is_empty() { OPENING } else { "" };
+    let opening = if wanted.is_empty() { kind.opening } else { "" };
     Ok(opening.to_owned() + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
 }
 
 /// The JSON Schema (draft 2020-12) of a job.
 pub fn describe_json() -> String {
-    format!("{:#}", schema())
+    format!("{:#}", Kind::job().schema)
 }
 
-fn unknown_table(wanted: &str, all: &[Table]) -> Error {
+fn unknown_table(kind: Kind, wanted: &str, all: &[Table]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => match tables_with(wanted) {
+        None => match tables_with(kind, wanted) {
             Some(elsewhere) => {
                 let table = elsewhere.split(']').next().unwrap_or_default().trim_start_matches('[');
-                format!("it is a key of {elsewhere}: try solver describe {table}.{wanted}")
+                format!("it is a key of {elsewhere}: try solver describe {}{table}.{wanted}", kind.prefix)
             }
             None => {
                 let names: Vec<&str> = all.iter().map(|table| table.path.as_str()).collect();
@@ -74,12 +73,12 @@ fn unknown_table(wanted: &str, all: &[Table]) -> Error {
             }
         },
     };
-    Error::Refused(format!("no table of a job is called `{wanted}`; {help}"))
+    Error::Refused(format!("no table of a {} is called `{wanted}`; {help}", kind.name))
 }
 
 /// The tables that have a key of this name, as text.
-pub fn tables_with(key: &str) -> Option<String> {
-    let found: Vec<String> = tables()
+pub fn tables_with(kind: Kind, key: &str) -> Option<String> {
+    let found: Vec<String> = tables(kind)
         .iter()
         .filter(|table| table.keys.iter().any(|(name, _)| *name == key))
         .map(|table| format!("[{}]", table.path))
@@ -87,11 +86,11 @@ pub fn tables_with(key: &str) -> Option<String> {
     (!found.is_empty()).then(|| found.join(", "))
 }
 
-fn tables() -> Vec<Table> {
+fn tables(kind: Kind) -> Vec<Table> {
     let mut all = Vec::new();
-    let job = resolve(schema());
-    let required: Vec<&str> = job.required().collect();
-    for (key, property) in job.properties() {
+    let document = kind.root();
+    let required: Vec<&str> = document.required().collect();
+    for (key, property) in document.properties() {
         collect(key, property, required.contains(&key.as_str()), &mut all);
     }
     all

@@ -4,15 +4,16 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::report::{Fault, Texts};
+use super::schema::Kind;
 use super::semantic::{self, MeshNames};
 use super::source::{Node, Place, parse};
 use super::{Job, Mesh, available, set, validate};
 use crate::error::{Error, Result};
 
-/// Longest job file in bytes.
+/// Longest file in bytes.
 const LARGEST: usize = 1 << 20;
 
 /// A job without faults, with the places of its keys for faults that only the mesh shows.
@@ -34,10 +35,8 @@ impl Job {
 
     /// As [`Job::load`]; faults are rendered for a terminal with colours if `colour`.
     pub fn load_coloured(path: &Path, overrides: &[String], colour: bool) -> Result<Loaded> {
-        let name = path.display().to_string();
-        let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
-        let folder = absolute.parent().unwrap_or(Path::new("/"));
-        Loaded::new(&read(path)?, &name, folder, overrides, colour)
+        let (text, folder) = read(Kind::job(), path)?;
+        Loaded::new(&text, &path.display().to_string(), &folder, overrides, colour)
     }
 
     /// The job in `text`, called `name` in faults; paths are relative to `base_dir`.
@@ -47,27 +46,56 @@ impl Job {
     }
 }
 
-impl Loaded {
-    fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
-        if text.len() > LARGEST {
-            return Err(Error::Refused(format!("{name}: a job file has at most {LARGEST} bytes")));
-        }
-        let texts = Texts::new(name, text, overrides, colour);
+/// A document with what is wrong with it so far.
+pub struct Document {
+    /// Its keys.
+    pub root: Node,
+    /// What faults point into.
+    pub texts: Texts,
+    /// Faults so far.
+    pub faults: Vec<Fault>,
+}
+
+impl Document {
+    /// Parses `text`, writes `overrides` over it and holds every key against the schema.
+    pub fn new(kind: Kind, text: &str, name: &str, overrides: &[String], colour: bool) -> Result<Self> {
+        refuse_long(kind, text.len(), name)?;
+        let texts = Texts::new(kind.name, name, text, overrides, colour);
         let mut root = parse(text).map_err(|fault| texts.refuse(vec![fault]))?;
         let mut faults = Vec::new();
         for (index, text) in overrides.iter().enumerate() {
             faults.extend(set::apply(&mut root, text, index + 1).err());
         }
-        faults.extend(validate::faults(&root, text));
-        let findings = semantic::check(&root);
-        faults.extend(findings.faults);
-        faults.extend(available::faults(&root));
-        if !faults.is_empty() {
-            return Err(texts.refuse(faults));
+        faults.extend(validate::faults(kind, &root, text));
+        Ok(Self { root, texts, faults })
+    }
+
+    /// A fault at the value under `path`, or at the deepest table on the way there.
+    pub fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
+        self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
+    }
+
+    /// The document's struct, or all its faults.
+    pub fn fill<T: DeserializeOwned>(self) -> Result<(T, Node, Texts)> {
+        if !self.faults.is_empty() {
+            return Err(self.texts.refuse(self.faults));
         }
+        let unfit = |error: toml::de::Error| {
+            self.texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")])
+        };
+        let filled = T::deserialize(self.root.plain()).map_err(unfit)?;
+        Ok((filled, self.root, self.texts))
+    }
+}
+
+impl Loaded {
+    fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
+        let mut document = Document::new(Kind::job(), text, name, overrides, colour)?;
+        let findings = semantic::check(&document.root);
+        document.faults.extend(findings.faults);
         let warnings = findings.warnings;
-        let mut job = Job::deserialize(root.plain())
-            .map_err(|error| texts.refuse(vec![Fault::new(Place::new(0, 0..0), error.message(), "")]))?;
+        document.faults.extend(available::faults(&document.root));
+        let (mut job, root, texts) = document.fill::<Job>()?;
         job.resolve_paths(folder, Path::new(name));
         Ok(Self { job, warnings, root, texts })
     }
@@ -102,7 +130,7 @@ impl Job {
 }
 
 /// The path without `.` and, as far as they follow a name, without `..`.
-fn normal(path: &Path) -> PathBuf {
+pub fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {
         match part {
@@ -116,17 +144,26 @@ fn normal(path: &Path) -> PathBuf {
     out
 }
 
-fn read(path: &Path) -> Result<String> {
+fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
+    if bytes <= LARGEST {
+        return Ok(());
+    }
+    Err(Error::Refused(format!("{name}: a {} file has at most {LARGEST} bytes", kind.name)))
+}
+
+/// The text of a file of this kind, and the folder it is in.
+pub fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
+    let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
+    let folder = absolute.parent().unwrap_or(Path::new("/")).to_owned();
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes))
         .map_err(|error| Error::unreadable(path, error))?;
-    if bytes.len() > LARGEST {
-        return Err(Error::Refused(format!("{}: a job file has at most {LARGEST} bytes", path.display())));
-    }
-    String::from_utf8(bytes).map_err(|error| {
+    refuse_long(kind, bytes.len(), &path.display().to_string())?;
+    let text = String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
         Error::Refused(format!("{}:{line}: not a text file (UTF-8 expected)", path.display()))
-    })
+    })?;
+    Ok((text, folder))
 }

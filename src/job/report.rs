@@ -36,19 +36,20 @@ impl Fault {
 /// The texts that faults point into.
 #[derive(Debug, Clone)]
 pub struct Texts {
+    kind: &'static str,
     files: SimpleFiles<String, String>,
     colour: bool,
 }
 
 impl Texts {
-    /// The job file and, after it, the overrides.
-    pub fn new(name: &str, text: &str, overrides: &[String], colour: bool) -> Self {
+    /// The file of this kind of document and, after it, the overrides.
+    pub fn new(kind: &'static str, name: &str, text: &str, overrides: &[String], colour: bool) -> Self {
         let mut files = SimpleFiles::new();
         files.add(printable(name), printable(text));
         for text in overrides {
             files.add("--set".to_owned(), printable(text));
         }
-        Self { files, colour }
+        Self { kind, files, colour }
     }
 
     /// All `faults` as one refusal, in the order of their places.
@@ -63,7 +64,7 @@ impl Texts {
             text.push_str(&format!("... and {} more\n\n", faults.len() - SHOWN));
         }
         let count = faults.len();
-        text.push_str(&format!("{count} fault{} in the job", if count == 1 { "" } else { "s" }));
+        text.push_str(&format!("{count} fault{} in the {}", if count == 1 { "" } else { "s" }, self.kind));
         Error::Refused(text)
     }
 
@@ -113,7 +114,7 @@ mod tests {
 
     #[test]
     fn faults_come_in_the_order_of_the_file_with_line_and_column() {
-        let texts = Texts::new("a.toml", "first = 1\nsecond = 2\n", &["x=3".to_owned()], false);
+        let texts = Texts::new("job", "a.toml", "first = 1\nsecond = 2\n", &["x=3".to_owned()], false);
         let text = rendered(
             &texts,
             vec![
@@ -130,7 +131,7 @@ mod tests {
 
     #[test]
     fn control_characters_of_a_job_never_reach_the_terminal() {
-        let texts = Texts::new("a.toml", "key = \"\u{1b}[31m\"\n", &[], false);
+        let texts = Texts::new("job", "a.toml", "key = \"\u{1b}[31m\"\n", &[], false);
         let text = rendered(&texts, vec![Fault::new(Place::new(0, 0..3), "bad \u{1b}]0;", "\u{9b}")]);
         assert!(!text.contains(|c: char| c.is_control() && c != '\n'), "{text:?}");
     }
@@ -138,7 +139,7 @@ mod tests {
     #[test]
     fn colour_is_there_only_when_asked_for() {
         let fault = || vec![Fault::new(Place::new(0, 0..1), "wrong", "here")];
-        assert!(!rendered(&Texts::new("a", "x", &[], false), fault()).contains('\u{1b}'));
-        assert!(rendered(&Texts::new("a", "x", &[], true), fault()).contains('\u{1b}'));
+        assert!(!rendered(&Texts::new("job", "a", "x", &[], false), fault()).contains('\u{1b}'));
+        assert!(rendered(&Texts::new("job", "a", "x", &[], true), fault()).contains('\u{1b}'));
     }
 }

@@ -1,31 +1,62 @@
-//! The JSON Schema of the job, from the structs, without what TOML does not have.
+//! The JSON Schema of a kind of document, from the structs, without what TOML does not have.
 
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
 
 use super::Job;
 
-static SCHEMA: LazyLock<Value> = LazyLock::new(|| {
-    let mut schema = schemars::schema_for!(Job).to_value();
+static JOB: LazyLock<Value> = LazyLock::new(schema_of::<Job>);
+
+/// A kind of document.
+#[derive(Clone, Copy)]
+pub struct Kind {
+    /// What messages call it.
+    pub name: &'static str,
+    /// What stands before the name of a table on the command line.
+    pub prefix: &'static str,
+    /// What the reference of its keys begins with.
+    pub opening: &'static str,
+    /// Its schema (draft 2020-12).
+    pub schema: &'static Value,
+}
+
+impl Kind {
+    /// Jobs.
+    pub fn job() -> Self {
+        Self { name: "job", prefix: "", opening: OPENING, schema: &JOB }
+    }
+
+    /// The schema of the whole document.
+    pub fn root(&self) -> Schema {
+        resolve(self.schema, self.schema)
+    }
+}
+
+const OPENING: &str = "\
+A job is a TOML file of the tables below. [table] stands once, [[table]] any number of times. A table that is absent
+is an effect that is not simulated. Lengths, forces and times are in SI units; paths are relative to the job file.
+
+";
+
+/// The schema of a whole document; no key may be null, as in TOML.
+pub fn schema_of<T: JsonSchema>() -> Value {
+    let mut schema = schemars::schema_for!(T).to_value();
     remove_null(&mut schema);
     schema
-});
-
-/// The schema of a whole job (draft 2020-12); no key may be null, as in TOML.
-pub fn schema() -> &'static Value {
-    &SCHEMA
 }
 
 /// A schema with its reference followed; the part that refers has the last word on description and default.
-pub fn resolve(schema: &'static Value) -> Schema {
-    let target = schema["$ref"].as_str().and_then(|name| SCHEMA.pointer(name.trim_start_matches('#')));
-    Schema { own: schema, target: target.unwrap_or(schema) }
+fn resolve(root: &'static Value, schema: &'static Value) -> Schema {
+    let target = schema["$ref"].as_str().and_then(|name| root.pointer(name.trim_start_matches('#')));
+    Schema { root, own: schema, target: target.unwrap_or(schema) }
 }
 
 /// A schema and the place where it is used.
 #[derive(Clone, Copy)]
 pub struct Schema {
+    root: &'static Value,
     own: &'static Value,
     target: &'static Value,
 }
@@ -63,7 +94,7 @@ impl Schema {
         let branches = self.get("oneOf").as_array().or_else(|| self.get("anyOf").as_array());
         let mut all = Vec::new();
         for branch in branches.into_iter().flatten() {
-            let branch = resolve(branch);
+            let branch = resolve(self.root, branch);
             match branch.alternatives() {
                 nested if nested.is_empty() => all.push(branch),
                 nested => all.extend(nested),
@@ -85,12 +116,17 @@ impl Schema {
 
     /// The keys of a table.
     pub fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
-        self.get("properties").as_object().into_iter().flatten().map(|(key, value)| (key, resolve(value)))
+        let root = self.root;
+        self.get("properties")
+            .as_object()
+            .into_iter()
+            .flatten()
+            .map(|(key, value)| (key, resolve(root, value)))
     }
 
     /// The schema of one key of a table.
     pub fn property(&self, key: &str) -> Option<Schema> {
-        self.get("properties").get(key).map(resolve)
+        self.get("properties").get(key).map(|inner| resolve(self.root, inner))
     }
 
     /// Keys that a table must have.
@@ -103,7 +139,7 @@ impl Schema {
         [self.get("items"), self.get("additionalProperties")]
             .into_iter()
             .find(|inner| inner.is_object())
-            .map(resolve)
+            .map(|inner| resolve(self.root, inner))
     }
 }
 

@@ -6,17 +6,18 @@ use super::describe;
 use super::expression::Expression;
 use super::nearest::nearest;
 use super::report::Fault;
-use super::schema::{Schema, resolve, schema};
+use super::schema::{Kind, Schema};
 use super::source::{Node, Place, Value};
 
 /// What is wrong with the document by itself, before keys are held against each other.
-pub fn faults(root: &Node, text: &str) -> Vec<Fault> {
-    let mut walk = Walk { text, faults: Vec::new() };
-    walk.value(root, resolve(schema()), "");
+pub fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
+    let mut walk = Walk { kind, text, faults: Vec::new() };
+    walk.value(root, kind.root(), "");
     walk.faults
 }
 
 struct Walk<'a> {
+    kind: Kind,
     text: &'a str,
     faults: Vec<Fault>,
 }
@@ -128,12 +129,16 @@ impl Walk<'_> {
         path: &str,
     ) -> Option<&'static str> {
         let near = nearest(key, known.iter().copied());
-        let place = if path.is_empty() { "at the top of a job".to_owned() } else { format!("in [{path}]") };
+        let place = if path.is_empty() {
+            format!("at the top of a {}", self.kind.name)
+        } else {
+            format!("in [{path}]")
+        };
         let mut fault =
             Fault::new(child.key.clone(), format!("unknown key `{key}` {place}"), "not a key here");
         if let Some(near) = near {
             fault = fault.help(format!("did you mean `{near}`?"));
-        } else if let Some(elsewhere) = describe::tables_with(key) {
+        } else if let Some(elsewhere) = describe::tables_with(self.kind, key) {
             fault = fault.help(format!("`{key}` is a key of {elsewhere}"));
         }
         self.faults.push(fault.help(format!("allowed: {}", list(known))));
@@ -141,7 +146,7 @@ impl Walk<'_> {
     }
 
     fn missing(&mut self, node: &Node, key: &str, schema: Option<Schema>, path: &str) {
-        let place = if path.is_empty() { "the job".to_owned() } else { format!("[{path}]") };
+        let place = if path.is_empty() { format!("the {}", self.kind.name) } else { format!("[{path}]") };
         let message = format!("missing key `{key}` in {place}");
         let label = if path.is_empty() { "" } else { "this table lacks it" };
         let mut fault = Fault::new(node.key.clone(), message, label);

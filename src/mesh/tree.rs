@@ -37,17 +37,23 @@ impl<const D: usize> BoxTree<D> {
     }
 
     /// Calls `found` with every box around the point, until it returns true; whether it did.
-    pub fn around(&self, point: &Vector<D>, mut found: impl FnMut(u32) -> bool) -> bool {
+    pub fn around(&self, point: &Vector<D>, found: impl FnMut(u32) -> bool) -> bool {
+        self.meeting(&(*point, *point), found)
+    }
+
+    /// Calls `found` with every box that has a point in common with the box `(low, high)`, until it returns true;
+    /// whether it did.
+    pub fn meeting(&self, wanted: &(Vector<D>, Vector<D>), mut found: impl FnMut(u32) -> bool) -> bool {
         let mut at = 0;
         while let Some(branch) = self.branches.get(at) {
-            if !encloses(&(branch.low, branch.high), point) {
+            if !meet(&(branch.low, branch.high), wanted) {
                 at = branch.after as usize;
                 continue;
             }
             let (first, last) = branch.items;
             if self.items[first as usize..last as usize]
                 .iter()
-                .any(|&item| encloses(&self.boxes[item as usize], point) && found(item))
+                .any(|&item| meet(&self.boxes[item as usize], wanted) && found(item))
             {
                 return true;
             }
@@ -57,8 +63,8 @@ impl<const D: usize> BoxTree<D> {
     }
 }
 
-fn encloses<const D: usize>((low, high): &Bounds<D>, point: &Vector<D>) -> bool {
-    (0..D).all(|i| low[i] <= point[i] && point[i] <= high[i])
+fn meet<const D: usize>((low, high): &Bounds<D>, other: &Bounds<D>) -> bool {
+    (0..D).all(|i| low[i] <= other.1[i] && other.0[i] <= high[i])
 }
 
 /// Appends the branch over `items`, which lie from position `first` on in the tree's items.

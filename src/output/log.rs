@@ -12,14 +12,15 @@ use std::{
 #[derive(Debug)]
 pub struct Log {
     speaks: bool,
+    on_terminal: bool,
     file: Option<File>,
     bar: Option<ProgressBar>,
 }
 
 impl Log {
-    /// A log that speaks on rank 0 only and has no file yet.
-    pub fn new(speaks: bool) -> Self {
-        Self { speaks, file: None, bar: None }
+    /// A log that speaks on rank 0 only and has no file yet; without `on_terminal` its lines go to the file alone.
+    pub fn new(speaks: bool, on_terminal: bool) -> Self {
+        Self { speaks, on_terminal, file: None, bar: None }
     }
 
     /// Also writes to this file, behind what it holds if the run goes on.
@@ -44,7 +45,8 @@ impl Log {
         }
         match &self.bar {
             Some(bar) => bar.suspend(|| print_line(words.as_ref())),
-            None => print_line(words.as_ref()),
+            None if self.on_terminal => print_line(words.as_ref()),
+            None => {}
         }
         self.file_line(words.as_ref());
     }
@@ -52,7 +54,7 @@ impl Log {
     /// Writes lines to the file and, where no progress bar moves, to the terminal.
     pub fn quiet_line(&mut self, words: impl AsRef<str>) {
         if self.speaks {
-            if self.bar.is_none() {
+            if self.bar.is_none() && self.on_terminal {
                 print_line(words.as_ref());
             }
             self.file_line(words.as_ref());
@@ -68,7 +70,8 @@ impl Log {
 
     /// Shows a progress bar if the output is a terminal.
     pub fn start_progress(&mut self, steps: u64, taken: u64) {
-        if self.speaks && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
+        let wanted = self.speaks && self.on_terminal;
+        if wanted && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
             let bar = ProgressBar::new(steps);
             let style = ProgressStyle::with_template(
                 "{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}",

@@ -70,6 +70,13 @@ pub fn set_option(name: &str, value: &str) -> Result<()> {
     Ok(())
 }
 
+/// Takes a PETSc option back, if it is set; the name is without the leading dash.
+pub fn clear_option(name: &str) -> Result<()> {
+    let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
+    // SAFETY: a NUL-terminated string; NULL is the global options database.
+    check(unsafe { sys::PetscOptionsClearValue(ptr::null_mut(), name.as_ptr()) })
+}
+
 /// Whether a PETSc option is set; the name is without the leading dash.
 pub fn has_option(name: &str) -> Result<bool> {
     let key: CString = c_string(&format!("-{name}"))?;

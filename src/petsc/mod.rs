@@ -17,7 +17,7 @@ mod variational_inequality;
 mod vector;
 
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Entered, Petsc, Stage, has_option, set_default_option, set_option};
+pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};

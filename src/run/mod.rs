@@ -56,13 +56,15 @@ impl Start {
     }
 }
 
-/// When the process began and how long MPI and PETSc took to start.
+/// When the process began, how long MPI and PETSc took to start, and who watches.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     /// The beginning.
     pub began: Instant,
     /// Time until MPI and PETSc were up.
     pub launched: Duration,
+    /// Whether the run's log is shown on the terminal too.
+    pub on_terminal: bool,
 }
 
 /// Calls a function of a submodule on a job's mesh, for its dimension and hypothesis.

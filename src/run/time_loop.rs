@@ -48,7 +48,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
     let restored = session.agree(restored)?;
-    let mut log = Log::new(session.is_first());
+    let mut log = Log::new(session.is_first(), clock.on_terminal);
     let prepared = if session.is_first() {
         prepare_folder(folder, goes_on, &mut log).and_then(|()| log.open(&folder.join("run.log"), goes_on))
     } else {

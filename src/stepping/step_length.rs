@@ -3,7 +3,7 @@
 use crate::{effect::Step, state::State};
 
 /// A step that ends within this share of a step of the end ends there.
-pub const SNAP: f64 = 1e-9;
+pub const SNAP: f64 = 1e-6;
 
 /// The step of `length` from here, cut or stretched to end at `end` where that is near.
 pub fn next_step(state: &State, length: f64, end: f64) -> Step {

@@ -1,0 +1,252 @@
+//! The base job without one of its effects at a time: what each costs and changes.
+//!
+//! The effects are found, not listed: every table of the job's physics that its schema lets be absent, and the density.
+
+use super::{
+    document::{Norm, Over, Quantity, Space, Timing},
+    execute::{Outcome, execute},
+    in_dimension,
+    measure::Target,
+    plan::{Plan, Planned, trim, word},
+    record::Record,
+    results::{Ablation, EffectResult},
+    seconds_of,
+};
+use crate::{
+    error::{Error, Result},
+    job::{Job, Kind, Loaded, Schema},
+    session::Session,
+};
+use std::path::Path;
+use toml::Value;
+
+/// Tables that are physics.
+const PHYSICS: [&str; 7] = ["material", "region", "support", "traction", "body_force", "contact", "initial"];
+/// Keys that are effects without being tables.
+const PLAIN_EFFECTS: [&str; 1] = ["density"];
+/// What is compared at the end.
+const COMPARED: [(Quantity, Space); 3] =
+    [(Quantity::Displacement, Space::V), (Quantity::Velocity, Space::H), (Quantity::Stress, Space::Q)];
+
+/// Paths of the effects in an effective job, such as `material.viscosity` and `contact.0`.
+pub fn effects(job: &Job) -> Result<Vec<String>> {
+    let document = document(job)?;
+    let mut found = Vec::new();
+    for (key, schema) in Kind::job().root().properties() {
+        let optional = !Kind::job().root().required().any(|required| required == key);
+        if let Some(value) = document.get(key).filter(|_| PHYSICS.contains(&key.as_str())) {
+            collect(key, value, schema, optional, &mut found);
+        }
+    }
+    Ok(found)
+}
+
+fn collect(path: &str, value: &Value, schema: Schema, optional: bool, found: &mut Vec<String>) {
+    match value {
+        Value::Array(items) if items.iter().all(Value::is_table) => {
+            for (index, item) in items.iter().enumerate() {
+                let Some(inner) = schema.items() else { continue };
+                collect(&format!("{path}.{index}"), item, inner, optional, found);
+            }
+        }
+        Value::Table(table) => {
+            if optional {
+                found.push(path.to_owned());
+            }
+            for (key, inner) in table {
+                let Some(property) = schema.property(key) else { continue };
+                let optional = !schema.required().any(|required| required == key);
+                let path = format!("{path}.{key}");
+                if optional && PLAIN_EFFECTS.contains(&key.as_str()) {
+                    found.push(path.clone());
+                }
+                collect(&path, inner, property, optional, found);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn document(job: &Job) -> Result<Value> {
+    let text = job.to_toml()?;
+    toml::from_str::<toml::Table>(&text).map(Value::Table).map_err(|error| {
+        Error::Internal(format!("the effective job can't be read back: {}", error.message()))
+    })
+}
+
+/// The job without the table or key `path`; refused where it needs it.
+pub fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
+    let mut document = document(job)?;
+    let parts: Vec<&str> = path.split('.').collect();
+    remove(&mut document, &parts);
+    let text = toml::to_string(&document)
+        .map_err(|error| Error::Internal(format!("a job without {path} can't be written: {error}")))?;
+    Job::from_text(&text, &format!("the job without {path}"), folder, &[])
+}
+
+/// Takes the part away, and a list that has become empty with it.
+fn remove(value: &mut Value, parts: &[&str]) {
+    let Some((part, rest)) = parts.split_first() else { return };
+    match value {
+        Value::Table(table) if rest.is_empty() => {
+            table.remove(*part);
+        }
+        Value::Table(table) => {
+            if let Some(inner) = table.get_mut(*part) {
+                remove(inner, rest);
+                if inner.as_array().is_some_and(Vec::is_empty) {
+                    table.remove(*part);
+                }
+            }
+        }
+        Value::Array(items) => match part.parse::<usize>() {
+            Ok(index) if index < items.len() && rest.is_empty() => {
+                items.remove(index);
+            }
+            Ok(index) if index < items.len() => remove(&mut items[index], rest),
+            _ => {}
+        },
+        _ => {}
+    }
+}
+
+/// Runs the base job whole and without each effect; `None` where it was asked to stop. Collective.
+pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
+    let folder = plan.folder.join("ablation");
+    let Some(whole) = run(session, &plan.study.timing, "whole", plan.base.clone(), &folder, say)? else {
+        return Ok(None);
+    };
+    let seconds = |record: &Record| seconds_of(record, plan.study.timing.take).map(|s| s.computing);
+    let mut ablation = Ablation { seconds: seconds(&whole), error: whole.error.clone(), effects: Vec::new() };
+    let norms = COMPARED.map(|(of, space)| Norm {
+        of,
+        space,
+        over: Over::End,
+        expected_order: None,
+        published: Vec::new(),
+    });
+    for path in effects(&plan.base.job)? {
+        let mut effect = EffectResult {
+            without: path.clone(),
+            status: "needed".into(),
+            error: None,
+            seconds: None,
+            saved: None,
+            change: None,
+        };
+        match without(&plan.base.job, &path, &plan.folder) {
+            Err(error) => effect.error = Some(first_line(&error.to_string())),
+            Ok(loaded) => {
+                let name = format!("without-{}", path.replace('.', "-"));
+                let Some(record) = run(session, &plan.study.timing, &name, loaded, &folder, say)? else {
+                    return Ok(None);
+                };
+                effect.status = record.status.clone();
+                effect.error = record.error.as_deref().map(first_line);
+                if record.is_complete() {
+                    effect.seconds = seconds(&record);
+                    effect.saved = ablation.seconds.zip(effect.seconds).map(|(all, left)| all - left);
+                }
+                if record.is_complete() && whole.is_complete() {
+                    effect.change =
+                        Some(change(session, record.dimension, &folder.join(&name), &folder, &norms)?);
+                }
+            }
+        }
+        ablation.effects.push(effect);
+    }
+    Ok(Some(ablation))
+}
+
+/// Relative changes of what is compared, against the whole job. Collective.
+fn change(
+    session: &Session,
+    dimension: usize,
+    run: &Path,
+    folder: &Path,
+    norms: &[Norm; 3],
+) -> Result<[f64; 3]> {
+    let whole = folder.join("whole");
+    let (measured, _) = in_dimension(session, dimension, run, Target::Run(&whole, true), norms)?;
+    let relative = |at: usize| {
+        measured.get(at).map_or(f64::NAN, |m| if m.error == 0.0 { 0.0 } else { m.error / m.size })
+    };
+    Ok(std::array::from_fn(relative))
+}
+
+fn run(
+    session: &Session,
+    timing: &Timing,
+    name: &str,
+    mut loaded: Loaded,
+    folder: &Path,
+    say: &dyn Fn(&str),
+) -> Result<Option<Record>> {
+    trim(&mut loaded.job, &folder.join(name));
+    loaded.job.output.fields = None;
+    let job = &loaded.job;
+    let planned = Planned {
+        name: name.to_owned(),
+        cells: Vec::new(),
+        step: job.time.step,
+        scheme: word(job.time.scheme),
+        tolerance: job.solver.tolerance,
+        set: Vec::new(),
+        adaptive: job.time.adaptive.is_some(),
+        loaded,
+    };
+    Ok(match execute(session, &planned, timing.repetitions as usize)? {
+        Outcome::Stopped => None,
+        Outcome::Ran { record, .. } => {
+            say(&format!("ablation {name}: {}", record.error.as_deref().unwrap_or("completed")));
+            Some(record)
+        }
+    })
+}
+
+/// What an error says first.
+fn first_line(words: &str) -> String {
+    let line = words.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    line.trim_start_matches("error: ").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const JOB: &str = include_str!("../../jobs/papers/wang_cheng_2022.toml");
+
+    fn job() -> Job {
+        Job::from_text(JOB, "square.toml", Path::new("/"), &[]).expect("a job").job
+    }
+
+    #[test]
+    fn effects_are_the_optional_tables_of_the_physics() {
+        let found = effects(&job()).expect("effects");
+        for effect in [
+            "material.density",
+            "material.elasticity",
+            "material.viscosity",
+            "material.viscoplasticity",
+            "support.0",
+            "traction.0",
+            "contact.0",
+            "initial",
+        ] {
+            assert!(found.iter().any(|name| name == effect), "{effect} is not in {found:?}");
+        }
+        for kept in ["material", "time", "solver", "output", "about", "contact.0.normal", "check"] {
+            assert!(!found.iter().any(|name| name == kept), "{kept} is in {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_job_without_an_effect_lacks_just_that() {
+        let left = without(&job(), "contact.0", Path::new("/")).expect("a job").job;
+        assert!(left.contact.is_empty() && left.traction == job().traction);
+        let left = without(&job(), "material.viscoplasticity", Path::new("/")).expect("a job").job;
+        assert!(left.material.viscoplasticity.is_none() && left.material.elasticity.is_some());
+        let refused = without(&job(), "material.elasticity", Path::new("/")).expect_err("needed");
+        assert!(first_line(&refused.to_string()).contains("elasticity"), "{refused}");
+    }
+}

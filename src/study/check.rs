@@ -1,0 +1,135 @@
+//! What is wrong with a study by itself and with its base job, before the jobs of its runs are loaded.
+
+use super::document::{Exact, Quantity, Reference, Run, Space, Study};
+use crate::job::{Document, Job};
+
+/// Runs of one study.
+const MOST_RUNS: usize = 1000;
+
+/// Holds the keys of the study against each other and against its base job; `products` is the number of runs of [product].
+pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document) {
+    let count = study.run.len() + products;
+    if count == 0 {
+        document.fault("", "the study has no runs", "add [[run]] tables, or lists in [product]");
+    }
+    if count > MOST_RUNS {
+        document.fault("product", format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
+    }
+    check_cells(study, base, document);
+    for (index, run) in study.run.iter().enumerate() {
+        let same = |other: &Run| run.name.is_some() && other.name == run.name;
+        if run.name.as_deref() == Some("reference") || study.run[..index].iter().any(same) {
+            let message = "two runs can't have the same name";
+            document.fault(
+                &format!("run.{index}.name"),
+                message,
+                "\"reference\" is the name of the reference",
+            );
+        }
+    }
+    for (index, norm) in study.norm.iter().enumerate() {
+        if (norm.of == Quantity::Stress) != (norm.space == Space::Q) {
+            let help = "displacement and velocity have norms in H and V, stress in Q";
+            let message = format!("a {:?} has no norm in {:?}", norm.of, norm.space).to_lowercase();
+            document.fault(&format!("norm.{index}.in"), message, help);
+        }
+        if !norm.published.is_empty() && (norm.published.len() != study.run.len() || study.product.is_some())
+        {
+            let message = format!("{} published errors for {count} runs", norm.published.len());
+            document.fault(
+                &format!("norm.{index}.published"),
+                message,
+                "give one for each [[run]], and no [product]",
+            );
+        }
+        if let Some(Reference::Exact(exact)) = &study.reference {
+            check_exact(exact, norm.of, base, &format!("norm.{index}.of"), document);
+        }
+    }
+    if study.reference.is_none() && !(study.norm.is_empty() && study.probe.is_empty()) {
+        let place = if study.norm.is_empty() { "probe.0" } else { "norm.0" };
+        document.fault(place, "errors need a reference", "add [reference.run] or [reference.exact]");
+    }
+    for (index, probe) in study.probe.iter().enumerate() {
+        check_probe(study, base, index, &probe.name, &probe.value, document);
+    }
+}
+
+fn check_cells(study: &Study, base: &Job, document: &mut Document) {
+    let mut given: Vec<(String, usize)> = Vec::new();
+    for (index, run) in study.run.iter().enumerate() {
+        given.extend(run.cells.as_ref().map(|cells| (format!("run.{index}.cells"), cells.len())));
+    }
+    for (index, cells) in study.product.iter().flat_map(|p| p.cells.iter().enumerate()) {
+        given.push((format!("product.cells.{index}"), cells.0.len()));
+    }
+    if let Some(Reference::Run(Run { cells: Some(cells), .. })) = &study.reference {
+        given.push(("reference.run.cells".into(), cells.len()));
+    }
+    for (path, count) in given {
+        match base.dimension() {
+            None => document.fault(
+                &path,
+                "the base job's mesh is a file: its cells can't be counted out here",
+                "name other files in the runs: set = [\"mesh.file=...\"]",
+            ),
+            Some(dimension) if dimension != count => {
+                let message = format!("{count} numbers of cells for a mesh of dimension {dimension}");
+                document.fault(&path, message, "one for each axis");
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &mut Document) {
+    let (key, count) = match of {
+        Quantity::Displacement => ("displacement", exact.displacement.len()),
+        Quantity::Velocity => ("velocity", exact.velocity.len()),
+        Quantity::Stress => ("stress", exact.stress.len()),
+    };
+    if count == 0 {
+        let message = format!("[reference.exact] has no {key}");
+        document.fault(path, message, format!("add {key} = [..] to [reference.exact]"));
+        return;
+    }
+    let wanted: &[usize] = match (of, base.dimension()) {
+        (Quantity::Stress, Some(2)) => &[3, 4],
+        (Quantity::Stress, Some(_)) => &[6],
+        (Quantity::Stress, None) => &[3, 4, 6],
+        (_, Some(2)) => &[2],
+        (_, Some(_)) => &[3],
+        (_, None) => &[2, 3],
+    };
+    if !wanted.contains(&count) {
+        let words: Vec<String> = wanted.iter().map(usize::to_string).collect();
+        let message = format!("reference.exact.{key} has {count} components");
+        document.fault(
+            &format!("reference.exact.{key}"),
+            message,
+            format!("{} expected", words.join(" or ")),
+        );
+    }
+}
+
+fn check_probe(study: &Study, base: &Job, index: usize, name: &str, value: &str, document: &mut Document) {
+    if !base.output.probe.iter().any(|probe| probe.name == name) {
+        let names: Vec<&str> = base.output.probe.iter().map(|probe| probe.name.as_str()).collect();
+        let help = if names.is_empty() {
+            "the base job has no probes: add [[output.probe]] to it".to_owned()
+        } else {
+            format!("the base job has: {}", names.join(", "))
+        };
+        document.fault(&format!("probe.{index}.name"), format!("no probe is called `{name}`"), help);
+    }
+    let axes = &["x", "y", "z"][..base.dimension().unwrap_or(3)];
+    let column = |field: &str| value.strip_prefix(field).is_some_and(|axis| axes.contains(&axis));
+    let path = format!("probe.{index}.value");
+    if !column("displacement_") && !column("velocity_") {
+        let message = format!("probes.csv has no column `{value}`");
+        document.fault(&path, message, "such as displacement_x or velocity_y");
+    } else if let Some(Reference::Exact(exact)) = &study.reference {
+        let of = if column("velocity_") { Quantity::Velocity } else { Quantity::Displacement };
+        check_exact(exact, of, base, &path, document);
+    }
+}

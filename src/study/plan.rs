@@ -1,0 +1,269 @@
+//! From a study to the runs it asks for: every job is loaded before the first one runs.
+
+use super::{
+    check::check,
+    document::{Product, Reference, Run, Study, kind},
+    exact::ExactFields,
+};
+use crate::{
+    error::{Error, Result},
+    job::{Document, Every, Job, Loaded, Mesh, Scheme, normal, read},
+};
+use std::path::{Path, PathBuf};
+
+/// Multiples are whole up to this.
+const WHOLE: f64 = 1e-6;
+
+/// A run, ready to be started.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// Name of the run and of its folder.
+    pub name: String,
+    /// Cells along each axis; empty for a mesh from a file.
+    pub cells: Vec<u32>,
+    /// Length of a step in s.
+    pub step: f64,
+    /// Name of the time scheme.
+    pub scheme: String,
+    /// The solver's tolerance.
+    pub tolerance: f64,
+    /// What else it overrides.
+    pub set: Vec<String>,
+    /// Whether steps are chosen on the way.
+    pub adaptive: bool,
+    /// Its job.
+    pub loaded: Loaded,
+}
+
+/// What runs are held against.
+#[derive(Debug)]
+pub enum PlannedReference {
+    /// A run.
+    Run(Box<Planned>),
+    /// Expressions.
+    Exact(ExactFields),
+}
+
+/// A study without faults.
+#[derive(Debug)]
+pub struct Plan {
+    /// The study as it was written.
+    pub study: Study,
+    /// The study file's name without extension.
+    pub name: String,
+    /// Where its files go.
+    pub folder: PathBuf,
+    /// The base job with the overrides of all runs.
+    pub base: Loaded,
+    /// The runs, in the order of the study.
+    pub runs: Vec<Planned>,
+    /// What they are held against.
+    pub reference: Option<PlannedReference>,
+}
+
+impl Plan {
+    /// Reads the study in the file `path` with `overrides` written over it, and loads the job of every run.
+    pub fn load(path: &Path, overrides: &[String], colour: bool) -> Result<Self> {
+        let (text, folder) = read(kind(), path)?;
+        let document = Document::new(kind(), &text, &path.display().to_string(), overrides, colour)?;
+        let (study, root, texts) = document.fill::<Study>()?;
+        let mut document = Document { root, texts, faults: Vec::new() };
+        let base = Job::load_coloured(&normal(&folder.join(&study.base.job)), &study.base.set, colour)?;
+        check(&study, &base.job, products(study.product.as_ref()).len(), &mut document);
+        let (study, ..) = document.fill::<Study>()?;
+
+        let name = path.file_stem().map_or("study".into(), |stem| stem.to_string_lossy().into_owned());
+        let below = study.output.folder.clone().unwrap_or_else(|| Path::new("out").join(&name));
+        let output = normal(&folder.join(below));
+        let job =
+            Source { file: normal(&folder.join(&study.base.job)), set: &study.base.set, base: &base.job };
+        let wanted: Vec<Run> = study.run.iter().cloned().chain(products(study.product.as_ref())).collect();
+        let mut taken = vec!["reference".to_owned()];
+        let mut refusals = Vec::new();
+        let mut runs = Vec::new();
+        for run in &wanted {
+            match job.planned(run, None, &output, &mut taken) {
+                Ok(planned) => runs.push(planned),
+                Err(error) => refusals.push(error.to_string()),
+            }
+        }
+        let reference = match &study.reference {
+            None => None,
+            Some(Reference::Exact(exact)) => Some(PlannedReference::Exact(ExactFields::new(exact))),
+            Some(Reference::Run(run)) => match job.planned(run, Some("reference"), &output, &mut taken) {
+                Ok(planned) => Some(PlannedReference::Run(Box::new(planned))),
+                Err(error) => {
+                    refusals.push(error.to_string());
+                    None
+                }
+            },
+        };
+        if !refusals.is_empty() {
+            return Err(Error::Refused(refusals.join("\n\n")));
+        }
+        let mut plan = Self { study, name, folder: output, base, runs, reference };
+        plan.choose_times()?;
+        Ok(plan)
+    }
+
+    /// Makes every run write its fields when it is compared, and the reference at all of these times.
+    fn choose_times(&mut self) -> Result<()> {
+        let mut faults = Vec::new();
+        let interval = self.study.compare.interval;
+        let mut spacings = Vec::new();
+        for run in &mut self.runs {
+            let every = match interval.filter(|_| !run.adaptive) {
+                None => Some(1),
+                Some(interval) => whole(interval / run.step),
+            };
+            let Some(every) = every else {
+                faults.push(format!(
+                    "run {}: compare.interval = {} s is not a whole multiple of its step, {} s",
+                    run.name,
+                    interval.unwrap_or_default(),
+                    run.step
+                ));
+                continue;
+            };
+            run.loaded.job.output.fields = Some(Every::Every(every));
+            spacings.push((run.name.clone(), run.adaptive, every as f64 * run.step));
+        }
+        if let Some(PlannedReference::Run(reference)) = &mut self.reference {
+            let mut every = 0;
+            for (name, adaptive, spacing) in &spacings {
+                let count =
+                    if *adaptive || reference.adaptive { Some(1) } else { whole(spacing / reference.step) };
+                match count {
+                    Some(count) => every = greatest_common_divisor(every, count),
+                    None => faults.push(format!(
+                        "run {name}: it is compared every {spacing} s, which is not a whole multiple of the reference's \
+                         step, {} s: choose steps that are",
+                        reference.step
+                    )),
+                }
+            }
+            reference.loaded.job.output.fields = Some(Every::Every(every.max(1)));
+        }
+        if faults.is_empty() { Ok(()) } else { Err(Error::Refused(faults.join("\n"))) }
+    }
+}
+
+/// The number, if it is whole and above zero.
+fn whole(number: f64) -> Option<u64> {
+    let near = number.round();
+    (near >= 1.0 && (number - near).abs() <= WHOLE * near).then_some(near as u64)
+}
+
+fn greatest_common_divisor(a: u64, b: u64) -> u64 {
+    if a == 0 { b } else { greatest_common_divisor(b % a, a) }
+}
+
+/// Where runs are made from.
+struct Source<'a> {
+    file: PathBuf,
+    set: &'a [String],
+    base: &'a Job,
+}
+
+impl Source<'_> {
+    fn planned(
+        &self,
+        run: &Run,
+        fixed_name: Option<&str>,
+        output: &Path,
+        taken: &mut Vec<String>,
+    ) -> Result<Planned> {
+        let mut overrides = self.set.to_vec();
+        if let Some(cells) = &run.cells {
+            let kind = if matches!(self.base.mesh, Mesh::Box(_)) { "box" } else { "rectangle" };
+            overrides.push(format!("mesh.{kind}.cells={cells:?}"));
+        }
+        overrides.extend(run.step.map(|step| format!("time.step={step:?}")));
+        overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", word(scheme))));
+        overrides.extend(run.tolerance.map(|tolerance| format!("solver.tolerance={tolerance:?}")));
+        overrides.extend(run.set.iter().cloned());
+        let mut loaded = Job::load(&self.file, &overrides).map_err(|error| {
+            Error::Refused(format!("the job of run {} is refused:\n{error}", called(run, fixed_name)))
+        })?;
+        let job = &mut loaded.job;
+        let cells = match &job.mesh {
+            Mesh::Rectangle(mesh) => mesh.cells.to_vec(),
+            Mesh::Box(mesh) => mesh.cells.to_vec(),
+            Mesh::File(_) => Vec::new(),
+        };
+        let mut name = match (fixed_name, &run.name) {
+            (Some(fixed), _) => fixed.to_owned(),
+            (None, Some(given)) => given.clone(),
+            (None, None) => made_name(job, &cells, run.tolerance),
+        };
+        if fixed_name.is_none() {
+            let plain = name.clone();
+            let mut count = 1;
+            while taken.contains(&name) {
+                count += 1;
+                name = format!("{plain}-{count}");
+            }
+            taken.push(name.clone());
+        }
+        trim(job, &output.join("runs").join(&name));
+        Ok(Planned {
+            cells,
+            step: job.time.step,
+            scheme: word(job.time.scheme),
+            tolerance: job.solver.tolerance,
+            set: run.set.clone(),
+            adaptive: job.time.adaptive.is_some(),
+            name,
+            loaded,
+        })
+    }
+}
+
+/// Leaves out what a study has no use for, and sends the files of the run to its own folder.
+pub fn trim(job: &mut Job, folder: &Path) {
+    job.output.folder = Some(folder.to_owned());
+    job.output.profile.clear();
+    job.checkpoint = None;
+    job.check.clear();
+}
+
+fn called(run: &Run, fixed_name: Option<&str>) -> String {
+    let size = run.cells.as_ref().map_or(String::new(), |cells| format!(" cells {cells:?}"));
+    let step = run.step.map_or(String::new(), |step| format!(" step {step}"));
+    let name = fixed_name.or(run.name.as_deref()).unwrap_or("with");
+    format!("{name}{size}{step}")
+}
+
+fn made_name(job: &Job, cells: &[u32], tolerance: Option<f64>) -> String {
+    let counts: Vec<String> = cells.iter().map(u32::to_string).collect();
+    let mut parts = vec![word(job.time.scheme)];
+    parts.extend((!counts.is_empty()).then(|| counts.join("x")));
+    parts.push(format!("{}", job.time.step));
+    parts.extend(tolerance.map(|tolerance| format!("{tolerance:e}")));
+    parts.join("-")
+}
+
+/// A scheme's name in jobs.
+pub fn word(scheme: Scheme) -> String {
+    serde_json::to_value(scheme).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// All combinations, the steps running fastest.
+fn products(product: Option<&Product>) -> Vec<Run> {
+    fn choices<T: Clone>(list: &[T]) -> Vec<Option<T>> {
+        if list.is_empty() { vec![None] } else { list.iter().cloned().map(Some).collect() }
+    }
+    let Some(product) = product else { return Vec::new() };
+    let mut runs = Vec::new();
+    for scheme in choices(&product.schemes) {
+        for tolerance in choices(&product.tolerances) {
+            for cells in choices(&product.cells) {
+                for step in choices(&product.steps) {
+                    let cells = cells.clone().map(|cells| cells.0);
+                    runs.push(Run { cells, step, scheme, tolerance, ..Run::default() });
+                }
+            }
+        }
+    }
+    runs
+}

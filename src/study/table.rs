@@ -1,0 +1,310 @@
+//! Tables of a study, as text for the terminal and as Markdown.
+
+use super::{
+    document::{Norm, Over, ProbeError, Quantity, Space, Study},
+    results::{ErrorResult, NormResult, Results, RunResult},
+};
+
+/// A table with a title and lines below it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Table {
+    /// What it shows.
+    pub title: String,
+    /// Names of the columns; the first is text, the others are numbers.
+    pub header: Vec<String>,
+    /// As many cells a row as the header has.
+    pub rows: Vec<Vec<String>>,
+    /// Lines below the table.
+    pub notes: Vec<String>,
+}
+
+impl Table {
+    fn new(title: impl Into<String>, header: &[&str]) -> Self {
+        let header = header.iter().map(|name| (*name).to_owned()).collect();
+        Self { title: title.into(), header, ..Self::default() }
+    }
+
+    /// In columns, for the terminal.
+    pub fn text(&self) -> String {
+        let width = |column: usize| {
+            let cells = self.rows.iter().chain([&self.header]).filter_map(|row| row.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let mut out = format!("{}\n", self.title);
+        for row in [&self.header].into_iter().chain(&self.rows).filter(|row| !row.is_empty()) {
+            let mut line = String::new();
+            for (column, cell) in row.iter().enumerate() {
+                let width = width(column);
+                let padded =
+                    if column == 0 { format!("  {cell:<width$}") } else { format!("  {cell:>width$}") };
+                line.push_str(&padded);
+            }
+            out.push_str(line.trim_end());
+            out.push('\n');
+        }
+        self.notes.iter().for_each(|note| out.push_str(&format!("  {note}\n")));
+        out
+    }
+
+    /// As a section of a Markdown document.
+    pub fn markdown(&self) -> String {
+        let escaped = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
+        let line =
+            |row: &Vec<String>| format!("| {} |\n", row.iter().map(escaped).collect::<Vec<_>>().join(" | "));
+        let mut out = format!("## {}\n\n", self.title);
+        if !self.header.is_empty() {
+            out.push_str(&line(&self.header));
+            let rules = (0..self.header.len()).map(|at| if at == 0 { ":--" } else { "--:" });
+            out.push_str(&format!("| {} |\n", rules.collect::<Vec<_>>().join(" | ")));
+            self.rows.iter().for_each(|row| out.push_str(&line(row)));
+            out.push('\n');
+        }
+        self.notes.iter().for_each(|note| out.push_str(&format!("{}\n\n", escaped(note))));
+        out
+    }
+}
+
+/// The study's norms, then its probes.
+pub fn norms(study: &Study) -> Vec<NormResult> {
+    let norm = |norm: &Norm| NormResult {
+        name: format!("{}_{:?}_{}", quantity(norm.of), norm.space, over(norm.over)).to_lowercase(),
+        meaning: meaning(norm),
+        is_published: !norm.published.is_empty(),
+    };
+    let probe = |probe: &ProbeError| NormResult {
+        name: format!("{}_{}_{}", probe.name, probe.value, over(probe.over)),
+        meaning: match probe.over {
+            Over::Max => format!("largest error of {} at {}", probe.value, probe.name),
+            Over::Sum => format!("(sum of k error^2)^1/2 of {} at {}", probe.value, probe.name),
+            Over::End => format!("error of {} at {} at the end", probe.value, probe.name),
+        },
+        is_published: false,
+    };
+    study.norm.iter().map(norm).chain(study.probe.iter().map(probe)).collect()
+}
+
+fn quantity(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Displacement => "displacement",
+        Quantity::Velocity => "velocity",
+        Quantity::Stress => "stress",
+    }
+}
+
+fn over(over: Over) -> &'static str {
+    match over {
+        Over::Max => "max",
+        Over::Sum => "sum",
+        Over::End => "end",
+    }
+}
+
+fn meaning(norm: &Norm) -> String {
+    let (letter, space) = (
+        match norm.of {
+            Quantity::Displacement => "u",
+            Quantity::Velocity => "v",
+            Quantity::Stress => "sigma",
+        },
+        match norm.space {
+            Space::H => "H",
+            Space::V => "V",
+            Space::Q => "Q",
+        },
+    );
+    match norm.over {
+        Over::Max => format!("max ||{letter} - {letter}_hk||_{space}"),
+        Over::Sum => format!("(sum k ||{letter} - {letter}_hk||_{space}^2)^1/2"),
+        Over::End => format!("||{letter} - {letter}_hk||_{space} at the end"),
+    }
+}
+
+/// All tables of the results, in the order in which they are read.
+pub fn all(results: &Results) -> Vec<Table> {
+    let mut tables: Vec<Table> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
+    tables.push(costs(results));
+    if !results.tolerances.is_empty() {
+        tables.push(tolerances(results));
+    }
+    tables.extend(ablation(results));
+    tables.extend(failures(results));
+    tables
+}
+
+fn errors(results: &Results, norm: usize) -> Table {
+    let shown = &results.norms[norm];
+    let symbols = refined(results, norm);
+    let names: Vec<String> = symbols.iter().map(|symbol| format!("order ({symbol})")).collect();
+    let mut header = vec!["run", "error", "relative"];
+    header.extend(names.iter().map(String::as_str));
+    header.push("theory");
+    if shown.is_published {
+        header.extend(["published", "its order", "ours/published"]);
+    }
+    header.push("digits/s");
+    let mut table = Table::new(format!("{}   [{}]", shown.meaning, shown.name), &header);
+    for run in &results.runs {
+        let mut row = vec![run.name.clone()];
+        match run.errors.get(norm).and_then(Option::as_ref) {
+            None => row.push(if run.error.is_some() { "failed".into() } else { "-".into() }),
+            Some(error) => row.extend(error_cells(error, &symbols, shown.is_published)),
+        }
+        row.resize(header.len(), String::new());
+        table.rows.push(row);
+    }
+    table
+}
+
+fn error_cells(error: &ErrorResult, symbols: &[&str], published: bool) -> Vec<String> {
+    let mut row = vec![format!("{:.4e}", error.error), optional(error.relative, |r| format!("{r:.2e}"))];
+    for symbol in symbols {
+        let order = error.orders.iter().find(|order| order.refined.symbol() == *symbol);
+        row.push(optional(order, |order| format!("{:.4}", order.observed)));
+    }
+    let theory: Vec<String> =
+        error.orders.iter().filter_map(|order| order.expected).map(|order| order.to_string()).collect();
+    row.push(if theory.is_empty() { "-".into() } else { theory.join(", ") });
+    if published {
+        row.push(optional(error.published, |p| format!("{p:.4e}")));
+        row.push(optional(error.published_order, |o| format!("{o:.4}")));
+        row.push(optional(error.ratio, |r| format!("{r:.4}")));
+    }
+    row.push(optional(error.digits_per_second, |d| format!("{d:.3}")));
+    row
+}
+
+fn optional<T>(value: Option<T>, words: impl Fn(T) -> String) -> String {
+    value.map_or("-".into(), words)
+}
+
+/// What was refined between runs, as far as this norm shows it.
+fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
+    let errors = results.runs.iter().filter_map(|run| run.errors.get(norm)?.as_ref());
+    let mut found: Vec<_> = errors.flat_map(|error| &error.orders).map(|order| order.refined).collect();
+    found.sort();
+    found.dedup();
+    found.into_iter().map(|refined| refined.symbol()).collect()
+}
+
+fn costs(results: &Results) -> Table {
+    let header = [
+        "run",
+        "unknowns",
+        "steps",
+        "unknowns*steps",
+        "newton",
+        "linear",
+        "total s",
+        "computing s",
+        "solve s",
+    ];
+    let mut table = Table::new("Costs   [wall seconds; computing is without writing files]", &header);
+    for run in results.runs.iter().chain(&results.reference) {
+        table.rows.push(cost_cells(run));
+    }
+    table
+}
+
+fn cost_cells(run: &RunResult) -> Vec<String> {
+    let seconds = |pick: fn(&super::record::Seconds) -> f64| {
+        optional(run.seconds.as_ref(), |s| format!("{:.3}", pick(s)))
+    };
+    if run.seconds.is_none() {
+        return std::iter::once(run.name.clone()).chain(vec!["-".into(); 8]).collect();
+    }
+    vec![
+        run.name.clone(),
+        run.unknowns.to_string(),
+        run.steps.to_string(),
+        (run.unknowns * run.steps).to_string(),
+        run.newton_iterations.to_string(),
+        run.linear_iterations.to_string(),
+        seconds(|s| s.total),
+        seconds(|s| s.computing),
+        seconds(|s| s.solve),
+    ]
+}
+
+fn tolerances(results: &Results) -> Table {
+    let names: Vec<&str> = results.norms.iter().map(|norm| norm.name.as_str()).collect();
+    let mut header = vec!["run", "tolerance", "computing s"];
+    header.extend(&names);
+    let mut table =
+        Table::new("Change by the solver's tolerance, over the error that is left at the tightest", &header);
+    for row in &results.tolerances {
+        let mut cells = vec![
+            row.run.clone(),
+            format!("{:e}", row.tolerance),
+            optional(row.seconds, |s| format!("{s:.3}")),
+        ];
+        for change in &row.changes {
+            cells.push(match change {
+                Some(change) => match change.share_of_error {
+                    Some(share) => format!("{share:.1e}{}", if share > 0.1 { " !" } else { "" }),
+                    None => format!("{:.1e} abs", change.difference),
+                },
+                None => "-".into(),
+            });
+        }
+        cells.resize(header.len(), "-".into());
+        table.rows.push(cells);
+    }
+    table.notes.push("!: above a tenth, the solver's error shows beside the discretisation's".into());
+    table
+}
+
+fn ablation(results: &Results) -> Option<Table> {
+    let ablation = results.ablation.as_ref()?;
+    let header =
+        ["without", "computing s", "saved s", "displacement (V)", "velocity (H)", "stress (Q)", "status"];
+    let title = "Effects switched off one by one   [relative change of the answer at the end]";
+    let mut table = Table::new(title, &header);
+    let whole = optional(ablation.seconds, |s| format!("{s:.3}"));
+    let status = ablation.error.clone().unwrap_or_else(|| "completed".into());
+    let none = || "-".to_owned();
+    table.rows.push(vec!["(nothing)".into(), whole, none(), none(), none(), none(), status]);
+    for effect in &ablation.effects {
+        let change = |at: usize| optional(effect.change, |change| format!("{:.3e}", change[at]));
+        table.rows.push(vec![
+            effect.without.clone(),
+            optional(effect.seconds, |s| format!("{s:.3}")),
+            optional(effect.saved, |s| format!("{s:+.3}")),
+            change(0),
+            change(1),
+            change(2),
+            match &effect.error {
+                Some(error) => format!("{}: {error}", effect.status),
+                None => effect.status.clone(),
+            },
+        ]);
+    }
+    Some(table)
+}
+
+fn failures(results: &Results) -> Option<Table> {
+    let mut table = Table { title: "Failed runs and notes".into(), ..Table::default() };
+    for run in results.runs.iter().chain(&results.reference) {
+        table.notes.extend(run.error.iter().map(|words| format!("{}: {}", run.name, words.trim())));
+        table.notes.extend(run.notes.iter().map(|words| format!("{}: {words}", run.name)));
+    }
+    (!table.notes.is_empty()).then_some(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_aligned_as_text_and_escaped_as_markdown() {
+        let mut table = Table::new("Errors", &["run", "error"]);
+        table.rows = vec![vec!["a".into(), "1.5".into()], vec!["long name".into(), "10.25".into()]];
+        table.notes = vec!["||v||".into()];
+        assert_eq!(
+            table.text(),
+            "Errors\n  run        error\n  a            1.5\n  long name  10.25\n  ||v||\n"
+        );
+        let markdown = table.markdown();
+        assert!(markdown.contains("| run | error |\n| :-- | --: |\n| a | 1.5 |\n"), "{markdown}");
+        assert!(markdown.contains("\\|\\|v\\|\\|"), "{markdown}");
+    }
+}

@@ -1,0 +1,9 @@
+//! Studies: refusals of the study file, and whole studies under `mpirun`.
+
+#[path = "../runs/launch.rs"]
+#[allow(dead_code)]
+mod launch;
+mod refusals;
+mod resume;
+mod results;
+mod scene;

@@ -1,0 +1,100 @@
+//! Studies that are refused before anything runs.
+
+use crate::scene::{SOLUTION, SQUARE, Scene};
+use clarke::study::Plan;
+
+/// What a study says that is refused.
+fn refused(study: &str) -> String {
+    let scene = Scene::new(SQUARE, study);
+    let error = Plan::load(&scene.path("study.toml"), &[], false).expect_err("refused");
+    assert_eq!(error.exit() as u8, 2);
+    assert!(!scene.path("out").exists());
+    error.to_string()
+}
+
+#[test]
+fn all_faults_of_a_study_come_at_once_with_line_and_nearest_name() {
+    let text = refused(
+        "[[run]]\ncels = [4, 4]\nstep = -1\n[refrence.run]\n[[norm]]\nof = \"velocty\"\nin = \"H\"\nover = \"max\"\n",
+    );
+    for words in [
+        "unknown key `cels` in [run.0]",
+        "study.toml:4:1",
+        "did you mean `cells`?",
+        "`run.0.step` is out of range",
+        "unknown key `refrence` at the top of a study",
+        "did you mean `reference`?",
+        "`norm.0.of` can't be \"velocty\"",
+        "did you mean \"velocity\"?",
+        "4 faults in the study",
+    ] {
+        assert!(text.contains(words), "{words} is not in {text}");
+    }
+}
+
+#[test]
+fn keys_that_contradict_each_other_are_refused_where_they_stand() {
+    let norm = "[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"max\"\n";
+    let run = "[[run]]\ncells = [4, 4]\n";
+    let cases = [
+        (String::new(), "the study has no runs"),
+        (format!("{run}{norm}"), "errors need a reference"),
+        (
+            format!("{run}[reference.run]\n[[norm]]\nof = \"stress\"\nin = \"V\"\nover = \"max\"\n"),
+            "a stress has no norm in v",
+        ),
+        (format!("{run}[reference.run]\n{norm}published = [1, 2]\n"), "2 published errors for 1 runs"),
+        (
+            format!("{run}{norm}[reference.exact]\ndisplacement = [0, 0]\n"),
+            "[reference.exact] has no velocity",
+        ),
+        (
+            format!("{run}{norm}[reference.exact]\nvelocity = [0, 0, 0]\n"),
+            "reference.exact.velocity has 3 components",
+        ),
+        ("[[run]]\ncells = [4, 4, 4]\n".into(), "3 numbers of cells for a mesh of dimension 2"),
+        (format!("{run}name = \"reference\"\n"), "two runs can't have the same name"),
+        (
+            format!(
+                "{run}[reference.run]\n[[probe]]\nname = \"tip\"\nvalue = \"velocity_x\"\nover = \"end\"\n"
+            ),
+            "the base job has: middle",
+        ),
+        (
+            format!(
+                "{run}[reference.run]\n[[probe]]\nname = \"middle\"\nvalue = \"velocity_z\"\nover = \"end\"\n"
+            ),
+            "probes.csv has no column `velocity_z`",
+        ),
+    ];
+    for (study, words) in cases {
+        let text = refused(&study);
+        assert!(text.contains(words) && text.contains("study.toml:"), "{words} is not in {text}");
+    }
+}
+
+#[test]
+fn steps_that_the_reference_does_not_have_are_refused() {
+    let text = refused("[[run]]\nstep = 0.25\n[[run]]\nstep = 0.1\n[reference.run]\nstep = 0.125\n");
+    assert!(text.contains("lagged_euler-4x4-0.1: it is compared every 0.1 s"), "{text}");
+    assert!(!text.contains("0.25 s, which"), "{text}");
+    let text = refused(&format!("[[run]]\nstep = 0.25\n[compare]\ninterval = 0.3\n{SOLUTION}"));
+    assert!(text.contains("compare.interval = 0.3 s is not a whole multiple of its step, 0.25 s"), "{text}");
+}
+
+#[test]
+fn a_run_whose_job_is_refused_is_named_with_the_fault() {
+    let text = refused("[[run]]\nname = \"long\"\nstep = 5.0\n[[run]]\nset = [\"time.stp=1\"]\n");
+    assert!(text.contains("the job of run long step 5 is refused"), "{text}");
+    assert!(text.contains("the step is longer than the whole run"), "{text}");
+    assert!(text.contains("did you mean `step`?"), "{text}");
+}
+
+#[test]
+fn a_base_job_that_is_not_there_is_refused_by_name() {
+    let scene = Scene::new(SQUARE, "[[run]]\n");
+    scene.write("study.toml", "[base]\njob = \"nowhere.toml\"\n[[run]]\n");
+    let error = Plan::load(&scene.path("study.toml"), &[], false).expect_err("refused").to_string();
+    assert!(error.contains("nowhere.toml"), "{error}");
+    scene.study(2, &[]).expect(2).says("nowhere.toml");
+}

@@ -1,0 +1,181 @@
+//! What studies find.
+
+use crate::scene::{SOLUTION, SQUARE, Scene, number};
+use clarke::study::{Plan, describe};
+use std::path::Path;
+
+const NORMS: &str = r#"
+norm = [
+    { of = "velocity", in = "H", over = "end" },
+    { of = "velocity", in = "V", over = "max" },
+    { of = "stress", in = "Q", over = "max" },
+    { of = "displacement", in = "H", over = "end" },
+]
+"#;
+
+#[test]
+fn errors_against_a_known_solution_fall_with_the_orders_of_theory() {
+    let study = format!(
+        "{NORMS}{}",
+        "[product]\ncells = [[8, 8], [16, 16], [32, 32]]\nsteps = [0.25, 0.125]\n[[probe]]\nname = \"middle\"\n\
+         value = \"displacement_x\"\nover = \"end\"\n"
+    );
+    let study = format!("{study}{SOLUTION}");
+    // Top-level keys stand before the tables.
+    let (norms, rest) = study.split_at(NORMS.len());
+    let scene = Scene::new(SQUARE, "");
+    scene.write("study.toml", &format!("{norms}[base]\njob = \"job.toml\"\n{rest}"));
+    scene.study(2, &[]).expect(0).says("order (h)").says("order (k)");
+    let results = scene.results();
+    let runs = results["runs"].as_array().expect("runs");
+    assert_eq!(runs.len(), 6);
+    // The last run: refined in the mesh against run 3, in the step against run 4.
+    let order =
+        |norm: usize, kind: usize| number(&results, &format!("/runs/5/errors/{norm}/orders/{kind}/observed"));
+    for (norm, expected) in [(0, 2.0), (1, 1.0), (2, 1.0)] {
+        assert!((order(norm, 0) - expected).abs() < 0.05, "norm {norm}: {}", order(norm, 0));
+        let theory = number(&results, &format!("/runs/5/errors/{norm}/orders/0/expected"));
+        assert_eq!(theory, expected);
+        assert!(order(norm, 1).abs() < 0.05, "the velocity has no error in time: {}", order(norm, 1));
+    }
+    // u_n = (t^2/2 + k t/2) sin sin at steps of k: at the end an error of k/2 times the norm 1/2 of sin sin.
+    let error = number(&results, "/runs/5/errors/3/error");
+    assert!((error - 0.125 / 4.0).abs() < 0.002, "{error}");
+    assert!((order(3, 1) - 1.0).abs() < 0.05, "{}", order(3, 1));
+    let at_middle = number(&results, "/runs/5/errors/4/error");
+    assert!((at_middle - 0.125 / 2.0).abs() < 0.003, "{at_middle}");
+    // The norm of v = sin(pi x) sin(pi y) is 1/2.
+    let relative = number(&results, "/runs/5/errors/0/relative");
+    assert!((relative - 2.0 * number(&results, "/runs/5/errors/0/error")).abs() < 1e-6 * relative);
+    for file in ["study.csv", "study.md", "work-precision-velocity_h_end.svg"] {
+        assert!(scene.path("out/study").join(file).exists(), "{file}");
+    }
+    let csv = std::fs::read_to_string(scene.path("out/study/study.csv")).expect("study.csv");
+    let columns = csv.lines().next().expect("header").split(',').count();
+    assert_eq!(csv.lines().count(), 1 + 6 * 5);
+    assert!(csv.lines().all(|line| line.split(',').count() == columns), "{csv}");
+}
+
+#[test]
+fn a_study_has_the_same_numbers_on_one_two_and_three_ranks() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let scene = Scene::new("", "");
+    let study = format!(
+        "[base]\njob = {paper:?}\nset = [\"time.end=0.25\"]\n[[run]]\ncells = [3, 3]\nstep = 0.0625\n[[run]]\ncells = [4, 5]\nstep = 0.0625\n\
+         [reference.run]\ncells = [8, 8]\nstep = 0.03125\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"max\"\n\
+         published = [0.1, 0.05]\n[[norm]]\nof = \"stress\"\nin = \"Q\"\nover = \"sum\"\n[[probe]]\nname = \"tip\"\n\
+         value = \"velocity_y\"\nover = \"max\"\n"
+    );
+    scene.write("study.toml", &study);
+    let numbers: Vec<Vec<f64>> = (1..=3)
+        .map(|ranks| {
+            scene
+                .study(ranks, &["--set", &format!("output.folder=out/{ranks}")])
+                .expect(0)
+                .says("ours/published");
+            let results = crate::scene::read(&scene.path(&format!("out/{ranks}")));
+            let at = |run: usize, norm: usize| number(&results, &format!("/runs/{run}/errors/{norm}/error"));
+            (0..2)
+                .flat_map(|run| (0..3).map(move |norm| (run, norm)))
+                .map(|(run, norm)| at(run, norm))
+                .collect()
+        })
+        .collect();
+    for other in &numbers[1..] {
+        for (a, b) in numbers[0].iter().zip(other) {
+            assert!(*a > 1e-6 && (a - b).abs() < 1e-6 * a, "{numbers:?}");
+        }
+    }
+}
+
+#[test]
+fn failed_runs_are_listed_with_their_words_and_the_others_compared() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let scene = Scene::new("", "");
+    // The first step is beyond the scheme's bound.
+    let study = format!(
+        "[base]\njob = {paper:?}\n[product]\ncells = [[4, 4]]\nsteps = [0.25, 0.0625]\n[reference.run]\ncells = [8, 8]\n\
+         step = 0.0625\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"end\"\n"
+    );
+    scene.write("study.toml", &study);
+    scene.study(2, &[]).expect(1).says("explicit stress makes errors grow").says("1 of 2 runs failed");
+    let results = scene.results();
+    assert_eq!(results["runs"][0]["status"], "failed");
+    assert!(
+        results["runs"][0]["error"].as_str().expect("words").contains("explicit_stability"),
+        "{results:#}"
+    );
+    assert!(number(&results, "/runs/1/errors/0/error") > 0.0);
+    let text = std::fs::read_to_string(scene.path("out/study/study.md")).expect("study.md");
+    assert!(text.contains("Failed runs"), "{text}");
+}
+
+#[test]
+fn a_looser_tolerance_is_held_against_the_tightest() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let scene = Scene::new("", "");
+    let study = format!(
+        "[base]\njob = {paper:?}\nset = [\"time.step=0.0625\", \"solver.preconditioner=gamg\", \"time.end=0.25\", \"solver.inclusion_tolerance=1\"]\n\
+         [product]\ncells = [[8, 8]]\ntolerances = [1e-2, 1e-6, 1e-11]\n[reference.run]\ncells = [16, 16]\n[[norm]]\n\
+         of = \"velocity\"\nin = \"V\"\nover = \"max\"\n"
+    );
+    scene.write("study.toml", &study);
+    scene.study(1, &[]).expect(0).says("Change by the solver's tolerance");
+    let results = scene.results();
+    let change = |row: usize| number(&results, &format!("/tolerances/{row}/changes/0/difference"));
+    assert_eq!(results["tolerances"].as_array().expect("rows").len(), 2);
+    assert!(change(0) > 3.0 * change(1) && change(1) > 0.0, "{} {}", change(0), change(1));
+    let share = number(&results, "/tolerances/0/changes/0/share_of_error");
+    let error = number(&results, "/runs/2/errors/0/error");
+    assert!((share - change(0) / error).abs() < 1e-9 * share, "{share}");
+}
+
+#[test]
+fn ablation_tells_what_each_effect_costs_and_changes() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let scene = Scene::new("", "");
+    let study = format!(
+        "[base]\njob = {paper:?}\nset = [\"time.step=0.0625\", \"mesh.rectangle.cells=[4, 4]\"]\n[[run]]\n"
+    );
+    scene.write("study.toml", &study);
+    scene.study(2, &["--ablate"]).expect(0).says("Effects switched off one by one");
+    let results = scene.results();
+    let effects = results["ablation"]["effects"].as_array().expect("effects");
+    let of = |name: &str| {
+        effects.iter().find(|effect| effect["without"] == name).unwrap_or_else(|| panic!("{name}"))
+    };
+    assert_eq!(of("material.elasticity")["status"], "needed");
+    assert_eq!(of("contact.0")["status"], "completed");
+    assert!(of("material.viscoplasticity")["change"][2].as_f64().expect("change") > 0.01);
+    assert_eq!(of("initial")["change"][0].as_f64(), Some(0.0), "the initial state is zero anyway");
+    // Nothing moves without the only load.
+    assert!((of("traction.0")["change"][0].as_f64().expect("change") - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn studies_of_the_repository_load() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/studies");
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("folder") {
+        let path = entry.expect("entry").path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            let plan = Plan::load(&path, &[], false).unwrap_or_else(|error| panic!("{error}"));
+            names.push((plan.name.clone(), plan.runs.len()));
+        }
+    }
+    names.sort();
+    assert_eq!(names, [("wang_cheng_honest_reference".to_owned(), 12), ("wang_cheng_table_1".to_owned(), 4)]);
+}
+
+#[test]
+fn every_key_of_a_study_is_described() {
+    let text = describe(None).expect("described");
+    for part in
+        ["[[run]]", "[reference.exact]", "[[norm]]", "expected_order", "\"max\": The largest after time 0."]
+    {
+        assert!(text.contains(part), "{part} is not in {text}");
+    }
+    assert!(describe(Some("norm")).expect("table").contains("published"));
+    let error = describe(Some("nrom")).expect_err("unknown").to_string();
+    assert!(error.contains("no table of a study") && error.contains("did you mean `norm`?"), "{error}");
+}
