@@ -21,4 +21,5 @@ pub mod stepping;
 pub mod certificate;
 pub mod output;
 pub mod run;
+pub mod report;
 pub mod cli;
