@@ -2,9 +2,9 @@
 
 use super::{
     colour::{Colour, Shades, VIRIDIS, dimmed, hex},
-    paint::{Triangle, paint},
+    paint::{Edges, Triangle, paint},
     picture::{LETTERS, Picture, WIDTH, open_svg, text},
-    scale::{Scale, extent, number, round_below},
+    scale::{Scale, extent, number},
     view::{Face, View, faces, outline},
 };
 use crate::{error::Result, output::field_snapshot::Snapshot};
@@ -14,7 +14,7 @@ use std::fmt::Write;
 const VISIBLE: f64 = 0.12;
 const TALLEST: f64 = 620.0;
 const LEFT: f64 = 56.0;
-const TOP: f64 = 36.0;
+const TOP: f64 = 54.0;
 
 /// The body as it is drawn.
 pub struct Body<'a> {
@@ -110,7 +110,7 @@ impl<'a> Body<'a> {
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
         svg += &text(6.0, 18.0, "start", &heading);
-        svg += &paint(&triangles, frame.height)?;
+        svg += &paint(&triangles, self.edges(), frame.height)?;
         svg += &self.surroundings(&frame);
         let scale = Scale::linear([low, high].into_iter(), false);
         svg += &colour_bar(name, shades, &scale, &scale.words(quantity, unit), &frame);
@@ -142,7 +142,7 @@ impl<'a> Body<'a> {
         let frame = self.frame(24.0, &ends);
         let mut svg = open_svg(frame.height);
         svg += &text(6.0, 18.0, "start", heading);
-        svg += &paint(&self.triangles(&frame, |_| [0xee; 3]), frame.height)?;
+        svg += &paint(&self.triangles(&frame, |_| [0xee; 3]), self.edges(), frame.height)?;
         svg += &self.surroundings(&frame);
         let _ = writeln!(svg, "<g stroke=\"{0}\" fill=\"{0}\" stroke-width=\"1.6\">", hex(colour));
         for arrow in arrows {
@@ -172,6 +172,10 @@ impl<'a> Body<'a> {
     /// Length of the diagonal of the box around the undeformed body, in m.
     pub fn size(&self) -> f64 {
         size(self.snapshot)
+    }
+
+    fn edges(&self) -> Edges {
+        if self.view == View::Plane { Edges::AboveAll } else { Edges::OfEach }
     }
 
     fn triangles(&self, frame: &Frame, colour: impl Fn(&Face) -> Colour) -> Vec<Triangle> {
@@ -256,7 +260,7 @@ impl<'a> Body<'a> {
         }
         out +=
             &text(LEFT + 0.5 * frame.width, frame.height - 8.0, "middle", &across.words(self.axes[0], "m"));
-        out + &text(6.0, TOP + 2.0, "start", &up.words(self.axes[1], "m"))
+        out + &text(6.0, TOP - 14.0, "start", &up.words(self.axes[1], "m"))
     }
 
     fn directions(&self, frame: &Frame) -> String {
@@ -293,7 +297,7 @@ impl Frame {
 /// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
 /// name of the picture keeps them apart.
 fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
-    let (x, top, bottom) = (WIDTH - 82.0, TOP + 26.0, frame.height - 3.2 * LETTERS);
+    let (x, top, bottom) = (WIDTH - 82.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
     let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
     for stop in 0..=16 {
         let share = f64::from(stop) / 16.0;
@@ -310,7 +314,7 @@ fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Fr
         let _ = writeln!(out, "<path stroke=\"#555\" d=\"M{} {y:.1}h5\"/>", x + 20.0);
         out += &text(x + 29.0, y + 0.35 * LETTERS, "start", word);
     }
-    out + &text(WIDTH - 6.0, TOP + 12.0, "end", words)
+    out + &text(WIDTH - 6.0, TOP - 14.0, "end", words)
 }
 
 fn size(snapshot: &Snapshot) -> f64 {
@@ -324,7 +328,13 @@ fn magnification(snapshot: &Snapshot) -> f64 {
     let lengths = snapshot.displacement.iter().flatten().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt());
     let largest = extent(lengths).map_or(0.0, |range| range.1);
     let wanted = VISIBLE * size(snapshot) / largest;
-    if wanted.is_finite() && wanted > 1.0 { round_below(wanted) } else { 1.0 }
+    if wanted.is_finite() && wanted > 1.0 { leading_digit(wanted) } else { 1.0 }
+}
+
+/// The number with its leading digit only, about.
+fn leading_digit(size: f64) -> f64 {
+    let power = 10f64.powf(size.log10().floor());
+    (size / power + 1e-9).floor() * power
 }
 
 #[cfg(test)]
@@ -347,7 +357,7 @@ mod tests {
     #[test]
     fn small_displacements_are_magnified_by_a_round_number_that_is_stated_and_large_ones_are_not() {
         for (displacement, factor, words) in [
-            (0.04, 2.0, "displacement × 2"),
+            (0.04, 4.0, "displacement × 4"),
             (1e-5, 10000.0, "displacement × 10000"),
             (3.0, 1.0, "to scale"),
             (0.0, 1.0, "to scale"),

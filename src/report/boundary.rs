@@ -311,8 +311,9 @@ impl<'a> Boundary<'a> {
     }
 }
 
+/// The colour of a branch's nodes, that of its background in strong.
 fn branch_colour(branch: usize) -> Colour {
-    LINES[branch % LINES.len()]
+    [LINES[0], LINES[1], LINES[6]][branch % BANDS.len()]
 }
 
 fn is_quantity(column: &str) -> bool {

@@ -163,7 +163,7 @@ impl<'a> Chart<'a> {
             .margin_right(18)
             .margin_top(8)
             .x_label_area_size(48)
-            .y_label_area_size(64)
+            .y_label_area_size(76)
             .build_cartesian_2d(Marked { scale: x.clone(), room }, Marked { scale: y.clone(), room: 0.0 })
             .map_err(words)?;
         let plane = chart.plotting_area().clone();
@@ -287,7 +287,8 @@ fn mark(
     let (x, y) = at;
     let drawn = match place % 4 {
         0 => area.draw(&Circle::new(at, 4, style)),
-        1 => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], style)),
+        1 => area
+            .draw(&Polygon::new(vec![(x - 4, y - 4), (x + 4, y - 4), (x + 4, y + 4), (x - 4, y + 4)], style)),
         2 => area.draw(&TriangleMarker::new(at, 6, style)),
         _ => area.draw(&Polygon::new(vec![(x - 6, y), (x, y - 6), (x + 6, y), (x, y + 6)], style)),
     };

@@ -5,7 +5,7 @@ use super::{
     found::Found,
     markup::{escape, facts, paragraph, table},
     picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
-    scale::number,
+    scale::{number, size},
 };
 use crate::certificate::{Accepted, Certificates};
 use serde_json::Value;
@@ -66,7 +66,7 @@ pub fn ending(summary: &Value) -> String {
     let value = |name: &str| summary.get(name).map_or_else(|| "?".into(), plain);
     let seconds =
         summary.get("wall_seconds").and_then(|seconds| seconds.get("total")).and_then(Value::as_f64);
-    let took = seconds.map(|s| format!(" in {} s", number(s))).unwrap_or_default();
+    let took = seconds.map(|s| format!(" in {} s", size(s))).unwrap_or_default();
     let ranks = if value("ranks") == "1" { "1 rank" } else { &format!("{} ranks", value("ranks")) };
     let ended = match status {
         "completed" => "Completed",
@@ -151,12 +151,11 @@ pub fn phases(summary: &Value) -> Option<Picture> {
             row - 6.0,
             hex(LINES[0])
         );
-        svg += &text(left + length + 8.0, y + 1.2 * LETTERS, "start", &format!("{} s", number(*value)));
+        svg += &text(left + length + 8.0, y + 1.2 * LETTERS, "start", &format!("{} s", size(*value)));
     }
     svg += "</svg>";
-    let words: Vec<String> =
-        bars.iter().map(|(name, value)| format!("{name} {} s", number(*value))).collect();
-    let total = total.map(|total| format!(" Together {} s.", number(total))).unwrap_or_default();
+    let words: Vec<String> = bars.iter().map(|(name, value)| format!("{name} {} s", size(*value))).collect();
+    let total = total.map(|total| format!(" Together {} s.", size(total))).unwrap_or_default();
     let caption = format!("Wall time of each phase, of the slowest rank.{total}");
     Some(Picture::new(
         "wall_seconds",

@@ -21,7 +21,7 @@ pub fn escape(text: &str) -> String {
 
 /// A table of two columns, what and how much; the words are escaped.
 pub fn facts(caption: &str, rows: &[(String, String)]) -> String {
-    let mut out = format!("<div class=\"wide\"><table>\n<caption>{}</caption>\n", escape(caption));
+    let mut out = opening("facts", caption);
     for (what, value) in rows {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escape(what), escape(value));
@@ -31,7 +31,7 @@ pub fn facts(caption: &str, rows: &[(String, String)]) -> String {
 
 /// A table with a header; the words are escaped.
 pub fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
-    let mut out = format!("<div class=\"wide\"><table>\n<caption>{}</caption>\n<thead><tr>", escape(caption));
+    let mut out = opening("data", caption) + "<thead><tr>";
     for name in header {
         let _ = write!(out, "<th scope=\"col\">{}</th>", escape(name));
     }
@@ -41,6 +41,16 @@ pub fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
         let _ = writeln!(out, "<tr>{}</tr>", cells.collect::<String>());
     }
     out + "</tbody></table></div>\n"
+}
+
+/// Wide tables scroll by themselves, also from the keyboard.
+fn opening(class: &str, caption: &str) -> String {
+    let words = escape(if caption.is_empty() { "Table" } else { caption });
+    format!(
+        "<div class=\"wide\" role=\"region\" tabindex=\"0\" aria-label=\"{words}\"><table class=\"{class}\">\n\
+         <caption>{}</caption>\n",
+        escape(caption)
+    )
 }
 
 /// A paragraph; the words are escaped.

@@ -186,7 +186,7 @@ fn time_sections(page: &mut Page, found: &Found) -> Result<()> {
         page.section("Energy", &paragraph("history.csv holds no steps yet."), vec![]);
         return Ok(());
     }
-    let unit = if found.dimension() == Some(2) { "(J/m)" } else { "J" };
+    let unit = if found.dimension() == Some(2) { "J/m" } else { "J" };
     page.section("Energy", "", history::energies(history, unit)?);
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
     page.section("Steps", "", history::steps(history, tolerance)?);

@@ -26,25 +26,52 @@ pub struct Triangle {
     pub colour: Colour,
 }
 
+/// How the edges of few triangles are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edges {
+    /// With each triangle, so that later ones cover them.
+    OfEach,
+    /// Over all triangles: for those that do not cover each other.
+    AboveAll,
+}
+
 /// The triangles as SVG elements; later ones cover earlier ones. `height` is that of the drawing.
-pub fn paint(triangles: &[Triangle], height: f64) -> Result<String> {
-    if triangles.len() > POLYGONS { image(triangles, height) } else { Ok(polygons(triangles)) }
+pub fn paint(triangles: &[Triangle], edges: Edges, height: f64) -> Result<String> {
+    if triangles.len() > POLYGONS { image(triangles, height) } else { Ok(polygons(triangles, edges)) }
 }
 
 /// One path for each run of triangles of a colour.
-fn polygons(triangles: &[Triangle]) -> String {
+fn polygons(triangles: &[Triangle], edges: Edges) -> String {
     let mut out = String::from("<g stroke-width=\"0.5\" stroke-linejoin=\"round\">\n");
-    let edges = triangles.len() <= EDGES;
+    let edges = (triangles.len() <= EDGES).then_some(edges);
     for run in triangles.chunk_by(|a, b| a.colour == b.colour) {
-        let (fill, stroke) = (run[0].colour, if edges { dimmed(run[0].colour, 0.72) } else { run[0].colour });
+        let fill = run[0].colour;
+        let stroke = if edges == Some(Edges::OfEach) { dimmed(fill, 0.75) } else { fill };
         // Writing to a String cannot fail.
-        let _ = write!(out, "<path fill=\"{}\" stroke=\"{}\" d=\"", hex(fill), hex(stroke));
-        for Triangle { corners: [a, b, c], .. } in run {
-            let _ = write!(out, "M{:.2} {:.2}L{:.2} {:.2} {:.2} {:.2}Z", a[0], a[1], b[0], b[1], c[0], c[1]);
-        }
-        out.push_str("\"/>\n");
+        let _ = writeln!(
+            out,
+            "<path fill=\"{}\" stroke=\"{}\" d=\"{}\"/>",
+            hex(fill),
+            hex(stroke),
+            outlines(run)
+        );
+    }
+    if edges == Some(Edges::AboveAll) {
+        let _ = writeln!(
+            out,
+            "<path fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.3\" d=\"{}\"/>",
+            outlines(triangles)
+        );
     }
     out + "</g>\n"
+}
+
+fn outlines(triangles: &[Triangle]) -> String {
+    let mut path = String::new();
+    for Triangle { corners: [a, b, c], .. } in triangles {
+        let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1} {:.1} {:.1}Z", a[0], a[1], b[0], b[1], c[0], c[1]);
+    }
+    path
 }
 
 fn image(triangles: &[Triangle], height: f64) -> Result<String> {
@@ -105,12 +132,16 @@ mod tests {
     use super::*;
     use crate::report::picture::{Picture, open_svg};
 
+    /// Half of the drawing, and many triangles too small to be seen in its corner.
     fn half(colour: Colour, count: usize) -> Vec<Triangle> {
-        vec![Triangle { corners: [[0.0, 0.0], [560.0, 0.0], [0.0, 100.0]], colour }; count]
+        let speck = Triangle { corners: [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]], colour };
+        let mut all = vec![speck; count];
+        all[0] = Triangle { corners: [[0.0, 0.0], [560.0, 0.0], [0.0, 100.0]], colour };
+        all
     }
 
     fn drawn(triangles: &[Triangle]) -> (String, Vec<[u8; 3]>) {
-        let body = paint(triangles, 100.0).expect("drawing");
+        let body = paint(triangles, Edges::OfEach, 100.0).expect("drawing");
         let png = Picture::new("p", "", "", format!("{}{body}</svg>", open_svg(100.0))).png().expect("PNG");
         let pixels = Pixmap::decode_png(&png).expect("PNG");
         let at = |x, y| pixels.pixel(x, y).map(|p| [p.red(), p.green(), p.blue()]).expect("inside");

@@ -61,6 +61,7 @@ impl Scale {
     pub fn words(&self, quantity: &str, unit: &str) -> String {
         match (&self.power, unit) {
             (None, "") => quantity.to_owned(),
+            (None, unit) if unit.contains('/') => format!("{quantity} / ({unit})"),
             (None, unit) => format!("{quantity} / {unit}"),
             (Some(power), "") => format!("{quantity} / {power}"),
             (Some(power), unit) => format!("{quantity} / ({power} {unit})"),
@@ -115,6 +116,12 @@ pub fn number(value: f64) -> String {
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let power = power_of_ten(exponent.parse().unwrap_or(0));
     with_minus(format!("{} × {power}", trimmed(digits)))
+}
+
+/// A number for readers who want its size only: three significant digits.
+pub fn size(value: f64) -> String {
+    let digits = format!("{value:.2e}").parse::<f64>();
+    number(digits.unwrap_or(value))
 }
 
 /// Without zeros behind the last digit that counts.
@@ -179,6 +186,7 @@ mod tests {
             assert_eq!(number(value), text);
         }
         assert_eq!(number(-2.7003e-8), "−2.7 × 10⁻⁸");
+        assert_eq!([7.0702, 0.012345, 123456.0].map(size), ["7.07", "0.0123", "123000"]);
     }
 
     #[test]

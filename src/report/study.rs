@@ -53,7 +53,7 @@ fn pictures(folder: &Path) -> Result<String> {
         // Writing to a String cannot fail.
         let _ = writeln!(
             out,
-            "<figure><img alt=\"{0}\" src=\"data:image/svg+xml;base64,{1}\"><figcaption>{0}</figcaption></figure>",
+            "<figure><img alt=\"{0}\" src=\"data:image/svg+xml;base64,{1}\"/><figcaption>{0}</figcaption></figure>",
             escape(&name),
             STANDARD.encode(bytes)
         );
@@ -165,6 +165,6 @@ mod tests {
         assert!(is_study(folder.path()));
         let html = page(folder.path()).expect("page").html("");
         assert!(html.contains("<th scope=\"col\">seconds</th>") && html.contains("<td>16</td>"), "{html}");
-        assert!(html.contains("alt=\"cost\" src=\"data:image/svg+xml;base64,PHN2Zy8+\""), "{html}");
+        assert!(html.contains("alt=\"cost\" src=\"data:image/svg+xml;base64,PHN2Zy8+\"/>"), "{html}");
     }
 }

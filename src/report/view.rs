@@ -5,7 +5,7 @@ use crate::output::field_snapshot::Snapshot;
 /// Toward the viewer of a solid: from the front right and above (x to the right, y away, z up).
 const TOWARD_VIEWER: [f64; 3] = [0.48, -0.74, 0.47];
 /// Toward the light.
-const TOWARD_LIGHT: [f64; 3] = [0.1, -0.75, 0.65];
+const TOWARD_LIGHT: [f64; 3] = [0.35, -0.6, 0.72];
 
 /// A triangle of the body that may be seen, before it is drawn.
 #[derive(Debug, Clone, Copy)]
@@ -90,7 +90,7 @@ impl View {
         }
         let normal = unit(cross(minus(b, a), minus(c, a)));
         let seen = dot(normal, unit(TOWARD_VIEWER)) > 0.0;
-        seen.then(|| 0.72 + 0.28 * dot(normal, unit(TOWARD_LIGHT)).max(0.0))
+        seen.then(|| 0.78 + 0.22 * dot(normal, unit(TOWARD_LIGHT)).max(0.0))
     }
 }
 

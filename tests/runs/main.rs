@@ -1,5 +1,6 @@
 //! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
 
+mod browser;
 mod case;
 mod certificates;
 mod check_values;
@@ -13,6 +14,7 @@ mod outputs;
 mod ranks;
 mod readers;
 mod regions;
+mod report;
 mod restart;
 mod results;
 mod signals;
