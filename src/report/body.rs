@@ -105,7 +105,7 @@ impl<'a> Body<'a> {
     ) -> Result<Picture> {
         let (low, high) = range.unwrap_or((0.0, 0.0));
         let span = if high > low { high - low } else { 1.0 };
-        let frame = self.frame(110.0, &[]);
+        let frame = self.frame(122.0, &[]);
         let triangles = self.triangles(&frame, |face| shades.at((value(face) - low) / span));
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
@@ -227,12 +227,12 @@ impl<'a> Body<'a> {
             out.push_str(
                 "<path fill=\"none\" stroke=\"#555\" stroke-width=\"1\" stroke-dasharray=\"5 4\" d=\"",
             );
-            for edge in outline(self.snapshot) {
-                let [[a, b], [c, d]] = edge.map(|n| {
-                    let [x, y, _] = self.snapshot.nodes[n as usize];
-                    frame.place([x, y])
-                });
-                let _ = write!(out, "M{a:.1} {b:.1}L{c:.1} {d:.1}");
+            for line in outline(self.snapshot) {
+                for (at, node) in line.into_iter().enumerate() {
+                    let [x, y, _] = self.snapshot.nodes[node as usize];
+                    let [a, b] = frame.place([x, y]);
+                    let _ = write!(out, "{}{a:.1} {b:.1}", if at == 0 { "M" } else { "L" });
+                }
             }
             out.push_str("\"/>\n");
         }
@@ -297,7 +297,7 @@ impl Frame {
 /// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
 /// name of the picture keeps them apart.
 fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
-    let (x, top, bottom) = (WIDTH - 82.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
+    let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
     let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
     for stop in 0..=16 {
         let share = f64::from(stop) / 16.0;

@@ -16,6 +16,10 @@ use std::collections::HashMap;
 
 /// Bands behind a chart beyond which they would only confuse.
 const MOST_BANDS: usize = 12;
+/// Nodes beyond which the dots of a curve merge.
+const MOST_DOTS: usize = 150;
+/// Arrows beyond which they would hide each other.
+const MOST_ARROWS: usize = 70;
 
 /// A boundary at the last time in `profiles.csv`.
 pub struct Boundary<'a> {
@@ -99,7 +103,8 @@ impl<'a> Boundary<'a> {
         let points: Vec<[f64; 2]> = self.arc.iter().zip(&values).map(|(s, v)| [*s, *v]).collect();
         let place =
             ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
-        let series = Series::new(place, "", Look::Dotted, points);
+        let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
+        let series = Series::new(place, "", look, points);
         let x = Axis { quantity: "arc length", unit: "m" };
         let mut chart = Chart::new(x, Axis { quantity: &quantity, unit }, vec![series]);
         chart.bands = self.bands();
@@ -125,7 +130,7 @@ impl<'a> Boundary<'a> {
         self.points.first().map(from).unwrap_or_default()
     }
 
-    /// The quantity on the boundary's own faces, seen along the axis in which the boundary is thinnest.
+    /// The quantity on the boundary's own faces, seen along the axis that shows most of them.
     fn map(
         &self,
         name: &str,
@@ -147,10 +152,8 @@ impl<'a> Boundary<'a> {
         if cells.is_empty() {
             return Ok(None);
         }
-        let thickness = [0, 1, 2]
-            .map(|axis| extent(self.points.iter().map(|p| p[axis])).map_or(0.0, |(low, high)| high - low));
-        let thinnest = (0..3).min_by(|a, b| thickness[*a].total_cmp(&thickness[*b])).unwrap_or(2);
-        let [first, second] = [[1, 2], [0, 2], [0, 1]][thinnest];
+        let along = super::view::widest_along(&self.points, &cells);
+        let [first, second] = [[1, 2], [0, 2], [0, 1]][along];
         let nodes = self.points.iter().map(|p| [p[first], p[second], 0.0]).collect();
         let flat = Snapshot { time: self.time, nodes, cells, corners: 3, ..Snapshot::default() };
         let look = Coloured { name, quantity, unit, shades: CIVIDIS };
@@ -165,7 +168,7 @@ impl<'a> Boundary<'a> {
             capital(quantity),
             self.name,
             number(self.time),
-            axes[thinnest]
+            axes[along]
         );
         Ok(Some(picture))
     }
@@ -265,7 +268,8 @@ impl<'a> Boundary<'a> {
                 let tip = [0, 1].map(|i| feet[n][i] + length.abs() * normals[n][i]);
                 if (length < 0.0) != inward { [tip, feet[n]] } else { [feet[n], tip] }
             };
-            let arrows: Vec<[[f64; 2]; 2]> = (0..feet.len()).map(arrow).collect();
+            let arrows: Vec<[[f64; 2]; 2]> =
+                (0..feet.len()).step_by(feet.len().div_ceil(MOST_ARROWS)).map(arrow).collect();
             let unit = unit_of(column);
             let heading = format!("longest arrow {} {unit}, {}", number(largest), body.magnified());
             let time = number(self.time);

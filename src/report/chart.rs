@@ -4,7 +4,7 @@
 use super::{
     colour::{Colour, INK, LINES},
     picture::{LETTERS, WIDTH, text_width},
-    scale::Scale,
+    scale::{Scale, extent},
 };
 use crate::error::{Error, Result};
 use plotters::coord::{
@@ -15,8 +15,12 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const HEIGHT: f64 = 380.0;
+/// Plotters rounds to whole pixels; it is given so many for a unit of the drawing that this is not seen.
+const FINE: i32 = 4;
 /// Points of a line beyond which it is thinned; more than twice the pixels of any screen it is read on.
 const ENOUGH: usize = 3000;
+/// Values that differ by less than this share of their size are steady.
+const STEADY: f64 = 0.02;
 /// Marks along a line that tell it from others without colour.
 const MARKS: usize = 9;
 
@@ -135,20 +139,25 @@ impl<'a> Chart<'a> {
     /// The drawing as an `svg` element.
     pub fn svg(&self) -> Result<String> {
         let mut svg = String::new();
-        let area = SVGBackend::with_string(&mut svg, (WIDTH as u32, HEIGHT as u32)).into_drawing_area();
+        let size = [WIDTH, HEIGHT].map(|size| (size * f64::from(FINE)) as u32);
+        let area = SVGBackend::with_string(&mut svg, size.into()).into_drawing_area();
         let drawn = self.draw(&area);
         drop(area);
         drawn.map_err(|words| {
             Error::Internal(format!("a chart of {} cannot be drawn: {words}", self.y.quantity))
         })?;
-        Ok(svg)
+        let fine = format!("<svg width=\"{}\" height=\"{}\"", size[0], size[1]);
+        Ok(svg.replacen(&fine, &format!("<svg width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1))
     }
 
     fn scales(&self) -> (Scale, Scale) {
         let coordinate =
             |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
         let levels = self.levels.iter().map(|level| level.0);
-        let y = coordinate(1).chain(levels).chain(self.from_zero.then_some(0.0));
+        let (low, high) = extent(coordinate(1)).unwrap_or((0.0, 0.0));
+        // What hardly changes is shown as that, not as a curve.
+        let steady = high - low < STEADY * low.abs().max(high.abs());
+        let y = coordinate(1).chain(levels).chain((self.from_zero || steady).then_some(0.0));
         let y = if self.logarithmic { Scale::logarithmic(y) } else { Scale::linear(y, true) };
         (Scale::linear(coordinate(0), false), y)
     }
@@ -160,10 +169,10 @@ impl<'a> Chart<'a> {
         let (_, below) = area.split_vertically(top);
         let room = 0.02 * (x.high - x.low);
         let mut chart = ChartBuilder::on(&below)
-            .margin_right(18)
-            .margin_top(8)
-            .x_label_area_size(48)
-            .y_label_area_size(76)
+            .margin_right(18 * FINE)
+            .margin_top(8 * FINE)
+            .x_label_area_size(48 * FINE)
+            .y_label_area_size(76 * FINE)
             .build_cartesian_2d(Marked { scale: x.clone(), room }, Marked { scale: y.clone(), room: 0.0 })
             .map_err(words)?;
         let plane = chart.plotting_area().clone();
@@ -172,10 +181,11 @@ impl<'a> Chart<'a> {
             .configure_mesh()
             .disable_x_mesh()
             .light_line_style(TRANSPARENT)
-            .bold_line_style(rgb([0xd9; 3]))
-            .axis_style(rgb([0x55; 3]))
+            .bold_line_style(rgb([0xd9; 3]).stroke_width(FINE as u32))
+            .axis_style(rgb([0x55; 3]).stroke_width(FINE as u32))
             .label_style(letters())
             .x_desc(x.words(self.x.quantity, self.x.unit))
+            .set_all_tick_mark_size(5 * FINE)
             .axis_desc_style(letters())
             .draw()
             .map_err(words)?;
@@ -190,8 +200,7 @@ impl<'a> Chart<'a> {
     fn draw_legend(&self, area: &Area<Shift>, y: &Scale) -> std::result::Result<i32, String> {
         let row = 1.4 * LETTERS;
         let mut line = 4.0;
-        area.draw_text(&y.words(self.y.quantity, self.y.unit), &letters(), (6, line as i32))
-            .map_err(words)?;
+        area.draw_text(&y.words(self.y.quantity, self.y.unit), &letters(), fine(6.0, line)).map_err(words)?;
         line += row;
         let named: Vec<(usize, &Series)> =
             self.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty()).collect();
@@ -201,16 +210,17 @@ impl<'a> Chart<'a> {
             if across > 8.0 && across + width > WIDTH {
                 (across, line) = (8.0, line + row);
             }
-            let (left, middle) = (across as i32, (line + 0.55 * LETTERS) as i32);
+            let middle = line + 0.55 * LETTERS;
             if series.look != Look::Dots {
-                let stroke = vec![(left, middle), (left + 28, middle)];
-                area.draw(&PathElement::new(stroke, rgb(series.colour).stroke_width(2))).map_err(words)?;
+                let stroke = vec![fine(across, middle), fine(across + 28.0, middle)];
+                area.draw(&PathElement::new(stroke, rgb(series.colour).stroke_width(2 * FINE as u32)))
+                    .map_err(words)?;
             }
-            mark(area, (left + 14, middle), *place, series)?;
-            area.draw_text(&series.label, &letters(), (left + 34, line as i32)).map_err(words)?;
+            mark(area, fine(across + 14.0, middle), *place, series)?;
+            area.draw_text(&series.label, &letters(), fine(across + 34.0, line)).map_err(words)?;
             across += width;
         }
-        Ok((line + if named.is_empty() { 0.0 } else { row }) as i32)
+        Ok(fine(0.0, line + if named.is_empty() { 0.0 } else { row }).1)
     }
 
     fn draw_bands(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
@@ -219,11 +229,11 @@ impl<'a> Chart<'a> {
             let area = Rectangle::new([(from, y.low), (to, y.high)], rgb(band.colour).filled());
             plane.draw(&area).map_err(words)?;
             let width = plane.map_coordinate(&(to, y.high)).0 - plane.map_coordinate(&(from, y.high)).0;
-            if f64::from(width) > text_width(&band.label) {
+            if f64::from(width) > f64::from(FINE) * text_width(&band.label) {
                 let style = letters().pos(Pos::new(HPos::Center, VPos::Top));
                 let place = (0.5 * (from + to), y.high);
                 plane
-                    .draw(&(EmptyElement::at(place) + Text::new(band.label.clone(), (0, 4), style)))
+                    .draw(&(EmptyElement::at(place) + Text::new(band.label.clone(), (0, 4 * FINE), style)))
                     .map_err(words)?;
             }
         }
@@ -235,12 +245,12 @@ impl<'a> Chart<'a> {
             let Some(height) = y.place(*level) else { continue };
             let room = 0.02 * (x.high - x.low);
             let stroke = vec![(x.low - room, height), (x.high + room, height)];
-            plane.draw(&PathElement::new(stroke, rgb([0x55; 3]).stroke_width(1))).map_err(words)?;
+            plane.draw(&PathElement::new(stroke, rgb([0x55; 3]).stroke_width(FINE as u32))).map_err(words)?;
             let place = (x.low, height);
             plane
                 .draw(
                     &(EmptyElement::at(place)
-                        + Text::new(name.clone(), (4, -(1.3 * LETTERS) as i32), letters())),
+                        + Text::new(name.clone(), fine(4.0, -1.3 * LETTERS), letters())),
                 )
                 .map_err(words)?;
         }
@@ -258,7 +268,9 @@ fn draw_series(
     let shown = series.points.iter().filter_map(|p| Some((x.place(p[0])?, y.place(p[1])?)));
     let shown = thinned(shown.collect());
     if series.look != Look::Dots && shown.len() > 1 {
-        plane.draw(&PathElement::new(shown.clone(), rgb(series.colour).stroke_width(2))).map_err(words)?;
+        plane
+            .draw(&PathElement::new(shown.clone(), rgb(series.colour).stroke_width(2 * FINE as u32)))
+            .map_err(words)?;
     }
     let every = match series.look {
         Look::Line if series.label.is_empty() && shown.len() > 1 => usize::MAX,
@@ -284,13 +296,14 @@ fn mark(
     series: &Series,
 ) -> std::result::Result<(), String> {
     let style = rgb(series.colour).filled();
-    let (x, y) = at;
+    let corners = |around: &[(i32, i32)]| {
+        around.iter().map(|c| (at.0 + FINE * c.0, at.1 + FINE * c.1)).collect::<Vec<_>>()
+    };
     let drawn = match place % 4 {
-        0 => area.draw(&Circle::new(at, 4, style)),
-        1 => area
-            .draw(&Polygon::new(vec![(x - 4, y - 4), (x + 4, y - 4), (x + 4, y + 4), (x - 4, y + 4)], style)),
-        2 => area.draw(&TriangleMarker::new(at, 6, style)),
-        _ => area.draw(&Polygon::new(vec![(x - 6, y), (x, y - 6), (x + 6, y), (x, y + 6)], style)),
+        0 => area.draw(&Circle::new(at, 4 * FINE, style)),
+        1 => area.draw(&Polygon::new(corners(&[(-4, -4), (4, -4), (4, 4), (-4, 4)]), style)),
+        2 => area.draw(&TriangleMarker::new(at, 6 * FINE, style)),
+        _ => area.draw(&Polygon::new(corners(&[(-6, 0), (0, -6), (6, 0), (0, 6)]), style)),
     };
     drawn.map_err(words)
 }
@@ -320,13 +333,19 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
+/// A place of the drawing in plotters' pixels.
+fn fine(x: f64, y: f64) -> (i32, i32) {
+    let pixel = |along: f64| (along * f64::from(FINE)).round() as i32;
+    (pixel(x), pixel(y))
+}
+
 fn rgb(colour: Colour) -> RGBColor {
     RGBColor(colour[0], colour[1], colour[2])
 }
 
 /// Plotters shows a text of size s in letters of s / 1.24.
 fn letters() -> TextStyle<'static> {
-    ("sans-serif", 1.24 * LETTERS).into_font().color(&rgb(INK))
+    ("sans-serif", 1.24 * LETTERS * f64::from(FINE)).into_font().color(&rgb(INK))
 }
 
 fn words(error: impl std::fmt::Display) -> String {

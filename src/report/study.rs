@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::Value;
 use std::{
+    collections::HashMap,
     fmt::Write,
     path::{Path, PathBuf},
 };
@@ -20,9 +21,10 @@ pub fn is_study(folder: &Path) -> bool {
 /// The page: what `study.md` says, or the tables of `study.json` where there is none; and all SVG files of the folder.
 pub fn page(folder: &Path) -> Result<Page> {
     let words = folder.join("study.md");
+    let mut captions = HashMap::new();
     let (title, body) = if words.is_file() {
         let text = std::fs::read_to_string(&words).map_err(|error| Error::unreadable(&words, error))?;
-        markdown(&text)
+        markdown(&text, &mut captions)
     } else {
         let path = folder.join("study.json");
         let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
@@ -33,12 +35,12 @@ pub fn page(folder: &Path) -> Result<Page> {
     };
     let mut page = Page::new(title.as_deref().unwrap_or("Study"), String::new());
     page.section("Results", &body, vec![]);
-    page.section("Pictures", &pictures(folder)?, vec![]);
+    page.section("Pictures", &pictures(folder, &captions)?, vec![]);
     Ok(page)
 }
 
 /// The SVG files as images: nothing in them can reach the page.
-fn pictures(folder: &Path) -> Result<String> {
+fn pictures(folder: &Path, captions: &HashMap<String, String>) -> Result<String> {
     let unreadable = |error: std::io::Error| Error::unreadable(folder, error);
     let mut files: Vec<PathBuf> = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
@@ -49,7 +51,9 @@ fn pictures(folder: &Path) -> Result<String> {
     let mut out = String::new();
     for file in files {
         let bytes = std::fs::read(&file).map_err(|error| Error::unreadable(&file, error))?;
-        let name = file.file_stem().unwrap_or_default().to_string_lossy().replace('_', " ");
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let name =
+            captions.get(name.as_ref()).cloned().unwrap_or_else(|| name.trim_end_matches(".svg").into());
         // Writing to a String cannot fail.
         let _ = writeln!(
             out,
@@ -94,16 +98,18 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// Headings, paragraphs, lists and tables of a Markdown text as HTML; its first heading apart.
-fn markdown(text: &str) -> (Option<String>, String) {
+/// Headings, paragraphs, lists and tables of a Markdown text as HTML; its first heading and the captions of its pictures
+/// apart.
+fn markdown(text: &str, captions: &mut HashMap<String, String>) -> (Option<String>, String) {
     let (mut title, mut out) = (None, String::new());
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {
-        let line = line.trim_end();
+        let line = plain_words(line.trim_end());
+        let line = line.as_str();
         if line.starts_with('|') {
             let mut rows = vec![cells(line)];
             while let Some(next) = lines.next_if(|next| next.starts_with('|')) {
-                rows.push(cells(next));
+                rows.push(cells(&plain_words(next)));
             }
             let header = rows.remove(0);
             let rule = |row: &Vec<String>| row.iter().all(|cell| cell.chars().all(|c| "-: ".contains(c)));
@@ -123,8 +129,8 @@ fn markdown(text: &str) -> (Option<String>, String) {
             }
             let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
             out += &format!("<ul>\n{items}</ul>\n");
-        } else if line.trim_start().starts_with("![") {
-            // Pictures stand below.
+        } else if let Some((caption, file)) = line.strip_prefix("![").and_then(|rest| rest.split_once("](")) {
+            captions.insert(file.trim_end_matches(')').to_owned(), caption.to_owned());
         } else if !line.is_empty() {
             let mut words = line.to_owned();
             let goes_on = |next: &&str| !next.trim().is_empty() && !next.starts_with(['|', '#', '-', '!']);
@@ -137,6 +143,11 @@ fn markdown(text: &str) -> (Option<String>, String) {
     (title, out)
 }
 
+/// Without the marks of emphasis and code.
+fn plain_words(line: &str) -> String {
+    line.replace("**", "").replace('`', "")
+}
+
 fn cells(line: &str) -> Vec<String> {
     line.trim().trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
 }
@@ -147,9 +158,10 @@ mod tests {
 
     #[test]
     fn a_table_in_markdown_becomes_a_table_and_nothing_becomes_markup() {
-        let (title, html) = markdown(
-            "# Orders\n\nText <b>\ngoes on.\n\n| h | error |\n|---|---:|\n| 1/8 | 0.5 |\n\n- one\n- two\n",
-        );
+        let text = "# Orders\n\nText <b>\ngoes **on**.\n\n| h | error |\n|---|---:|\n| 1/8 | 0.5 |\n\n- one\n- two\n\n![Cost](c.svg)\n";
+        let mut captions = HashMap::new();
+        let (title, html) = markdown(text, &mut captions);
+        assert_eq!(captions["c.svg"], "Cost");
         assert_eq!(title.as_deref(), Some("Orders"));
         assert!(html.contains("<p>Text &lt;b&gt; goes on.</p>"), "{html}");
         assert!(html.contains("<td>1/8</td><td>0.5</td>") && !html.contains("---"), "{html}");

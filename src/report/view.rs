@@ -1,6 +1,7 @@
 //! What is seen of a body: the plane itself, or a solid from a fixed oblique direction.
 
 use crate::output::field_snapshot::Snapshot;
+use std::collections::BTreeMap;
 
 /// Toward the viewer of a solid: from the front right and above (x to the right, y away, z up).
 const TOWARD_VIEWER: [f64; 3] = [0.48, -0.74, 0.47];
@@ -37,14 +38,38 @@ pub fn faces(snapshot: &Snapshot) -> Vec<Face> {
     alone.map(|same| outward(snapshot, same[0])).collect()
 }
 
-/// Edges of a plane body that belong to one cell only.
-pub fn outline(snapshot: &Snapshot) -> Vec<[u32; 2]> {
+/// The edges of a plane body that belong to one cell only, joined to lines: nodes in order, the first again at the end of a
+/// closed one.
+pub fn outline(snapshot: &Snapshot) -> Vec<Vec<u32>> {
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(snapshot.cells.len());
     for n in snapshot.cells() {
         edges.extend([[n[0], n[1]], [n[1], n[2]], [n[2], n[0]]].map(|[a, b]| [a.min(b), a.max(b)]));
     }
     edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]).collect()
+    let alone = edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]);
+    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for [a, b] in alone {
+        next.entry(a).or_default().push(b);
+        next.entry(b).or_default().push(a);
+    }
+    let mut lines = Vec::new();
+    while let Some((&start, _)) = next.first_key_value() {
+        let mut line = vec![start];
+        let mut node = start;
+        while let Some(follower) = next.get_mut(&node).and_then(Vec::pop) {
+            if let Some(back) = next.get_mut(&follower) {
+                back.retain(|other| *other != node);
+            }
+            line.push(follower);
+            node = follower;
+        }
+        if line.len() > 1 {
+            lines.push(line);
+        } else {
+            next.remove(&start);
+        }
+    }
+    lines
 }
 
 fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> Face {
@@ -54,6 +79,17 @@ fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> F
     let normal = cross(minus(b, a), minus(c, a));
     let nodes = if dot(normal, minus(inside, a)) > 0.0 { [key[0], key[2], key[1]] } else { key };
     Face { nodes, cell }
+}
+
+/// The axis along which faces between these points are seen widest: the greatest part of their summed area vector.
+pub fn widest_along(points: &[[f64; 3]], faces: &[u32]) -> usize {
+    let mut area = [0.0; 3];
+    for face in faces.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|n| points[face[n] as usize]);
+        let normal = cross(minus(b, a), minus(c, a));
+        area = std::array::from_fn(|i| area[i] + normal[i]);
+    }
+    (0..3).max_by(|a, b| area[*a].abs().total_cmp(&area[*b].abs())).unwrap_or(2)
 }
 
 /// How points of the body become points of the picture, before it is fitted to its frame.
@@ -145,6 +181,19 @@ mod tests {
     }
 
     #[test]
+    fn a_gutter_is_seen_widest_from_above() {
+        let points = [
+            [-1.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 1.0],
+            [-1.0, 0.2, 1.0],
+            [0.0, 0.2, 0.0],
+            [1.0, 0.2, 1.0],
+        ];
+        assert_eq!(widest_along(&points, &[0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4]), 2);
+    }
+
+    #[test]
     fn the_outline_of_two_triangles_is_their_square() {
         let square = Snapshot {
             nodes: vec![[0.0; 3]; 4],
@@ -152,6 +201,7 @@ mod tests {
             corners: 3,
             ..Snapshot::default()
         };
-        assert_eq!(outline(&square), [[0, 1], [0, 3], [1, 2], [2, 3]]);
+        let lines = outline(&square);
+        assert!(lines == [[0, 3, 2, 1, 0]] || lines == [[0, 1, 2, 3, 0]], "{lines:?}");
     }
 }

@@ -1,9 +1,6 @@
 //! The page that `solver report` makes of a run.
 
-use crate::{
-    case::Case,
-    launch::{self, Outcome},
-};
+use crate::{case::Case, launch};
 use resvg::usvg::roxmltree::{Document, Node, ParsingOptions};
 use std::path::{Path, PathBuf};
 
@@ -251,16 +248,14 @@ fn a_folder_without_a_run_is_refused_with_the_remedy() {
     let folder = tempfile::tempdir().expect("folder");
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).expect("folder");
-    let refused = |path: &Path, words: &str| -> Outcome {
-        let outcome = launch::run_alone(&["report".as_ref(), path.as_os_str()]).expect(2).says(words);
-        launch::run(2, &["report".as_ref(), path.as_os_str()]).expect(2).says(words);
-        outcome
+    let refused = |path: &Path, words: &str| {
+        launch::run_alone(&["report".as_ref(), path.as_os_str()]).expect(2).says(words);
+        let outcome = launch::run(2, &["report".as_ref(), path.as_os_str()]).expect(2);
+        assert_eq!(outcome.stderr.matches(words).count(), 1, "{}", outcome.stderr);
     };
     refused(&empty, "is not the output folder of a run: it holds none of job.toml");
     refused(&folder.path().join("nowhere"), "nowhere is not there");
-    let job = Case::square(4).written();
-    let job =
-        std::fs::copy(&job, folder.path().join("square.toml")).map(|_| folder.path().join("square.toml"));
-    refused(&job.expect("copied"), "that is a job; give the folder that its run left");
+    let case = Case::square(4);
+    refused(&case.written(), "that is a job; give the folder that its run left");
     assert!(!empty.join("report").exists());
 }
