@@ -16,6 +16,8 @@ const FUNCTIONS: &[&str] = &[
     "Vec(Copy|Scale|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize)",
     "VecCreateMPIWithArray",
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
+    "Mat(Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
+    "(VecGetLocalToGlobalMapping|VecEqual|PetscObjectReference|ISLocalToGlobalMapping(GetBlockIndices|RestoreBlockIndices|GetSize))",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",
     "MatNullSpace(Create|CreateRigidBody|SetFunction|Destroy)",
@@ -23,11 +25,12 @@ const FUNCTIONS: &[&str] = &[
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
     "KSP(SetOptionsPrefix|GetType|SetPC)",
     "PCShell(SetApply|SetContext|GetContext)",
-    "PC(Apply|SetType|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
+    "PC(Apply|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
-    "SNESLineSearchSetFromOptions",
     "SNESLineSearchSetType",
+    "SNESVISetVariableBounds",
+    "SNESSetDivergenceTolerance",
 ];
 
 fn main() {
@@ -51,8 +54,8 @@ fn main() {
         .prepend_enum_name(false)
         .generate_cstr(true)
         .allowlist_function(format!("({})", FUNCTIONS.join("|")))
-        .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*)")
-        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|KSP_NORM_.*)")
+        .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*|MatDuplicateOption|MatStructure|PetscBool)")
+        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN)")
         .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
         .raw_line("pub use mpi_sys::MPI_Comm;")
         .layout_tests(false)

@@ -1,7 +1,7 @@
 //! A body on a mesh with all that acts on it: what a run advances in time.
 
 use crate::{
-    effect::{Contact, Effect, Energy, Form, Load, Phases, Step},
+    effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
@@ -21,6 +21,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub effects: Vec<Box<dyn Effect<D, S>>>,
     /// What the surface touches.
     pub contacts: Vec<Contact<D>>,
+    /// What else acts on the surface.
+    pub surface_effects: Vec<Box<dyn SurfaceEffect<D>>>,
     /// What pulls.
     pub load: Load,
     /// One flag a local component: held by a support.
@@ -42,12 +44,24 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Adds explicit forces at the start of a step to `forces` (with ghosts); effects write their trial histories.
     pub fn add_explicit_forces(&mut self, state: &State, step: Step, forces: &mut [f64]) -> Result<Energy> {
         let mut energy = Energy::default();
+        if !self.surface_effects.is_empty() {
+            let effects = &mut self.surface_effects;
+            with_surface(state, |nodal| {
+                effects.iter_mut().for_each(|e| e.add_explicit(step, nodal, forces, &mut energy));
+            })?;
+        }
         let Some(needs) = self.needs(|p| p.explicit) else { return Ok(energy) };
         let (mesh, effects) = (&self.mesh, &mut self.effects);
         with_nodal(state, |nodal| {
             Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
-                for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
-                    effect.add_explicit(step, batch, &mut energy);
+                if needs.elastic_stress {
+                    effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+                }
+                for weakens in [true, false] {
+                    let called = |p: Phases| p.explicit.is_some() && p.weakens == weakens;
+                    for effect in effects.iter_mut().filter(|e| called(e.phases())) {
+                        effect.add_explicit(step, batch, &mut energy);
+                    }
                 }
                 batch.scatter(mesh, forces);
             });
@@ -55,17 +69,23 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(energy)
     }
 
-    /// Energies of this rank's cells and contacts after a committed step.
+    /// Energies of this rank's cells, contacts and surface after a committed step.
     pub fn energy(&self, state: &State, step: Step) -> Result<Energy> {
         let mut energy = Energy::default();
         {
             let displacement = state.displacement.local()?;
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
-            energy.stored_in_contact = stored.sum();
+            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
+        }
+        if !self.surface_effects.is_empty() {
+            with_surface(state, |nodal| {
+                self.surface_effects.iter().for_each(|e| e.add_energy(step, nodal, &mut energy));
+            })?;
         }
         let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                self.weaken(batch);
                 for effect in self.effects.iter().filter(|e| e.phases().energy.is_some()) {
                     effect.add_energy(step, batch, &mut energy);
                 }
@@ -76,7 +96,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Whether an effect stands for this form.
     pub fn has_form(&self, form: Form) -> bool {
-        self.effects.iter().any(|e| e.form() == Some(form))
+        let on_the_surface = form == Form::Elasticity && self.surface_effects.iter().any(|e| e.is_elastic());
+        on_the_surface || self.effects.iter().any(|e| e.form() == Some(form))
     }
 
     /// Whether effects stand for this form in all of the body.
@@ -89,6 +110,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
         let nodal = Nodal { displacement: x, velocity: x, previous_velocity: x };
+        if form == Form::Elasticity {
+            self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
+        }
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
                 for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
@@ -117,6 +141,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
+                self.weaken(batch);
                 for effect in self.effects.iter().filter(|e| e.phases().stress.is_some()) {
                     effect.add_stress(step, batch);
                 }
@@ -140,6 +165,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Makes all trial histories the converged ones.
     pub fn commit(&mut self) {
         self.effects.iter_mut().for_each(|effect| effect.commit());
+        self.surface_effects.iter_mut().for_each(|effect| effect.commit());
     }
 
     /// Velocity components that no support holds, over all ranks. Collective.
@@ -159,7 +185,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if !self.contacts.is_empty() {
             names.push("contact");
         }
+        names.extend(self.surface_effects.iter().map(|e| e.name()));
         names
+    }
+
+    /// Weakens a batch as the converged histories have it.
+    fn weaken(&self, batch: &mut Batch<D, S>) {
+        self.effects.iter().filter(|e| e.phases().weakens).for_each(|effect| effect.weaken(batch));
     }
 
     fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
@@ -172,5 +204,14 @@ fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
     let velocity = state.velocity.local()?;
     let previous_velocity = state.previous_velocity.local()?;
     body(Nodal { displacement: &displacement, velocity: &velocity, previous_velocity: &previous_velocity });
+    Ok(())
+}
+
+fn with_surface(state: &State, body: impl FnOnce(SurfaceState<'_>)) -> Result<()> {
+    let displacement = state.displacement.local()?;
+    let velocity = state.velocity.local()?;
+    let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
+    let contact_traction = traction.as_deref();
+    body(SurfaceState { displacement: &displacement, velocity: &velocity, contact_traction });
     Ok(())
 }

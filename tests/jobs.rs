@@ -2,7 +2,7 @@
 //!
 //! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
 //! end: `history.COLUMN` and `probe.NAME.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or `.min.` over the
-//! boundary at the last output.
+//! boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -66,23 +66,30 @@ fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) 
     kept.map(|row| row[wanted].parse().ok()).collect()
 }
 
+fn extreme(side: &str, mut values: impl Iterator<Item = f64>) -> Option<f64> {
+    match side {
+        "max" => values.reduce(f64::max),
+        "min" => values.reduce(f64::min),
+        _ => None,
+    }
+}
+
 /// The quantity as the run in `folder` left it, if there is such a quantity.
 fn measured(folder: &Path, quantity: &str) -> Option<f64> {
     let parts: Vec<&str> = quantity.split('.').collect();
     match parts[..] {
         ["probe", name, field] => column(folder, "probes.csv", Some(("probe", name)), field)?.pop(),
+        ["probe", name, side, field] => {
+            let all = column(folder, "probes.csv", Some(("probe", name)), field)?.into_iter();
+            extreme(side, all)
+        }
         ["history", field] => column(folder, "history.csv", None, field)?.pop(),
         ["profile", boundary, side, field] => {
             let filter = Some(("profile", boundary));
             let times = column(folder, "profiles.csv", filter, "time")?;
             let values = column(folder, "profiles.csv", filter, field)?;
             let rows = times.iter().zip(values).filter(|(time, _)| Some(*time) == times.last());
-            let last = rows.map(|(_, value)| value);
-            match side {
-                "max" => last.reduce(f64::max),
-                "min" => last.reduce(f64::min),
-                _ => None,
-            }
+            extreme(side, rows.map(|(_, value)| value))
         }
         _ => {
             let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
@@ -157,6 +164,8 @@ fn numbers_are_read_where_the_quantity_says() {
         ("certificates.theta", 0.5),
         ("history.work", 3.5),
         ("probe.a.velocity_y", 3.0),
+        ("probe.b.min.velocity_y", 2.0),
+        ("probe.a.max.velocity_y", 3.0),
         ("profile.low.max.pressure", 5.0),
         ("profile.low.min.pressure", -1.0),
     ];

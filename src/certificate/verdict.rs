@@ -83,7 +83,7 @@ impl Verdict {
     fn stability(&mut self, bound: f64, step: f64, accepted: bool) {
         if step < bound {
             self.words.push(format!(
-                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress"
+                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress and adhesion"
             ));
             return;
         }

@@ -1,11 +1,15 @@
 //! Contact laws: pure functions at a point of the contact boundary.
 
+mod adhesion;
 mod compliance;
 mod damped_response;
 mod graph;
 mod normal_law;
+mod obstacle;
 
+pub use adhesion::Adhesion;
 pub use compliance::Compliance;
 pub use damped_response::{DampedResponse, Symmetry};
 pub use graph::Graph;
 pub use normal_law::{NodeContext, NormalLaw, Resolved};
+pub use obstacle::Gap;

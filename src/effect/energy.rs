@@ -12,7 +12,9 @@ use std::ops::AddAssign;
 /// ```
 ///
 /// with `X` the viscoplastic strain rate at `s_{n-1}`, `(s_{n-1} - P_K s_{n-1}) / (2 lambda)` in the paper, and stresses measured
-/// by `E^-1`. What hardening stores is part of the viscoplastic term.
+/// by `E^-1`. What hardening stores is part of the viscoplastic term. Damage `d` scales all terms with `S` or `E` by
+/// `1 - d_n` and adds its dissipation `(d_n - d_{n-1}) 1/2 S_{n-1}:E^-1 S_{n-1}`; what adhesion adds stands with
+/// [`super::Adhesion`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Kinetic energy at the end of the step.
@@ -31,11 +33,17 @@ pub struct Energy {
     pub work: f64,
     /// The scheme's own terms in the step, known exactly.
     pub numerical: f64,
+    /// Dissipated by damage in the step.
+    pub damage: f64,
+    /// Stored in stretched adhesive bonds at the end of the step.
+    pub stored_in_bonds: f64,
+    /// Dissipated by bonds that give way in the step.
+    pub debonding: f64,
 }
 
 impl Energy {
     /// As an array, for sums over ranks.
-    pub fn to_array(self) -> [f64; 8] {
+    pub fn to_array(self) -> [f64; 11] {
         [
             self.kinetic,
             self.elastic,
@@ -45,13 +53,30 @@ impl Energy {
             self.contact,
             self.work,
             self.numerical,
+            self.damage,
+            self.stored_in_bonds,
+            self.debonding,
         ]
     }
 
     /// Back from the array.
-    pub fn from_array(a: [f64; 8]) -> Self {
-        let [kinetic, elastic, stored_in_contact, viscous, viscoplastic, contact, work, numerical] = a;
-        Self { kinetic, elastic, stored_in_contact, viscous, viscoplastic, contact, work, numerical }
+    pub fn from_array(a: [f64; 11]) -> Self {
+        let [kinetic, elastic, stored_in_contact, viscous, viscoplastic, contact, work, numerical, rest @ ..] =
+            a;
+        let [damage, stored_in_bonds, debonding] = rest;
+        Self {
+            kinetic,
+            elastic,
+            stored_in_contact,
+            viscous,
+            viscoplastic,
+            contact,
+            work,
+            numerical,
+            damage,
+            stored_in_bonds,
+            debonding,
+        }
     }
 }
 

@@ -55,7 +55,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
     fn phases(&self) -> Phases {
         let velocity = Needs { velocity: true, ..Needs::default() };
         let both = Needs { velocity_change: true, ..velocity };
-        Phases { matrix: true, explicit: Some(velocity), energy: Some(both), stress: None }
+        Phases { matrix: true, explicit: Some(velocity), energy: Some(both), ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {

@@ -2,22 +2,29 @@
 //!
 //! Each effect takes part in the phases it names in [`Effect::phases`]; the others never call it.
 
+mod adhesion;
 mod cell_history;
 mod contact;
+mod damage;
 mod elastic_stress;
 mod energy;
 mod inertia;
 mod load;
+mod node_history;
 mod support;
+mod surface;
 mod viscoplastic_history;
 mod viscous_stress;
 
+pub use adhesion::{Adhesion, Bonded};
 pub use contact::{Contact, PointCount, Quadrature, choose_unknowns};
+pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
 pub use support::{Held, Support, fixed_components};
+pub use surface::{SurfaceEffect, SurfaceState};
 pub use viscoplastic_history::ViscoplasticHistory;
 pub use viscous_stress::ViscousStress;
 
@@ -46,6 +53,8 @@ pub struct Phases {
     pub energy: Option<Needs>,
     /// Adds to the total stress that is written to files; what that needs.
     pub stress: Option<Needs>,
+    /// Weakens the elastic stress of other effects: it is called before them in the other phases.
+    pub weakens: bool,
 }
 
 /// A quadratic form of the velocity, for certificates.
@@ -82,7 +91,15 @@ pub trait Effect<const D: usize, const S: usize> {
     ) {
     }
 
-    /// Adds its explicit stress or force, from the converged state, to the batch; may write its trial history.
+    /// Adds its part of the elastic stress of the converged displacement and history, to `elastic_stress` of the batch;
+    /// called where some effect needs that.
+    fn add_elastic_stress(&self, _batch: &mut Batch<D, S>) {}
+
+    /// Weakens the batch's cells as the converged history has it; called in the phases energy and stress if it weakens.
+    fn weaken(&self, _batch: &mut Batch<D, S>) {}
+
+    /// Adds its explicit stress or force, from the converged state, to the batch; may write its trial history. One that
+    /// weakens weakens the batch as its trial history has it.
     fn add_explicit(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
 
     /// Adds its energies after the step was committed.
@@ -121,14 +138,14 @@ pub trait Effect<const D: usize, const S: usize> {
     fn restore(&mut self, _name: &str, _values: &[f64]) {}
 }
 
-/// Values that an effect keeps for cells.
+/// Values that an effect keeps for cells or nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct History<'a> {
     /// Name in checkpoints and field files.
     pub name: &'static str,
-    /// Values a cell.
+    /// Values a cell or node.
     pub width: usize,
-    /// `width` values for each cell of this rank; zero for cells whose material keeps no such history.
+    /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
     pub values: Cow<'a, [f64]>,
     /// Bytes that are kept in memory, trial values included.
     pub bytes: usize,

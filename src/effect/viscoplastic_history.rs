@@ -47,8 +47,9 @@ impl<const S: usize> ViscoplasticHistory<S> {
             let flow = flow(at, &lagged);
             let release = elasticity.apply(&flow);
             *trial = add_scaled(converged, -step.length, &release);
-            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, trial);
-            let weight = batch.cells[at].volume * step.length;
+            let share = batch.integrity.of(at);
+            batch.stress[at] = add_scaled(&batch.stress[at], share, trial);
+            let weight = share * batch.cells[at].volume * step.length;
             energy.viscoplastic += weight * dot(&lagged, &flow);
             energy.numerical +=
                 weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
@@ -64,11 +65,22 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
         let both = Needs { strain_rate: true, ..strain };
-        Phases { matrix: false, explicit: Some(both), energy: Some(strain), stress: Some(Needs::default()) }
+        Phases {
+            explicit: Some(both),
+            energy: Some(strain),
+            stress: Some(Needs::default()),
+            ..Phases::default()
+        }
     }
 
     fn is_everywhere(&self) -> bool {
         self.laws.is_everywhere()
+    }
+
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+        for (stress, history) in batch.elastic_stress.iter_mut().zip(self.stress.converged(batch.number)) {
+            *stress = add_scaled(stress, 1.0, history);
+        }
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
@@ -101,13 +113,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         let elasticity = law.elasticity();
         for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
             let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
-            energy.elastic += 0.5 * batch.cells[at].volume * elasticity.inverse_square(&stress);
+            let volume = batch.integrity.of(at) * batch.cells[at].volume;
+            energy.elastic += 0.5 * volume * elasticity.inverse_square(&stress);
         }
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        for (stress, history) in batch.stress.iter_mut().zip(self.stress.converged(batch.number)) {
-            *stress = add_scaled(stress, 1.0, history);
+        let stresses = batch.stress.iter_mut().zip(self.stress.converged(batch.number));
+        for (at, (stress, history)) in stresses.enumerate() {
+            *stress = add_scaled(stress, batch.integrity.of(at), history);
         }
     }
 

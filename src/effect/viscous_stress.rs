@@ -19,7 +19,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn phases(&self) -> Phases {
         let rate = Needs { strain_rate: true, ..Needs::default() };
-        Phases { matrix: true, explicit: None, energy: Some(rate), stress: Some(rate) }
+        Phases { matrix: true, energy: Some(rate), stress: Some(rate), ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {

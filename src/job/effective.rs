@@ -16,6 +16,7 @@ const NO_PHYSICS: &[&str] = &[
     "solver.accept",
     "solver.inclusion_tolerance",
     "solver.max_newton_iterations",
+    "solver.method",
     "solver.petsc",
     "solver.preconditioner",
     "time.end",

@@ -1,6 +1,7 @@
 //! Material laws: pure functions at a point.
 
 mod by_material;
+mod damage;
 mod drucker_prager;
 mod hardening;
 mod isotropic;
@@ -9,6 +10,7 @@ mod perzyna;
 mod viscoplasticity;
 
 pub use by_material::ByMaterial;
+pub use damage::Damage;
 pub use drucker_prager::DruckerPrager;
 pub use hardening::Hardening;
 pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};

@@ -90,13 +90,15 @@ pub fn save<const D: usize, const S: usize>(
     let traction =
         traction.as_deref().map(|t| Table { name: "contact_traction", set: "nodes", width: D, values: t });
     tables.extend(traction);
-    let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
-    tables.extend(histories.iter().map(|h| Table {
-        name: h.name,
-        set: "cells",
-        width: h.width,
-        values: &h.values,
-    }));
+    let of_cells: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+    let of_nodes: Vec<History> = body.surface_effects.iter().flat_map(|e| e.histories()).collect();
+    for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
+        let table = |h| {
+            let History { name, width, values, .. }: &History = h;
+            Table { name, set, width: *width, values }
+        };
+        tables.extend(histories.iter().map(table));
+    }
     checkpoint_file::write(path, session.world(), &header, &sets, &tables)
 }
 
@@ -127,6 +129,13 @@ pub fn restore<const D: usize, const S: usize>(
     for effect in &mut body.effects {
         let kept: Vec<(&str, usize)> = effect.histories().iter().map(|h| (h.name, h.width)).collect();
         let values = checkpoint.read("cells", body.mesh.total_cells as u64, &kept, &cells)?;
+        for ((name, _), values) in kept.iter().zip(&values) {
+            effect.restore(name, values);
+        }
+    }
+    for effect in &mut body.surface_effects {
+        let kept: Vec<(&str, usize)> = effect.histories().iter().map(|h| (h.name, h.width)).collect();
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &kept, &nodes)?;
         for ((name, _), values) in kept.iter().zip(&values) {
             effect.restore(name, values);
         }

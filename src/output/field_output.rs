@@ -78,10 +78,15 @@ impl<const D: usize> FieldOutput<D> {
         if let Some(values) = traction.as_deref() {
             fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
         }
-        let histories: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
-        for history in &histories {
+        let of_cells: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+        for history in &of_cells {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
+        }
+        let of_nodes: Vec<History> = body.surface_effects.iter().flat_map(|e| e.histories()).collect();
+        for history in &of_nodes {
+            let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
+            fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });
         }
         self.0.write_step(state.time, &fields)
     }

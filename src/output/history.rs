@@ -7,13 +7,13 @@ use std::path::Path;
 
 const HEADER: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
-energy_imbalance,numerical_dissipation,contact_energy";
+energy_imbalance,numerical_dissipation,contact_energy,damage_dissipation,adhesion_energy,adhesion_dissipation";
 
 /// What adds up over the steps of a run; saved in checkpoints.
 ///
 /// Dissipations and work are totals since time 0 in J (J/m in the plane).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Totals {
     /// Kinetic energy now.
     pub kinetic_energy: f64,
@@ -27,6 +27,12 @@ pub struct Totals {
     pub viscoplastic_dissipation: f64,
     /// Dissipated by contact.
     pub contact_dissipation: f64,
+    /// Dissipated by damage.
+    pub damage_dissipation: f64,
+    /// Energy stored in adhesive bonds now.
+    pub adhesion_energy: f64,
+    /// Dissipated by adhesive bonds that gave way.
+    pub adhesion_dissipation: f64,
     /// Work of the loads.
     pub external_work: f64,
     /// Dissipated by the scheme: what the exact terms of its time discretisation took out.
@@ -50,8 +56,9 @@ impl Totals {
     pub fn at_start(energy: Energy) -> Self {
         let (kinetic_energy, elastic_energy) = (energy.kinetic, energy.elastic);
         let contact_energy = energy.stored_in_contact;
-        let turnover = kinetic_energy + elastic_energy + contact_energy;
-        Self { kinetic_energy, elastic_energy, contact_energy, turnover, ..Self::default() }
+        let adhesion_energy = energy.stored_in_bonds;
+        let turnover = kinetic_energy + elastic_energy + contact_energy + adhesion_energy;
+        Self { kinetic_energy, elastic_energy, contact_energy, adhesion_energy, turnover, ..Self::default() }
     }
 
     /// Takes a step in.
@@ -59,15 +66,21 @@ impl Totals {
         let energy = &outcome.energy;
         let stored = energy.kinetic - self.kinetic_energy + energy.elastic - self.elastic_energy
             + energy.stored_in_contact
-            - self.contact_energy;
-        let released = energy.viscous + energy.viscoplastic + energy.contact;
+            - self.contact_energy
+            + energy.stored_in_bonds
+            - self.adhesion_energy;
+        let released =
+            energy.viscous + energy.viscoplastic + energy.contact + energy.damage + energy.debonding;
         let open = stored + released - energy.work - energy.numerical;
         self.kinetic_energy = energy.kinetic;
         self.elastic_energy = energy.elastic;
         self.contact_energy = energy.stored_in_contact;
+        self.adhesion_energy = energy.stored_in_bonds;
         self.viscous_dissipation += energy.viscous;
         self.viscoplastic_dissipation += energy.viscoplastic;
         self.contact_dissipation += energy.contact;
+        self.damage_dissipation += energy.damage;
+        self.adhesion_dissipation += energy.debonding;
         self.external_work += energy.work;
         self.numerical_dissipation -= energy.numerical;
         let sizes = [
@@ -77,6 +90,9 @@ impl Totals {
             self.viscous_dissipation,
             self.viscoplastic_dissipation,
             self.contact_dissipation,
+            self.damage_dissipation,
+            self.adhesion_energy,
+            self.adhesion_dissipation,
             self.external_work,
         ];
         self.turnover = sizes.iter().fold(self.turnover, |m, s| m.max(s.abs()));
@@ -129,6 +145,9 @@ impl History {
                 totals.energy_imbalance,
                 totals.numerical_dissipation,
                 totals.contact_energy,
+                totals.damage_dissipation,
+                totals.adhesion_energy,
+                totals.adhesion_dissipation,
             ])
         ))
     }

@@ -120,8 +120,13 @@ impl Ksp {
 
     /// Starts from the values already in the solution.
     pub fn start_from_solution(&mut self) -> Result<()> {
+        self.start(true)
+    }
+
+    /// Starts from the values already in the solution, or from zero.
+    pub(super) fn start(&mut self, from_solution: bool) -> Result<()> {
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, 1) })
+        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, i32::from(from_solution) as sys::PetscBool) })
     }
 
     /// Lets PETSc options override what was set.

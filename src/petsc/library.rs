@@ -70,13 +70,18 @@ pub fn set_option(name: &str, value: &str) -> Result<()> {
     Ok(())
 }
 
-/// Sets a PETSc option unless the user has set it already.
-pub fn set_default_option(name: &str, value: &str) -> Result<()> {
+/// Whether a PETSc option is set; the name is without the leading dash.
+pub fn has_option(name: &str) -> Result<bool> {
     let key: CString = c_string(&format!("-{name}"))?;
     let mut set = 0;
     // SAFETY: as above; `set` is a live PetscBool.
     check(unsafe { sys::PetscOptionsHasName(ptr::null_mut(), ptr::null(), key.as_ptr(), &mut set) })?;
-    if set == 0 { set_option(name, value) } else { Ok(()) }
+    Ok(set != 0)
+}
+
+/// Sets a PETSc option unless the user has set it already.
+pub fn set_default_option(name: &str, value: &str) -> Result<()> {
+    if has_option(name)? { Ok(()) } else { set_option(name, value) }
 }
 
 /// A named stage of PETSc's `-log_view`; what runs while it is entered is attributed to it.

@@ -53,6 +53,13 @@ impl Matrix {
         }
     }
 
+    /// Another handle of the same matrix.
+    pub(super) fn share(&self) -> Result<Self> {
+        // SAFETY: live object; the new handle owns the reference that is added.
+        check(unsafe { sys::PetscObjectReference(self.raw.cast()) })?;
+        Ok(Self { raw: self.raw, not_send: PhantomData })
+    }
+
     /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
     pub fn attach_rigid_motions(&mut self, block: usize, coordinates: &[f64]) -> Result<()> {
         let mut points = ptr::null_mut();

@@ -10,15 +10,18 @@ mod ksp;
 mod library;
 mod matrix;
 mod projected;
+mod reduced;
 mod snes;
 pub mod sys;
+mod variational_inequality;
 mod vector;
 
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Entered, Petsc, Stage, set_default_option, set_option};
+pub use library::{Entered, Petsc, Stage, has_option, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
 pub use projected::{ProjectedKsp, ProjectedOperator, ProjectedOutcome};
-pub use snes::{LineSearch, NonlinearOutcome, NonlinearProblem, Snes};
+pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
+pub use variational_inequality::{BoundedSnes, UNBOUNDED};
 pub use vector::{DistributedVector, LocalRead, LocalWrite};
 
 use crate::error::{Error, Result};

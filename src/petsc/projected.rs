@@ -3,6 +3,7 @@ use super::{
     callback::{Callback, USER_ERROR, spoil},
     check, index,
     library::communicator,
+    reduced::ReducedMatrix,
     sys,
 };
 use crate::error::Result;
@@ -13,21 +14,34 @@ pub trait ProjectedOperator {
     /// `y = P B x` for an `x` of the subspace.
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
-    /// `x = P x`: the orthogonal projection on the subspace.
+    /// `x = P x`: the orthogonal projection on the subspace, node by node.
     fn project(&mut self, x: &mut DistributedVector) -> Result<()>;
+
+    /// Whether the subspace may be less than the whole space.
+    fn may_project(&self) -> bool {
+        true
+    }
 }
 
-/// A Krylov solver on a subspace, preconditioned by a constant matrix that knows nothing of the subspace.
+/// A Krylov solver on a subspace that changes from solve to solve, preconditioned by a constant matrix.
 ///
 /// To PETSc the operator is a shell matrix whose null space is the complement of the subspace: it projects every result
-/// of the preconditioner. The preconditioner is set up once for as long as the constant matrix stands.
+/// of the preconditioner. The preconditioner is that of the constant matrix on the subspace of some solve before; it is
+/// made anew only when a solve has not converged in as many iterations as that is worth
+/// ([`ProjectedKsp::set_patience`]), and goes on from where the solve was.
 #[derive(Debug)]
 pub struct ProjectedKsp {
     ksp: Ksp,
     fallback: Option<Ksp>,
     shell: sys::Mat,
     complement: sys::MatNullSpace,
+    constant: Option<Matrix>,
+    reduced: Option<ReducedMatrix>,
+    block: usize,
     tolerances: (f64, f64, usize),
+    /// The smallest right-hand side since the tolerances were set.
+    smallest: f64,
+    patience: usize,
 }
 
 /// How a solve on a subspace ended.
@@ -37,10 +51,18 @@ pub struct ProjectedOutcome {
     pub linear: LinearOutcome,
     /// Whether CG met negative curvature, so that GMRES had to solve.
     pub indefinite: bool,
+    /// Whether the preconditioner was made anew.
+    pub refreshed: bool,
 }
 
 /// PETSc's reasons of CG for negative curvature: of the preconditioner, of the matrix.
 const INDEFINITE: [i32; 2] = [-8, -10];
+
+/// PETSc's reason for a solve that has used up its iterations.
+const TOO_MANY: i32 = -3;
+
+/// A solve of no iterations.
+const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, residual: f64::INFINITY };
 
 impl ProjectedKsp {
     /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
@@ -52,7 +74,12 @@ impl ProjectedKsp {
             fallback: None,
             shell: ptr::null_mut(),
             complement: ptr::null_mut(),
+            constant: None,
+            reduced: None,
+            block,
             tolerances: (1e-5, 0.0, 10_000),
+            smallest: f64::INFINITY,
+            patience: usize::MAX,
         };
         // SAFETY: the handle owns one reference each to the shell matrix and the null space from their creation on; the
         // shell is only multiplied inside `solve`, which sets its context.
@@ -82,25 +109,52 @@ impl ProjectedKsp {
         &mut self.ksp
     }
 
-    /// Stops at `relative * |r|` or at `absolute`, whichever is larger, or after this many iterations.
+    /// Stops at `relative * |r|` or at `absolute`, whichever is larger, or after this many iterations. `r` is the
+    /// smallest right-hand side of all solves from here on: what Newton's method gained is not put at risk when the
+    /// residual grows for a while.
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         self.tolerances = (relative, absolute, iterations);
-        self.ksp.set_tolerances(relative, absolute, iterations)
+        self.smallest = f64::INFINITY;
+        Ok(())
+    }
+
+    /// Iterations with the preconditioner of another subspace after which it is made for the subspace in use.
+    pub fn set_patience(&mut self, iterations: usize) {
+        self.patience = iterations;
     }
 
     /// Takes the constant matrix and sets up its preconditioner. Collective.
     ///
     /// The preconditioner is set up with the constant matrix alone: multigrid would smooth with the operator otherwise.
     pub fn set_constant(&mut self, constant: &Matrix) -> Result<()> {
+        self.reduced = None;
+        self.constant = Some(constant.share()?);
+        self.precondition_with(constant.raw)
+    }
+
+    fn precondition_with(&mut self, matrix: sys::Mat) -> Result<()> {
         self.fallback = None;
-        // SAFETY: live objects; PETSc keeps its own references.
+        let mut pc = ptr::null_mut();
+        // SAFETY: live objects; PETSc keeps its own references. Multigrid smooths with its own matrix: the shell can only
+        // be multiplied inside `solve`, and is another operator.
         unsafe {
-            check(sys::KSPSetReusePreconditioner(self.ksp.raw, 0))?;
-            check(sys::KSPSetOperators(self.ksp.raw, constant.raw, constant.raw))?;
-            check(sys::KSPSetUp(self.ksp.raw))?;
-            check(sys::KSPSetReusePreconditioner(self.ksp.raw, 1))?;
-            check(sys::KSPSetOperators(self.ksp.raw, self.shell, constant.raw))
+            check(sys::KSPSetOperators(self.ksp.raw, self.shell, matrix))?;
+            check(sys::KSPGetPC(self.ksp.raw, &mut pc))?;
+            check(sys::PCSetUseAmat(pc, 0))
         }
+    }
+
+    /// Takes in the subspace in use; says whether the preconditioner is that of another. Collective.
+    fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<bool> {
+        let Some(constant) = &self.constant else { return Ok(false) };
+        if self.patience == usize::MAX || !operator.may_project() {
+            return Ok(false);
+        }
+        let reduced = match &mut self.reduced {
+            Some(reduced) => reduced,
+            none => none.insert(ReducedMatrix::new(constant, like, self.block)?),
+        };
+        reduced.look(|column| operator.project(column))
     }
 
     /// Solves `P B x = r` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an error.
@@ -112,6 +166,7 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
+        let stale = self.look(operator, right_hand_side)?;
         let callback = Callback::new(operator);
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
         // KSPSolve. The null space is attached for the solve alone, so that its function is never called without.
@@ -120,7 +175,7 @@ impl ProjectedKsp {
             check(sys::MatSetNullSpace(self.shell, self.complement))?;
             check(sys::MatShellSetContext(self.shell, callback.pointer()))?;
         }
-        let outcome = self.solve_attached(right_hand_side, solution);
+        let outcome = self.solve_attached(right_hand_side, solution, stale);
         // SAFETY: as above.
         unsafe {
             check(sys::MatShellSetContext(self.shell, ptr::null_mut()))?;
@@ -135,21 +190,49 @@ impl ProjectedKsp {
         &mut self,
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
+        stale: bool,
     ) -> Result<ProjectedOutcome> {
-        let first = self.ksp.solve(right_hand_side, solution)?;
-        if !INDEFINITE.contains(&first.reason) {
-            return Ok(ProjectedOutcome { linear: first, indefinite: false });
+        let norm = right_hand_side.norm()?;
+        self.smallest = self.smallest.min(norm);
+        let (relative, absolute, iterations) = self.tolerances;
+        let target = (relative * self.smallest).max(absolute);
+        let first = if stale { self.patience.min(iterations) } else { iterations };
+        let mut outcome = ProjectedOutcome { linear: NOTHING, indefinite: false, refreshed: false };
+        if first > 0 {
+            self.ksp.set_tolerances(0.0, target, first)?;
+            outcome.linear = self.ksp.solve(right_hand_side, solution)?;
+        } else {
+            solution.fill(0.0)?;
+        }
+        if stale && outcome.linear.reason == TOO_MANY {
+            outcome.refreshed = true;
+            self.refresh()?;
+            self.ksp.set_tolerances(0.0, target, iterations)?;
+            self.ksp.start(true)?;
+            let rest = self.ksp.solve(right_hand_side, solution)?;
+            self.ksp.start(false)?;
+            outcome.linear =
+                LinearOutcome { iterations: outcome.linear.iterations + rest.iterations, ..rest };
+        }
+        if !INDEFINITE.contains(&outcome.linear.reason) {
+            return Ok(outcome);
         }
         if self.fallback.is_none() {
             self.fallback = Some(self.ksp.sharing_preconditioner("indefinite_", "gmres")?);
         }
         let Some(fallback) = &mut self.fallback else { unreachable!("it was just made") };
-        let (relative, absolute, iterations) = self.tolerances;
-        let relative = relative.max(absolute / right_hand_side.norm()?).min(relative.max(1e-3));
-        fallback.set_tolerances(relative, 0.0, iterations)?;
+        fallback.set_tolerances((target / norm).min(1e-3), 0.0, iterations)?;
         let second = fallback.solve(right_hand_side, solution)?;
-        let linear = LinearOutcome { iterations: first.iterations + second.iterations, ..second };
-        Ok(ProjectedOutcome { linear, indefinite: true })
+        let iterations = outcome.linear.iterations + second.iterations;
+        Ok(ProjectedOutcome { linear: LinearOutcome { iterations, ..second }, indefinite: true, ..outcome })
+    }
+
+    /// Makes the preconditioner for the subspace in use. Collective.
+    fn refresh(&mut self) -> Result<()> {
+        let (Some(constant), Some(reduced)) = (&self.constant, &mut self.reduced) else { return Ok(()) };
+        reduced.make(constant)?;
+        let raw = reduced.raw;
+        self.precondition_with(raw)
     }
 }
 

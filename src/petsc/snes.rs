@@ -45,6 +45,19 @@ pub struct NonlinearOutcome {
 }
 
 impl NonlinearOutcome {
+    /// How the last solve of a live solver ended.
+    pub(super) fn of(raw: sys::SNES) -> Result<Self> {
+        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
+        // SAFETY: live object, live numbers.
+        unsafe {
+            check(sys::SNESGetConvergedReason(raw, &mut reason))?;
+            check(sys::SNESGetIterationNumber(raw, &mut iterations))?;
+            check(sys::SNESGetFunctionNorm(raw, &mut residual))?;
+        }
+        let iterations = usize::try_from(iterations).unwrap_or(0);
+        Ok(Self { reason, iterations, residual })
+    }
+
     /// Whether the tolerance was reached.
     pub fn converged(&self) -> bool {
         self.reason > 0
@@ -62,15 +75,6 @@ impl NonlinearOutcome {
             _ => "Newton's method diverged",
         }
     }
-}
-
-/// How far along its direction Newton's method goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LineSearch {
-    /// All the way.
-    FullSteps,
-    /// As far as the norm of the residual falls enough.
-    Backtracking,
 }
 
 /// Newton's method; the problem applies its Jacobian and solves with it.
@@ -119,6 +123,8 @@ impl Snes {
             check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
+            // A full step may take the residual up by orders of magnitude while the branches settle.
+            check(sys::SNESSetDivergenceTolerance(raw, -1.0))?;
             let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
             check(sys::SNESGetKSP(raw, &mut ksp))?;
             check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
@@ -133,28 +139,24 @@ impl Snes {
         }
     }
 
+    /// Takes every step in full, or searches along it for a decrease of the residual.
+    pub fn search_along_steps(&mut self, search: bool) -> Result<()> {
+        let mut line_search = ptr::null_mut();
+        // SAFETY: live object, which owns its line search; the names are static.
+        unsafe {
+            check(sys::SNESGetLineSearch(self.raw, &mut line_search))?;
+            check(sys::SNESLineSearchSetType(line_search, if search { c"bt" } else { c"basic" }.as_ptr()))
+        }
+    }
+
     /// Lets PETSc options override what was set.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::SNESSetFromOptions(self.raw) })
     }
 
-    /// Chooses the line search, unless PETSc options do.
-    pub fn set_line_search(&mut self, line_search: LineSearch) -> Result<()> {
-        let name = match line_search {
-            LineSearch::FullSteps => c"basic",
-            LineSearch::Backtracking => c"bt",
-        };
-        let mut search = ptr::null_mut();
-        // SAFETY: live objects; PETSc copies the name.
-        unsafe {
-            check(sys::SNESGetLineSearch(self.raw, &mut search))?;
-            check(sys::SNESLineSearchSetType(search, name.as_ptr()))?;
-            check(sys::SNESLineSearchSetFromOptions(search))
-        }
-    }
-
-    /// Solves `problem` from and into `x`, down to a residual norm of `tolerance`. Collective.
+    /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.
+    /// Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
     /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.
@@ -162,7 +164,7 @@ impl Snes {
         &mut self,
         problem: &mut dyn NonlinearProblem,
         x: &mut DistributedVector,
-        tolerance: f64,
+        (absolute, relative): (f64, f64),
         iterations: usize,
     ) -> Result<NonlinearOutcome> {
         let callback = Callback::new(problem);
@@ -177,8 +179,8 @@ impl Snes {
             check(sys::PCShellSetContext(self.preconditioner, pointer))?;
             check(sys::SNESSetTolerances(
                 self.raw,
-                tolerance,
-                0.0,
+                absolute,
+                relative,
                 0.0,
                 index(iterations, "Newton iterations")?,
                 unlimited,
@@ -190,24 +192,12 @@ impl Snes {
         };
         callback.finish()?;
         check(code)?;
-        self.outcome()
+        NonlinearOutcome::of(self.raw)
     }
 
     /// The residual at the end of the last solve.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
-    }
-
-    fn outcome(&self) -> Result<NonlinearOutcome> {
-        let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
-        // SAFETY: live object, live numbers.
-        unsafe {
-            check(sys::SNESGetConvergedReason(self.raw, &mut reason))?;
-            check(sys::SNESGetIterationNumber(self.raw, &mut iterations))?;
-            check(sys::SNESGetFunctionNorm(self.raw, &mut residual))?;
-        }
-        let iterations = usize::try_from(iterations).unwrap_or(0);
-        Ok(NonlinearOutcome { reason, iterations, residual })
     }
 }
 

@@ -135,6 +135,14 @@ impl DistributedVector {
         Ok(norm)
     }
 
+    /// Whether the owned values are those of `other` on all ranks. Collective.
+    pub fn equals(&self, other: &Self) -> Result<bool> {
+        let mut equal = 0;
+        // SAFETY: live vectors and a live PetscBool.
+        check(unsafe { sys::VecEqual(self.raw, other.raw, &mut equal) })?;
+        Ok(equal != 0)
+    }
+
     /// Scalar product over all ranks. Collective.
     pub fn dot(&self, other: &Self) -> Result<f64> {
         let mut product = 0.0;

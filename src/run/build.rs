@@ -2,22 +2,23 @@
 
 use crate::{
     body::Body,
-    contact::{self, DampedResponse, Graph, Symmetry},
+    contact::{self, DampedResponse, Gap, Graph, Symmetry},
     effect::{
-        BodyForce, Contact, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load, Quadrature, Support,
-        Traction, ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
+        Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load,
+        Quadrature, Support, SurfaceEffect, Traction, ViscoplasticHistory, ViscousStress, choose_unknowns,
+        fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw, Scalar},
+    job::{self, Fix, Job, Material, Named, NormalLaw, Obstacle, Scalar},
     material::{
-        ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric, Perzyna,
-        Viscoplasticity,
+        self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
+        Perzyna, Viscoplasticity,
     },
     mesh::Mesh,
     session::Session,
-    space::Geometry,
+    space::{Geometry, surface_points},
     state::State,
-    stepping::{Preconditioner, SolverSettings},
+    stepping::{Method, Preconditioner, SolverSettings},
     tensor::Vector,
 };
 
@@ -41,9 +42,10 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Nodal => Quadrature::Nodal,
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
-        let (law, gap) = session.agree(normal_law(&contact.normal))?;
+        let (law, gap) = session.agree(normal_law(contact))?;
         contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
     }
+    let surface_effects = surface_effects(session, job, &mesh)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -51,7 +53,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
-    Ok((Body { mesh, geometry, effects, contacts, load, fixed }, state))
+    Ok((Body { mesh, geometry, effects, contacts, surface_effects, load, fixed }, state))
 }
 
 /// What the stresses of this many components stand for.
@@ -99,7 +101,46 @@ fn effects<const D: usize, const S: usize>(
     if let Some(laws) = ByMaterial::new(flow) {
         effects.push(Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs)));
     }
+    if let Some(laws) = by_material(materials, damage_law::<S>) {
+        effects.push(Box::new(Damage::new(laws, &geometry.runs)));
+    }
     Ok(effects)
+}
+
+/// What acts at nodes of boundaries beside contact. Collective.
+fn surface_effects<const D: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
+    let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
+    let mut bonded = Vec::new();
+    for contact in &job.contact {
+        let Some(adhesion) = &contact.adhesion else { continue };
+        let law = contact::Adhesion {
+            stiffness: adhesion.stiffness,
+            tangential_stiffness: adhesion.tangential_stiffness.unwrap_or(0.0),
+            energy: adhesion.energy,
+            viscosity: adhesion.viscosity,
+            length: adhesion.length.unwrap_or(f64::INFINITY),
+        };
+        bonded.push(Bonded { law, points: surface_points(session, mesh, &facets(mesh, &contact.on))? });
+    }
+    if !bonded.is_empty() {
+        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
+    }
+    Ok(effects)
+}
+
+fn damage_law<const S: usize>(material: &Material) -> Option<material::Damage> {
+    let (damage, elastic) = (material.damage.as_ref()?, material.elasticity.as_ref()?);
+    Some(material::Damage {
+        threshold: damage.threshold,
+        viscosity: damage.viscosity,
+        exponent: damage.exponent,
+        largest: damage.largest,
+        elasticity: elasticity(elastic).tensor(hypothesis(S)),
+    })
 }
 
 fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
@@ -157,10 +198,11 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 }
 
 /// The law of a contact, and the gap it is felt beyond.
-fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
+fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
     let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
-    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Scalar::default());
-    Ok(match law {
+    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Gap::default());
+    let gap = |given: &Option<Scalar>| gap(contact.obstacle.as_ref(), given.as_ref());
+    Ok(match &contact.normal {
         NormalLaw::DampedResponse(d) => {
             let symmetry = match d.symmetry {
                 job::Symmetry::Even => Symmetry::Even,
@@ -174,13 +216,24 @@ fn normal_law(law: &NormalLaw) -> Result<(contact::NormalLaw, Scalar)> {
         NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
         NormalLaw::Compliance(c) => {
             let law = contact::Compliance { stiffness: c.stiffness, exponent: c.exponent };
-            (contact::NormalLaw::Compliance(law), c.gap.clone())
+            (contact::NormalLaw::Compliance(law), gap(&c.gap))
         }
         NormalLaw::Unilateral(u) => match u.bound {
-            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), u.gap.clone()),
+            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), gap(&u.gap)),
             job::Bound::Velocity => of_velocity(wall()?),
         },
     })
+}
+
+/// What the gap of a contact is measured to.
+fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
+    match obstacle {
+        None => Gap::Distance(given.cloned().unwrap_or_default()),
+        Some(Obstacle::Plane(p)) => Gap::Plane { point: p.point.clone(), normal: p.normal.clone() },
+        Some(Obstacle::Sphere(s)) => {
+            Gap::Sphere { centre: s.centre.clone(), radius: s.radius, hollow: s.hollow }
+        }
+    }
 }
 
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
@@ -250,6 +303,10 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
         tolerance: job.solver.tolerance,
         inclusion_tolerance: job.solver.inclusion_tolerance,
+        method: match job.solver.method {
+            job::Method::Newton => Method::Newton,
+            job::Method::Vinewtonrsls => Method::VariationalInequality,
+        },
         preconditioner: match job.solver.preconditioner {
             job::Preconditioner::Auto => Preconditioner::Auto,
             job::Preconditioner::Cholesky => Preconditioner::Cholesky,

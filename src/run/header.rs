@@ -1,7 +1,12 @@
 //! What the log says before the first and after the last step.
 
 use super::{Summary, setup::Setup};
-use crate::{error::Result, job::Loaded, output::log::Log, session::Session};
+use crate::{
+    error::Result,
+    job::{Loaded, Method},
+    output::log::Log,
+    session::Session,
+};
 use std::path::Path;
 
 /// Versions, title, mesh, partition, effects, solver, output folder, warnings: a line each. Collective.
@@ -30,7 +35,11 @@ pub(super) fn lines<const D: usize, const S: usize>(
         "scheme     lagged_euler, steps of {} s to {} s; {}, preconditioner {}, tolerance {:.0e}",
         job.time.step,
         job.time.end,
-        if scheme.is_nonlinear() { "Newton with line search" } else { "one linear solve a step" },
+        match job.solver.method {
+            Method::Vinewtonrsls => "PETSc's vinewtonrsls",
+            Method::Newton if scheme.is_nonlinear() => "Newton with line search",
+            Method::Newton => "one linear solve a step",
+        },
         scheme.preconditioner().name(),
         job.solver.tolerance
     ));

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 /// Sums over all ranks.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Inventory {
-    /// Bytes of each history that effects keep for the cells, trial values included.
+    /// Bytes of each history that effects keep for cells or nodes, trial values included.
     pub history_bytes: BTreeMap<String, u64>,
     /// Quadrature points of all contacts.
     pub contact_points: u64,
@@ -25,7 +25,8 @@ impl Inventory {
         scheme: &LaggedEuler,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        for history in body.effects.iter().flat_map(|e| e.histories()) {
+        let of_nodes = body.surface_effects.iter().flat_map(|e| e.histories());
+        for history in body.effects.iter().flat_map(|e| e.histories()).chain(of_nodes) {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }

@@ -22,6 +22,8 @@ pub struct Needs {
     pub velocity: bool,
     /// Change of the velocity over the last step at the cell's nodes.
     pub velocity_change: bool,
+    /// Elastic stress of the displacement and the histories, before anything weakens it.
+    pub elastic_stress: bool,
 }
 
 impl Needs {
@@ -32,6 +34,7 @@ impl Needs {
             strain_rate: self.strain_rate || other.strain_rate,
             velocity: self.velocity || other.velocity,
             velocity_change: self.velocity_change || other.velocity_change,
+            elastic_stress: self.elastic_stress || other.elastic_stress,
         }
     }
 }
@@ -45,6 +48,27 @@ pub struct Nodal<'a> {
     pub velocity: &'a [f64],
     /// Velocity before the last step in m/s.
     pub previous_velocity: &'a [f64],
+}
+
+/// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Integrity(Vec<f64>);
+
+impl Integrity {
+    /// The share of a cell, by its position in the batch.
+    #[inline(always)]
+    pub fn of(&self, at: usize) -> f64 {
+        self.0.get(at).copied().unwrap_or(1.0)
+    }
+
+    /// Multiplies the shares of the batch's cells by these.
+    pub fn weaken(&mut self, shares: impl Iterator<Item = f64>) {
+        if self.0.is_empty() {
+            self.0.extend(shares);
+        } else {
+            self.0.iter_mut().zip(shares).for_each(|(all, share)| *all *= share);
+        }
+    }
 }
 
 /// A run of cells with their gathered inputs and the outputs that effects add to.
@@ -66,6 +90,10 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub velocity: Vec<Vector<D>>,
     /// Change of the velocity over the last step, `D + 1` nodes a cell, if needed.
     pub velocity_change: Vec<Vector<D>>,
+    /// Elastic stress `E e(u) + H` in Pa before anything weakens it, one a cell, if needed; effects add to it.
+    pub elastic_stress: Vec<Mandel<S>>,
+    /// What the cells still bear of it.
+    pub integrity: Integrity,
     /// Output: stress in Pa, one a cell.
     pub stress: Vec<Mandel<S>>,
     /// Output: force in N on the cell's nodes, `D + 1` a cell.
@@ -90,6 +118,8 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             strain_rate: vec![[0.0; S]; if needs.strain_rate { BATCH } else { 0 }],
             velocity: vec![[0.0; D]; if needs.velocity { BATCH * (D + 1) } else { 0 }],
             velocity_change: vec![[0.0; D]; if needs.velocity_change { BATCH * (D + 1) } else { 0 }],
+            elastic_stress: vec![[0.0; S]; if needs.elastic_stress { BATCH } else { 0 }],
+            integrity: Integrity::default(),
             stress: vec![[0.0; S]; BATCH],
             force: vec![[0.0; D]; BATCH * (D + 1)],
         };
@@ -98,6 +128,8 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             batch.cells = &geometry.cells[run.first..run.first + run.count];
             batch.stress[..run.count].fill([0.0; S]);
             batch.force[..run.count * (D + 1)].fill([0.0; D]);
+            batch.elastic_stress.fill([0.0; S]);
+            batch.integrity.0.clear();
             batch.gather(mesh, nodal, needs);
             visit(&mut batch);
         }

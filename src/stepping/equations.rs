@@ -4,7 +4,7 @@ use crate::{
     effect::Contact,
     error::{Error, Result},
     petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator},
-    state::State,
+    session::Session,
 };
 
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::effect::Contact`] for the unknown `x`.
@@ -19,6 +19,10 @@ pub struct ContactEquations<'a, const D: usize> {
     pub scratch: &'a mut Scratch,
     /// Solves with the Jacobian; its constant matrix is `K`.
     pub linear_solver: &'a mut ProjectedKsp,
+    /// All ranks.
+    pub session: &'a Session<'a>,
+    /// Whether to fail when the branches of the contact graph come back.
+    pub stop_at_cycles: bool,
     /// What was done so far.
     pub effort: Effort,
 }
@@ -53,8 +57,26 @@ pub struct Effort {
     pub linear_iterations: usize,
     /// Linear systems in which CG met negative curvature.
     pub indefinite: usize,
-    /// Numbers that tell the sets of branches of this rank's points apart, one a linearisation.
-    pub sets: Vec<u64>,
+    /// How often the preconditioner was made anew.
+    pub refreshed: usize,
+    /// Numbers that tell the sets of branches of all points apart, one a linearisation.
+    pub sets: Vec<f64>,
+}
+
+impl Effort {
+    /// How many iterations ago the set of branches was the same as now, if there were others in between.
+    pub fn period(&self) -> Option<usize> {
+        let (last, before) = self.sets.split_last()?;
+        let at = before.iter().rposition(|set| set == last)?;
+        (at + 1 < before.len()).then(|| before.len() - at)
+    }
+}
+
+/// That the branches came back, in words.
+pub(super) fn cycle(period: usize) -> String {
+    format!(
+        "Newton's method came back to the branches of the contact graph that it had {period} iterations before"
+    )
 }
 
 /// Adds to `out` what `add` puts on the nodes, given the nodal values of `x`.
@@ -82,19 +104,6 @@ fn add_contact<const D: usize>(
 }
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Turns the converged velocities in `x` into unknowns, with the converged pressures; tells sets met before this from
-    /// later ones no more.
-    pub fn start_again(&mut self, state: &State, x: &mut DistributedVector) -> Result<()> {
-        self.effort.sets.clear();
-        if let Some(traction) = &state.contact_traction {
-            let traction = traction.owned()?;
-            self.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
-        }
-        let mut x = x.owned_mut()?;
-        self.contacts.iter().for_each(|contact| contact.unmap(&mut x));
-        Ok(())
-    }
-
     /// Writes the velocities of these unknowns.
     fn map(&mut self, x: &DistributedVector) -> Result<()> {
         self.scratch.velocity.copy_from(x)?;
@@ -131,8 +140,14 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&velocity));
         }
         let digests = self.contacts.iter().map(Contact::set_digest);
-        self.effort.sets.push(digests.fold(0, |sum, digest| sum.rotate_left(7) ^ digest));
-        Ok(())
+        let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
+        // Half the bits suffice to tell sets apart, and add up over ranks without a carry beyond them.
+        let [all] = self.session.sum([(mine >> 32) as f64]);
+        self.effort.sets.push(all);
+        match self.effort.period() {
+            Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle(period))),
+            _ => Ok(()),
+        }
     }
 
     fn apply_jacobian(
@@ -162,6 +177,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let outcome = self.linear_solver.solve(&mut operator, open, velocity)?;
         self.effort.linear_iterations += outcome.linear.iterations;
         self.effort.indefinite += usize::from(outcome.indefinite);
+        self.effort.refreshed += usize::from(outcome.refreshed);
         if !outcome.linear.converged() {
             return Err(Error::Failed(outcome.linear.words().into()));
         }
@@ -196,5 +212,9 @@ impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
         let mut x = x.owned_mut()?;
         self.contacts.iter().for_each(|contact| contact.project(&mut x));
         Ok(())
+    }
+
+    fn may_project(&self) -> bool {
+        self.contacts.iter().any(|contact| contact.law.has_vertical_parts())
     }
 }

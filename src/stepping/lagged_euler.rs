@@ -8,15 +8,16 @@
 //! ```
 
 use super::{
+    bounded::{self, Bounded},
     equations::Scratch,
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, SolverSettings},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
     newton::{Newton, REMEDY, failed},
 };
 use crate::{
     body::Body,
     effect::{Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage},
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, Stage, has_option},
     session::Session,
     state::State,
 };
@@ -124,7 +125,26 @@ impl LaggedEuler {
             linear_solver.linear_solver().apply_options()?;
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            Solver::Newton(Box::new(Newton { snes, linear_solver, scratch, before, after, scales }))
+            let bounded = match settings.method {
+                Method::Newton => None,
+                Method::VariationalInequality => {
+                    session.agree(bounded::refuse(body))?;
+                    Some(Bounded::new(&state.velocity)?)
+                }
+            };
+            linear_solver.set_patience(preconditioner.patience(D));
+            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
+            Solver::Newton(Box::new(Newton {
+                snes,
+                bounded,
+                linear_solver,
+                scratch,
+                before,
+                after,
+                scales,
+                start,
+                chosen_search,
+            }))
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },

@@ -18,6 +18,15 @@ pub enum Preconditioner {
     Boomeramg,
 }
 
+/// What solves a step with contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Newton's method on the contact graphs.
+    Newton,
+    /// PETSc's solver for variational inequalities, where contacts are nothing but bounds on velocity components.
+    VariationalInequality,
+}
+
 /// How the equations of a step are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
@@ -25,6 +34,8 @@ pub struct SolverSettings {
     pub tolerance: f64,
     /// Largest scaled distance to a contact graph.
     pub inclusion_tolerance: f64,
+    /// The method for steps with contact.
+    pub method: Method,
     /// The preconditioner.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step has failed.
@@ -73,6 +84,15 @@ impl Preconditioner {
         matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
     }
 
+    /// Iterations that cost as much as making it anew (measured, see docs/contact-preconditioner.md).
+    pub(super) fn patience(self, dimension: usize) -> usize {
+        match self {
+            Self::Auto | Self::Cholesky if dimension == 2 => 5,
+            Self::Auto | Self::Cholesky => 40,
+            Self::Gamg | Self::Boomeramg => 40,
+        }
+    }
+
     /// Its name in job files.
     pub fn name(self) -> &'static str {
         match self {
@@ -106,6 +126,7 @@ impl Preconditioner {
                 }
                 set_default_option("pc_gamg_threshold", "0.01")?;
                 set_default_option("pc_gamg_agg_nsmooths", "1")?;
+                set_default_option("pc_gamg_reuse_interpolation", "true")?;
                 set_default_option("mg_levels_ksp_type", "chebyshev")?;
                 set_default_option("mg_levels_ksp_max_it", "2")?;
                 set_default_option("mg_levels_pc_type", "jacobi")

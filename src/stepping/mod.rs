@@ -1,5 +1,6 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
+mod bounded;
 mod equations;
 mod lagged_euler;
 mod linear_solver;
@@ -7,4 +8,4 @@ mod newton;
 
 pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
-pub use linear_solver::{Preconditioner, SolverSettings};
+pub use linear_solver::{Method, Preconditioner, SolverSettings};

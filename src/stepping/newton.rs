@@ -2,31 +2,34 @@
 
 use super::{
     StepOutcome,
-    equations::{ContactEquations, Effort, Scratch},
+    bounded::Bounded,
+    equations::{ContactEquations, Effort, Scratch, cycle},
     linear_solver::SolverSettings,
 };
 use crate::{
     body::Body,
     effect::{Contact, Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, LineSearch, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
+    petsc::{DistributedVector, Matrix, NonlinearOutcome, ProjectedKsp, Snes},
     session::Session,
     state::State,
 };
 
-/// Iterations with full steps before backtracking starts anew. A new set of branches raises the residual at first, so that
-/// backtracking would creep where full steps arrive; where the sets repeat, only backtracking arrives.
-const FULL_STEPS: usize = 12;
-
 /// Newton's method with what it needs.
 pub(super) struct Newton {
     pub snes: Snes,
+    /// PETSc's solver for variational inequalities, if that solves the steps.
+    pub bounded: Option<Bounded>,
     pub linear_solver: ProjectedKsp,
     pub scratch: Scratch,
     pub before: Vec<u8>,
     pub after: Vec<u8>,
     /// The parameter of each contact's graphs for the matrix in use.
     pub scales: Vec<f64>,
+    /// Where the step started.
+    pub start: DistributedVector,
+    /// Whether the user chose how to search along steps.
+    pub chosen_search: bool,
 }
 
 impl Newton {
@@ -66,43 +69,68 @@ impl Newton {
     ) -> Result<StepOutcome> {
         body.contacts.iter_mut().zip(&self.scales).for_each(|(contact, scale)| contact.scale = *scale);
         branches(body, &state.velocity, &mut self.before)?;
+        // Where nothing acts but an obstacle that moves, its first push is what residuals are small against.
+        let tolerances = (tolerance, settings.tolerance);
+        if let Some(bounded) = &mut self.bounded {
+            let contacts = &mut body.contacts;
+            let most = settings.newton_iterations;
+            let solved = bounded.solve(contacts, matrix, right_hand_side, trial, tolerances, most);
+            let outcome = session.agree(solved)?;
+            if !outcome.converged() {
+                return Err(failed(step, outcome.words(), REMEDY));
+            }
+            return self.judge(session, body, step, trial, settings, (outcome.iterations, &Effort::default()));
+        }
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
-        let mut equations = ContactEquations {
-            matrix,
-            contacts: &mut body.contacts,
-            right_hand_side,
-            scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
-            effort: Effort::default(),
-        };
-        let words = |error| match error {
-            Error::Failed(words) => failed(step, &words, REMEDY),
-            other => other,
-        };
-        let iterations = settings.newton_iterations;
-        self.snes.set_line_search(LineSearch::FullSteps)?;
-        let full = self.snes.solve(&mut equations, trial, tolerance, iterations.min(FULL_STEPS));
-        let mut outcome = session.agree(full.map_err(words))?;
-        if !outcome.converged() && outcome.iterations < iterations {
-            let tried = outcome.iterations;
-            trial.copy_from(&state.velocity)?;
-            equations.start_again(state, trial)?;
-            self.snes.set_line_search(LineSearch::Backtracking)?;
-            let solved = self.snes.solve(&mut equations, trial, tolerance, iterations - tried);
-            outcome = session.agree(solved.map_err(words))?;
-            outcome.iterations += tried;
-        }
-        let effort = equations.effort;
-        if !outcome.converged() {
-            return Err(failed(step, &why(session, &outcome, &effort), REMEDY));
+        self.start.copy_from(trial)?;
+        let (mut effort, mut newton_iterations) = (Effort::default(), 0);
+        for last in if self.chosen_search { &[true][..] } else { &[false, true] } {
+            if !self.chosen_search {
+                self.snes.search_along_steps(*last)?;
+            }
+            trial.copy_from(&self.start)?;
+            effort.sets.clear();
+            let mut equations = ContactEquations {
+                matrix,
+                contacts: &mut body.contacts,
+                right_hand_side,
+                scratch: &mut self.scratch,
+                linear_solver: &mut self.linear_solver,
+                session,
+                stop_at_cycles: !last,
+                effort,
+            };
+            let solved = self.snes.solve(&mut equations, trial, tolerances, settings.newton_iterations);
+            effort = equations.effort;
+            newton_iterations += effort.sets.len();
+            match session.agree(solved) {
+                Ok(outcome) if outcome.converged() => break,
+                Ok(_) | Err(Error::Failed(_)) if !last => {}
+                Ok(outcome) => return Err(failed(step, &why(&outcome, &effort), REMEDY)),
+                Err(Error::Failed(words)) => return Err(failed(step, &words, REMEDY)),
+                Err(other) => return Err(other),
+            }
         }
         {
             let mut trial = trial.owned_mut()?;
             body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
         }
+        self.judge(session, body, step, trial, settings, (newton_iterations, &effort))
+    }
+
+    /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
+    fn judge<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        step: Step,
+        trial: &DistributedVector,
+        settings: SolverSettings,
+        (newton_iterations, effort): (usize, &Effort),
+    ) -> Result<StepOutcome> {
         trial.update_ghosts()?;
         branches(body, trial, &mut self.after)?;
         let changes = self.before.iter().zip(&self.after).filter(|(a, b)| a != b).count();
@@ -116,7 +144,7 @@ impl Newton {
         let mine = counts.fold([changes, 0, 0], |[a, s, o], c| [a, s + c.sticking, o + c.open]);
         let [active_changes, sticking, open] = session.sum(mine.map(|n| n as f64)).map(|n| n as usize);
         Ok(StepOutcome {
-            newton_iterations: outcome.iterations,
+            newton_iterations,
             linear_iterations: effort.linear_iterations,
             active_changes,
             points: PointCount { sticking, open },
@@ -133,7 +161,8 @@ impl Newton {
         body: &Body<D, S>,
         velocity: &DistributedVector,
     ) -> Result<f64> {
-        let (velocity, residual) = (velocity.local()?, self.snes.residual().owned()?);
+        let residual = self.bounded.as_ref().map_or(self.snes.residual(), Bounded::residual);
+        let (velocity, residual) = (velocity.local()?, residual.owned()?);
         let mut largest = 0.0;
         for contact in &body.contacts {
             let range = session.largest(contact.range(&velocity));
@@ -144,20 +173,10 @@ impl Newton {
     }
 }
 
-/// Why Newton's method failed, in words. Collective.
-fn why(session: &Session, outcome: &NonlinearOutcome, effort: &Effort) -> String {
+/// Why Newton's method failed, in words.
+fn why(outcome: &NonlinearOutcome, effort: &Effort) -> String {
     let words = outcome.words().to_owned();
-    let Some(last) = effort.sets.len().checked_sub(1) else { return words };
-    // Half the bits suffice to tell sets apart, and add up over ranks without a carry beyond them.
-    let of = |at: usize| (effort.sets[at] >> 32) as f64;
-    let seen = (0..last).rev().find(|&at| session.sum([f64::from(u8::from(of(at) != of(last)))])[0] == 0.0);
-    match seen {
-        Some(first) => format!(
-            "{words}; Newton's method came back to the branches of the contact graph that it had {} iterations before",
-            last - first
-        ),
-        None => words,
-    }
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
 pub(super) const REMEDY: &str =

@@ -125,3 +125,56 @@ fn a_run_without_contact_solves_one_linear_system_a_step() {
     let iterations = results.table("history.csv").numbers("linear_iterations");
     assert!(iterations.iter().all(|count| *count <= 2.0), "{iterations:?}");
 }
+
+const DAMAGE: &str = "{ threshold = 0.1, viscosity = 0.02, largest = 0.7 }";
+const ADHESION: &str = "{ stiffness = 3000, tangential_stiffness = 1000, energy = 0.1, viscosity = 0.001 }";
+
+fn weakened() -> Case {
+    let case = square().set("initial.displacement", "['0.03*x', '0.04*x']");
+    case.set("material.damage", DAMAGE).set("contact.0.adhesion", ADHESION)
+}
+
+#[test]
+fn damage_and_bonding_are_kept_written_and_counted_where_they_are_called_for() {
+    for (ranks, keys) in
+        [(1, ["material.damage", "contact.0.adhesion"]), (2, ["", ""]), (2, ["material.damage", ""])]
+    {
+        let case = keys.iter().filter(|key| !key.is_empty()).fold(weakened(), |case, key| case.without(key));
+        let results = case.run(ranks);
+        let summary = results.summary();
+        let parts = [
+            ("material.damage", "damage", "damage", "damage_dissipation", 6 * 6 * 2),
+            ("contact.0.adhesion", "adhesion", "bonding", "adhesion_dissipation", 7),
+        ];
+        let history = results.table("history.csv");
+        let effects = summary["effects"].as_array().expect("a list");
+        let fields = NumberFile::open(&results.path("fields.vtkhdf")).names("Fields");
+        let tables = NumberFile::open(&results.path("checkpoint-4.h5")).checkpoint_tables();
+        for (key, effect, field, column, values) in parts {
+            let there = !keys.contains(&key);
+            assert_eq!(effects.iter().any(|name| name == effect), there, "{effect}");
+            assert_eq!(fields.iter().any(|name| name == field), there, "{field}");
+            assert_eq!(history.last(column) > 0.0, there, "{column}");
+            let bytes = if there { serde_json::json!(values * 16) } else { serde_json::Value::Null };
+            assert_eq!(summary["inventory"]["history_bytes"][field], bytes, "{field}");
+            let saved = tables.iter().find(|(name, _)| name == field).map(|(_, values)| values);
+            assert_eq!(saved.is_some(), there, "{field}");
+            let within =
+                |all: &Vec<f64>| all.iter().all(|x| (0.0..=1.0).contains(x)) && all.iter().any(|x| *x > 0.0);
+            assert!(saved.is_none_or(within), "{field}: {saved:?}");
+        }
+        assert!(results.number("max_energy_imbalance") < 1e-10, "{summary}");
+    }
+}
+
+#[test]
+fn effects_that_do_nothing_leave_every_number_as_it_is() {
+    let plain = square();
+    let inert = square()
+        .set("material.damage", "{ threshold = 1e30, viscosity = 1 }")
+        .set("contact.0.adhesion", "{ stiffness = 0, energy = 1 }");
+    let (plain_results, inert_results) = (plain.run(2), inert.run(2));
+    for name in ["probes.csv", "history.csv", "profiles.csv"] {
+        assert_eq!(plain_results.text(name), inert_results.text(name), "{name}");
+    }
+}

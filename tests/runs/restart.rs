@@ -109,6 +109,36 @@ fn a_restarted_run_with_each_contact_law_is_the_straight_run_to_the_last_bit() {
     }
 }
 
+/// A square that is damaged, whose bonds give way on the way.
+fn weakened() -> Case {
+    saving()
+        .set("material.damage", "{ threshold = 0.05, viscosity = 0.5, exponent = 1 }")
+        .set(
+            "contact.0.adhesion",
+            "{ stiffness = 20, tangential_stiffness = 20, energy = 1e-4, viscosity = 1e-4 }",
+        )
+        .set("traction.0.value", "[0, 10]")
+}
+
+#[test]
+fn a_restarted_run_with_damage_and_adhesion_is_the_straight_run_to_the_last_bit() {
+    for ranks in [1, 2, 3] {
+        compare_with_straight(weakened, ranks, "damage and adhesion");
+    }
+    let history = weakened().run(1).table("history.csv");
+    for column in ["damage_dissipation", "adhesion_dissipation"] {
+        let values = history.numbers(column);
+        assert!(0.0 < values[7] && values[7] < values[15], "{column} goes on behind the restart: {values:?}");
+    }
+}
+
+#[test]
+fn a_run_with_damage_and_adhesion_goes_on_on_any_number_of_ranks() {
+    for writers in [1, 3] {
+        go_on_on_other_ranks(weakened(), writers, &["damage", "bonding"]);
+    }
+}
+
 #[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
@@ -116,9 +146,9 @@ fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
 }
 
 /// Saves on some ranks and goes on on 1, 2, 3 and 4; the last state must be that of a run that was not interrupted.
-fn go_on_on_other_ranks(writers: usize) {
+fn go_on_on_other_ranks(case: Case, writers: usize, histories: &[&str]) {
     // Solved further than by default, so that what is left of the equations does not hide the restart.
-    let case = saving().set("solver.tolerance", "1e-13");
+    let case = case.set("solver.tolerance", "1e-13");
     case.run_with(1, &["--set", "output.folder='straight'"]).expect(0);
     let straight = Results::of(case.folder().join("straight"));
     interrupt(&case, writers);
@@ -130,31 +160,31 @@ fn go_on_on_other_ranks(writers: usize) {
         case.run_with(readers, &["--set", &to_copy, "--restart"]).expect(0);
         assert_same_answer(&straight, &Results::of(case.folder().join(&what)), 1e-9, &what);
     }
-    assert_restored(&case, &saved, 5 - writers);
+    assert_restored(&case, &saved, 5 - writers, histories);
 }
 
 #[test]
 fn a_run_saved_on_one_rank_goes_on_on_any_number() {
-    go_on_on_other_ranks(1);
+    go_on_on_other_ranks(saving(), 1, &[]);
 }
 
 #[test]
 fn a_run_saved_on_two_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(2);
+    go_on_on_other_ranks(saving(), 2, &[]);
 }
 
 #[test]
 fn a_run_saved_on_three_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(3);
+    go_on_on_other_ranks(saving(), 3, &[]);
 }
 
 #[test]
 fn a_run_saved_on_four_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(4);
+    go_on_on_other_ranks(saving(), 4, &[]);
 }
 
 /// Goes on from a checkpoint without taking a step, so that the restored state is what the field file gets.
-fn assert_restored(case: &Case, saved: &Path, readers: usize) {
+fn assert_restored(case: &Case, saved: &Path, readers: usize, histories: &[&str]) {
     let file = saved.join("checkpoint-8.h5").display().to_string();
     let options = ["--set", "time.end=0.5", "--set", "output.folder='restored'", "--restart", &file];
     case.run_with(readers, &options).expect(0);
@@ -162,7 +192,7 @@ fn assert_restored(case: &Case, saved: &Path, readers: usize) {
     let restored = NumberFile::open(&case.folder().join("restored/fields.vtkhdf"));
     let written = NumberFile::open(&saved.join("fields.vtkhdf"));
     assert_eq!((written.times()[1], restored.times()), (0.5, vec![0.5]), "{what}");
-    for name in ["displacement", "velocity", "viscoplastic_history"] {
+    for name in ["displacement", "velocity", "viscoplastic_history"].iter().chain(histories) {
         assert!(written.field(name, 1) == restored.field(name, 0), "{what}: {name}");
     }
     for name in ["stress", "von_mises"] {

@@ -165,17 +165,17 @@ pub fn solve_nonlinear(session: &Session) {
     let mut snes = solver(session);
     let mut problem = problem(session, &matrix, Fault::None);
     let mut x = vector(session);
-    let outcome = snes.solve(&mut problem, &mut x, 1e-11, 30).expect("solve");
+    let outcome = snes.solve(&mut problem, &mut x, (1e-11, 0.0), 30).expect("solve");
     assert!(outcome.converged() && outcome.residual <= 1e-11, "{outcome:?}");
     assert!((3..=10).contains(&outcome.iterations), "Newton's method converges fast: {outcome:?}");
     assert!(problem.linear_iterations > outcome.iterations);
     assert_owned(session, &x, solution);
     assert!(snes.residual().norm().expect("norm") <= 1e-11);
 
-    let again = snes.solve(&mut problem, &mut x, 1e-9, 30).expect("again");
+    let again = snes.solve(&mut problem, &mut x, (1e-9, 0.0), 30).expect("again");
     assert_eq!(again.iterations, 0, "it started from the solution");
     x.fill(0.0).expect("fill");
-    let short = snes.solve(&mut problem, &mut x, 1e-11, 1).expect("an outcome, not an error");
+    let short = snes.solve(&mut problem, &mut x, (1e-11, 0.0), 1).expect("an outcome, not an error");
     assert!(!short.converged());
     assert_eq!(short.words(), "too many Newton iterations");
 }
@@ -194,7 +194,7 @@ pub fn fail_on_the_last_rank(session: &Session) {
     ] {
         let mut x = vector(session);
         let mut faulty = problem(session, &matrix, fault);
-        let result = snes.solve(&mut faulty, &mut x, 1e-11, 30);
+        let result = snes.solve(&mut faulty, &mut x, (1e-11, 0.0), 30);
         match (&result, session.rank() == last) {
             (Err(error), true) => assert_eq!(error.to_string(), "this rank gave up"),
             (Ok(outcome), false) => {
@@ -214,7 +214,7 @@ pub fn fail_on_the_last_rank(session: &Session) {
         }
         let mut sound = problem(session, &matrix, Fault::None);
         x.fill(0.0).expect("fill");
-        let outcome = session.agree(snes.solve(&mut sound, &mut x, 1e-11, 30)).expect("solve");
+        let outcome = session.agree(snes.solve(&mut sound, &mut x, (1e-11, 0.0), 30)).expect("solve");
         assert!(outcome.converged(), "the solver works again after a failure: {outcome:?}");
         assert_owned(session, &x, solution);
     }
@@ -226,7 +226,7 @@ pub fn panic_on_the_last_rank(session: &Session, folder: &Path) {
     let matrix = matrix(session);
     let mut snes = solver(session);
     let mut faulty = problem(session, &matrix, Fault::Panic(2));
-    let result = snes.solve(&mut faulty, &mut vector(session), 1e-11, 30);
+    let result = snes.solve(&mut faulty, &mut vector(session), (1e-11, 0.0), 30);
     println!("a rank went on: {:?}", result.is_ok());
 }
 

@@ -1,4 +1,4 @@
-//! Rung 7, second part: uniaxial viscoplastic creep against the recursion (24)-(25) worked out for one homogeneous
+//! Rung 7, second part: uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) worked out for one homogeneous
 //! cell, with projections of its own.
 
 use crate::run_on;
@@ -19,6 +19,8 @@ const RELAXATION: f64 = 3.0;
 const YIELD: f64 = 1.0;
 const STEP: f64 = 0.02;
 const STEPS: usize = 60;
+/// Threshold, viscosity and exponent of damage.
+const DAMAGE: (f64, f64, i32) = (0.01, 0.02, 2);
 
 /// Normal components of a homogeneous state: two in plane stress, else three.
 type Diagonal3 = [f64; 3];
@@ -32,6 +34,8 @@ struct Cell {
     strain: Diagonal3,
     history: Diagonal3,
     stress: Diagonal3,
+    /// What damage has left, where there is damage.
+    left: Option<f64>,
 }
 
 fn von_mises(s: Diagonal3) -> f64 {
@@ -39,7 +43,7 @@ fn von_mises(s: Diagonal3) -> f64 {
 }
 
 impl Cell {
-    fn new(hypothesis: &str, metric: &'static str) -> Self {
+    fn new(hypothesis: &str, metric: &'static str, damaged: bool) -> Self {
         let plane_stress = hypothesis == "plane_stress";
         let below = if plane_stress { 1.0 - RATIO } else { 1.0 - 2.0 * RATIO };
         let volumetric = MODULUS * RATIO / (1.0 + RATIO) / below;
@@ -51,6 +55,7 @@ impl Cell {
             strain: [0.0; 3],
             history: [0.0; 3],
             stress: [0.0; 3],
+            left: damaged.then_some(1.0),
         }
     }
 
@@ -95,8 +100,23 @@ impl Cell {
         at(0.5 * (low + high))
     }
 
+    /// The elastic energy per volume before the step.
+    fn energy(&self) -> f64 {
+        let elastic = self.apply(self.elasticity, self.strain);
+        let s: Diagonal3 = std::array::from_fn(|i| elastic[i] + self.history[i]);
+        let trace: f64 = s[..self.kept].iter().sum();
+        let (volumetric, shear) = self.elasticity;
+        let mean = volumetric * trace / (shear + self.kept as f64 * volumetric);
+        s[..self.kept].iter().map(|x| 0.5 * x * (x - mean) / shear).sum()
+    }
+
     /// A step of (24) and (25); gives the total stress.
     fn advance(&mut self) -> Diagonal3 {
+        let excess = f64::max(self.energy() - DAMAGE.0, 0.0);
+        if let Some(left) = &mut self.left {
+            *left -= STEP * left.powi(DAMAGE.2) * excess / DAMAGE.1;
+        }
+        let left = self.left.unwrap_or(1.0);
         let projected = self.project(self.stress);
         let flow = std::array::from_fn(|i| (self.stress[i] - projected[i]) / (2.0 * RELAXATION));
         let release = self.apply(self.elasticity, flow);
@@ -106,7 +126,7 @@ impl Cell {
             self.stress[i] = elastic[i] + self.history[i];
         }
         let open: Vec<f64> =
-            (0..self.free).map(|i| if i == 0 { PULL } else { 0.0 } - self.stress[i]).collect();
+            (0..self.free).map(|i| if i == 0 { PULL } else { 0.0 } - left * self.stress[i]).collect();
         let trace = open.iter().sum::<f64>() / (self.free as f64 * VISCOSITY.0 + VISCOSITY.1);
         let mut rate = [0.0; 3];
         for i in 0..self.free {
@@ -114,7 +134,7 @@ impl Cell {
             self.strain[i] += STEP * rate[i];
         }
         let viscous = self.apply(VISCOSITY, rate);
-        std::array::from_fn(|i| viscous[i] + self.stress[i])
+        std::array::from_fn(|i| viscous[i] + left * self.stress[i])
     }
 }
 
@@ -122,6 +142,7 @@ fn creeping<const D: usize, const S: usize>(
     session: &Session,
     hypothesis: &str,
     metric: &'static str,
+    damaged: bool,
     mesh: &GlobalMesh<D>,
 ) {
     let end = STEP * STEPS as f64;
@@ -138,6 +159,12 @@ fn creeping<const D: usize, const S: usize>(
          viscoplasticity.perzyna = {{ relaxation = {RELAXATION}, yield_stress = {YIELD}, metric = \"{metric}\" }}\n",
         VISCOSITY.0, VISCOSITY.1
     );
+    if damaged {
+        let (threshold, viscosity, exponent) = DAMAGE;
+        job += &format!(
+            "damage = {{ threshold = {threshold}, viscosity = {viscosity}, exponent = {exponent} }}\n"
+        );
+    }
     let sides = ["left", if D == 2 { "bottom" } else { "front" }, "bottom"];
     for (side, axis) in sides.iter().zip(["x", "y", "z"]).take(D) {
         job += &format!("[[support]]\non = [\"{side}\"]\nfix = [\"{axis}\"]\n");
@@ -146,7 +173,7 @@ fn creeping<const D: usize, const S: usize>(
     job += &format!("[[traction]]\non = [\"right\"]\nvalue = {value:?}\n");
 
     let mut run = simulation::<D, S>(session, &job, mesh);
-    let mut cell = Cell::new(hypothesis, metric);
+    let mut cell = Cell::new(hypothesis, metric, damaged);
     while run.advance(session).expect("step").is_some() {
         let total = cell.advance();
         let step = run.state.step;
@@ -169,6 +196,7 @@ fn creeping<const D: usize, const S: usize>(
         }
     }
     assert_eq!(run.state.step as usize, STEPS);
+    assert!(cell.left.is_none_or(|left| (0.1..0.9).contains(&left)), "{:?}", cell.left);
     assert!(
         von_mises(cell.stress) > YIELD && cell.strain[0] > 1.5 * PULL / MODULUS,
         "it creeps: {:?}",
@@ -180,10 +208,13 @@ pub fn all(session: &Session) {
     let plane = rectangle([1.0, 1.0], [1, 1], Diagonal::Right, [1.0, 1.0]).expect("mesh");
     let space = box_mesh([1.0; 3], [1; 3], [1.0; 3]).expect("mesh");
     for metric in ["elasticity", "compliance", "frobenius"] {
-        creeping::<2, 3>(session, "plane_stress", metric, &plane);
+        creeping::<2, 3>(session, "plane_stress", metric, false, &plane);
     }
-    creeping::<2, 4>(session, "plane_strain", "elasticity", &plane);
-    creeping::<3, 6>(session, "", "compliance", &space);
+    for damaged in [false, true] {
+        creeping::<2, 4>(session, "plane_strain", "elasticity", damaged, &plane);
+        creeping::<3, 6>(session, "", "compliance", damaged, &space);
+    }
+    creeping::<2, 3>(session, "plane_stress", "compliance", true, &plane);
 }
 
 #[test]

@@ -1,14 +1,14 @@
 //! Rung 4: an effect is called in its own phases only, and nothing is gathered that nobody needs.
 
 use crate::run_on;
-use crate::scenes::{any_mesh, body, brick, crossed, simulation};
+use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
-    effect::{Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
+    effect::{Damage, Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
     job::Job,
-    material::{ByMaterial, Isotropic},
+    material::{self, ByMaterial, Isotropic},
     run::{Inventory, Simulation},
     session::Session,
-    space::{Batch, CellMatrix, Simplex},
+    space::{Batch, CellMatrix, Geometry, Simplex},
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
 
@@ -37,6 +37,7 @@ impl<E> Watched<E> {
             ("strain_rate", batch.strain_rate.is_empty()),
             ("velocity", batch.velocity.is_empty()),
             ("velocity_change", batch.velocity_change.is_empty()),
+            ("elastic_stress", batch.elastic_stress.is_empty()),
         ];
         let present = fields.into_iter().filter(|(_, empty)| !empty).map(|(name, _)| name).collect();
         self.seen.borrow_mut().gathered.insert(phase, present);
@@ -65,6 +66,16 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
     ) {
         self.note("matrix");
         self.inner.add_matrix(material, geometry, step_length, matrix);
+    }
+
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+        self.note_batch("elastic stress", batch);
+        self.inner.add_elastic_stress(batch);
+    }
+
+    fn weaken(&self, batch: &mut Batch<D, S>) {
+        self.note("weaken");
+        self.inner.weaken(batch);
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
@@ -141,6 +152,23 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     assert_eq!(seen.calls, BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]), "elasticity");
     assert_eq!(seen.gathered["explicit"], ["strain"], "viscosity has no part in the explicit pass");
     assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"]);
+
+    let elastic = || ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) };
+    let law =
+        material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9, elasticity: tensor };
+    let runs = Geometry::new(&part(session, whole)).runs;
+    let damage = || Damage::new(ByMaterial::uniform(law), &runs);
+    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+        vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
+    });
+    let calls = [("elastic stress", 1), ("explicit", 1), ("energy", 1), ("stress", 1)];
+    assert_eq!(seen.calls, BTreeMap::from(calls), "elasticity with damage beside it");
+    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+        vec![Box::new(elastic()), Box::new(Watched { inner: damage(), seen: seen.clone() })]
+    });
+    let calls = [("elastic stress", 1), ("explicit", 1), ("weaken", 2)];
+    assert_eq!(seen.calls, BTreeMap::from(calls), "damage");
+    assert_eq!(seen.gathered["explicit"], ["strain", "elastic_stress"]);
 }
 
 fn inventory<const D: usize, const S: usize>(session: &Session, simulation: &Simulation<D, S>) -> Inventory {
@@ -172,6 +200,19 @@ fn allocations(session: &Session) {
     );
     let found = inventory(session, &simulation::<2, 3>(session, &touching, &mesh));
     assert_eq!(found, Inventory { contact_points: 4, newton: true, ..Inventory::default() });
+
+    let damaged = format!("{elastic}damage = {{ threshold = 1, viscosity = 1 }}\n");
+    let found = inventory(session, &simulation::<2, 3>(session, &damaged, &mesh));
+    let histories = BTreeMap::from([("damage".to_owned(), (24 * 8 * 2) as u64)]);
+    assert_eq!(found, Inventory { history_bytes: histories, ..Inventory::default() });
+
+    let bonded = format!("{touching}adhesion = {{ stiffness = 1, energy = 1 }}\n");
+    let bonded = simulation::<2, 3>(session, &bonded, &mesh);
+    let histories = BTreeMap::from([("bonding".to_owned(), (4 * 8 * 2) as u64)]);
+    let expected =
+        Inventory { history_bytes: histories, contact_points: 4, newton: true, ..Inventory::default() };
+    assert_eq!(inventory(session, &bonded), expected);
+    assert_eq!(bonded.body.effect_names(), ["inertia", "contact", "adhesion"]);
 
     let nothing = elastic.replace("density = 1\n", "");
     let mut loaded = Job::from_text(&nothing, "job.toml", Path::new("."), &[]).expect("a job");

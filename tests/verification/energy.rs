@@ -107,6 +107,14 @@ fn job<const D: usize>(number: u64, hypothesis: &str) -> String {
         job += &format!("hypothesis = \"{hypothesis}\"\n");
     }
     job += &material(draw, dynamic);
+    let weak = &mut Draw(number + 5000, 0);
+    if job.contains("elasticity") && weak.flip() {
+        let (threshold, viscosity) = (weak.between(0.0, 2e-3), weak.between(1e-4, 2e-3));
+        let (exponent, largest) = (weak.one_of(&["0", "1", "2.5"]), weak.between(0.3, 0.99));
+        job += &format!(
+            "damage = {{ threshold = {threshold}, viscosity = {viscosity}, exponent = {exponent}, largest = {largest} }}\n"
+        );
+    }
     if !dynamic || draw.flip() {
         job += "[[support]]\non = [\"left\"]\nfix = \"all\"\n";
     }
@@ -119,7 +127,19 @@ fn job<const D: usize>(number: u64, hypothesis: &str) -> String {
         job += &format!("[[body_force]]\nvalue = {along:?}\n");
     }
     if draw.between(0.0, 1.0) < 0.7 {
-        job += &contact(draw);
+        let contact = contact(draw);
+        if !contact.contains("gauss") && !contact.contains("gap") && weak.between(0.0, 1.0) < 0.8 {
+            job += &contact.replacen("\"bottom\"", "\"bottom\", \"right\"", 1);
+            let (stiffness, sliding) = (weak.between(10.0, 200.0), weak.between(0.0, 200.0));
+            let (energy, viscosity) = (weak.between(0.0, 1e-4), weak.one_of(&["0", "1e-5", "1e-3"]));
+            let length = weak.between(1e-3, 1e-2);
+            job += &format!(
+                "[contact.adhesion]\nstiffness = {stiffness}\ntangential_stiffness = {sliding}\nenergy = {energy}\n\
+                 viscosity = {viscosity}\nlength = {length}\n"
+            );
+        } else {
+            job += &contact;
+        }
     }
     let (speed, stretch) = (draw.between(0.1, 1.0), draw.between(-0.02, 0.02));
     let velocity: Vec<String> = (0..D).map(|i| format!("{speed}*cos(2*x+3*y+{i})")).collect();
@@ -146,6 +166,7 @@ fn balanced<const D: usize, const S: usize>(
         );
         assert!(inclusion < 1e-6, "step {steps}: inclusion residual {inclusion:e}\n{text}");
         assert!(outcome.energy.viscous >= 0.0 && outcome.energy.viscoplastic >= 0.0);
+        assert!(outcome.energy.damage >= 0.0 && outcome.energy.debonding >= 0.0);
     }
     assert_eq!(steps, STEPS);
     assert!(run.totals.turnover > 1e-6, "something happens\n{text}");
@@ -154,7 +175,7 @@ fn balanced<const D: usize, const S: usize>(
 
 pub fn random_jobs(session: &Session) {
     let (plane, space) = (crossed([4, 3]), brick([3, 2, 2]));
-    let mut active = [0; 5];
+    let mut active = [0; 7];
     for number in 0..JOBS {
         let totals = match number % 3 {
             0 => balanced::<2, 3>(session, number, "plane_stress", &plane),
@@ -167,12 +188,15 @@ pub fn random_jobs(session: &Session) {
             totals.viscoplastic_dissipation,
             totals.contact_dissipation,
             totals.external_work,
+            totals.damage_dissipation,
+            totals.adhesion_dissipation,
         ];
         active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
     }
-    for (count, what) in active.into_iter().zip(["elastic", "viscous", "viscoplastic", "contact", "external"])
-    {
-        assert!((JOBS / 5..JOBS).contains(&count), "{what} energy in {count} of {JOBS} jobs");
+    let names = ["elastic", "viscous", "viscoplastic", "contact", "external", "damage", "adhesion"];
+    for (count, what) in active.into_iter().zip(names) {
+        let least = if what == "adhesion" { JOBS / 10 } else { JOBS / 5 };
+        assert!((least..JOBS).contains(&count), "{what} energy in {count} of {JOBS} jobs");
     }
 }
 

@@ -3,9 +3,8 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Compliance, DampedResponse, Graph, NormalLaw, Symmetry},
+    contact::{Compliance, DampedResponse, Gap, Graph, NormalLaw, Symmetry},
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
-    job::Scalar,
     material::{ByMaterial, Isotropic},
     mesh::GlobalMesh,
     petsc::{Matrix, NonlinearProblem, ProjectedKsp},
@@ -54,7 +53,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             if quadrature == Quadrature::Gauss && needs_nodes {
                 continue;
             }
-            let gap = Scalar::Number(0.01);
+            let gap = Gap::Distance(clarke::job::Scalar::Number(0.01));
             let contact =
                 Contact::new(session, &body.mesh, &facets, quadrature, normal.clone(), gap, &body.fixed)
                     .expect("contact");
@@ -95,6 +94,8 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 right_hand_side: &load,
                 scratch: &mut scratch,
                 linear_solver: &mut linear_solver,
+                session,
+                stop_at_cycles: false,
                 effort: Effort::default(),
             };
             equations.linearise(&point).expect("linearised");

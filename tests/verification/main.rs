@@ -3,19 +3,24 @@
 //!
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
 
+mod adhesion;
 mod assembly;
 mod callbacks;
 mod closed_forms;
 mod creep;
+mod damage;
 mod effects;
 mod energy;
 mod jacobian;
 mod manufactured;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
+mod obstacles;
 mod patch;
 mod petsc_boundary;
+mod random_laws;
 mod scenes;
+mod subspace;
 mod wave;
 
 use clarke::session::Mpi;
@@ -44,6 +49,14 @@ fn scenario() {
         "energy" => energy::random_jobs(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
+        "damage" => damage::all(&session),
+        "adhesion" => adhesion::all(&session),
+        "moving_obstacles" => obstacles::moving(&session),
+        "impacts" => obstacles::impacts(&session),
+        "bounds" => obstacles::bounds(&session),
+        "several_laws" => obstacles::several(&session, &folder),
+        "random_laws" => random_laws::solve(&session),
+        "subspace" => subspace::solve(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "manufactured_time" => manufactured::time(&session),

@@ -75,7 +75,16 @@ pub fn body<const D: usize, const S: usize>(
         .collect();
     let fixed = fixed_components(&mesh, &supports, &state.velocity).expect("flags");
     let geometry = Geometry::new(&mesh);
-    (Body { mesh, geometry, effects, contacts: Vec::new(), load: Load::default(), fixed }, state)
+    let body = Body {
+        mesh,
+        geometry,
+        effects,
+        contacts: Vec::new(),
+        surface_effects: Vec::new(),
+        load: Load::default(),
+        fixed,
+    };
+    (body, state)
 }
 
 /// The job of this text on a mesh that every rank has made.

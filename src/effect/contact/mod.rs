@@ -14,13 +14,13 @@
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
+mod bounds;
 mod point;
 mod unknowns;
 
 use crate::{
-    contact::{NodeContext, NormalLaw},
-    error::{Error, Result},
-    job::Scalar,
+    contact::{Gap, NodeContext, NormalLaw},
+    error::Result,
     mesh::{Mesh, shape::facet_normal},
     session::Session,
     space::{facet_rule, surface_points},
@@ -44,8 +44,8 @@ pub enum Quadrature {
 pub struct Contact<const D: usize> {
     /// The law.
     pub law: NormalLaw,
-    /// Distance to the obstacle along the normal in m, at a time, of the point that was at a place at first.
-    gap: Scalar,
+    /// Distance to the obstacle along the normal.
+    gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
     facets: Vec<u32>,
@@ -70,7 +70,7 @@ impl<const D: usize> Contact<D> {
         facets: &[u32],
         quadrature: Quadrature,
         law: NormalLaw,
-        gap: Scalar,
+        gap: Gap,
         fixed: &[bool],
     ) -> Result<Self> {
         let mut points: Vec<Point<D>> = match quadrature {
@@ -133,11 +133,11 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         }
         for point in &mut self.points {
-            let gap = gap_at(&self.gap, time, point)?;
-            let before = gap_at(&self.gap, time - length, point)?;
-            let penetration = point.normal_component(displacement) - gap;
-            point.context = NodeContext { penetration, step_length: length };
-            point.gap_change = gap - before;
+            let gap_at = |time| self.gap.at(time, &point.place, &point.normal);
+            let (gap, before) = (gap_at(time)?, gap_at(time - length)?);
+            let along = point.normal_component(displacement);
+            point.context = NodeContext { penetration: along - gap, step_length: length };
+            point.penetration_before = along - before;
         }
         Ok(())
     }
@@ -306,13 +306,14 @@ impl<const D: usize> Contact<D> {
             let v = point.normal_component(velocity);
             let pressure = point.pressure_at(&self.law, velocity);
             let work = length * pressure * v;
-            let before = point.context.penetration + point.gap_change;
             let after = point.context.penetration + length * v;
+            // An obstacle that was nowhere appears where the point is.
+            let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let stored = self.law.energy(after) - self.law.energy(before);
-            let numerical = if matches!(self.law, NormalLaw::Compliance(_)) {
-                stored - pressure * (after - before)
-            } else {
-                0.0
+            let numerical = match self.law {
+                NormalLaw::Compliance(_) if pressure == 0.0 => stored,
+                NormalLaw::Compliance(_) => stored - pressure * (after - before),
+                _ => 0.0,
             };
             sums[0] += point.weight * (work - stored + numerical);
             sums[1] += point.weight * numerical;
@@ -321,11 +322,11 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Energy in J stored at `time`, from displacements with ghosts.
-    pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> f64 {
-        let NormalLaw::Compliance(law) = &self.law else { return 0.0 };
+    pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
+        let NormalLaw::Compliance(law) = &self.law else { return Ok(0.0) };
         let energy = |point: &Point<D>| {
-            let gap = self.gap.evaluate(time, &point.place);
-            point.weight * law.energy(point.normal_component(displacement) - gap)
+            let gap = self.gap.at(time, &point.place, &point.normal)?;
+            Ok(point.weight * law.energy(point.normal_component(displacement) - gap))
         };
         self.points.iter().map(energy).sum()
     }
@@ -344,24 +345,13 @@ impl<const D: usize> Contact<D> {
         // The pressure that would change the velocities by as much as they are counts where there is no other.
         let range = [range[0], range[1].max(self.scale * range[0])];
         let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
-        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
+        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
         let distance = |p: &Point<D>| {
             let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
             self.law.distance(p.normal_component(velocity), pressure, p.context, range)
         };
         free.map(distance).fold(0.0, f64::max)
     }
-}
-
-fn gap_at<const D: usize>(gap: &Scalar, time: f64, point: &Point<D>) -> Result<f64> {
-    let value = gap.evaluate(time, &point.place);
-    if value.is_finite() {
-        return Ok(value);
-    }
-    Err(Error::Failed(format!(
-        "contact: the gap is {value} at t = {time} s, position {:?} m; correct the expression in the job",
-        point.place
-    )))
 }
 
 fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {

@@ -24,7 +24,7 @@ pub(super) struct Point<const D: usize> {
     count: usize,
     /// Share of each node.
     shares: [f64; D],
-    normal: Vector<D>,
+    pub normal: Vector<D>,
     /// Quadrature weight in m^(D-1).
     pub weight: f64,
     /// Force on each node per pressure, without held components, in m^(D-1).
@@ -38,8 +38,8 @@ pub(super) struct Point<const D: usize> {
     pub place: Vector<D>,
     /// What the step brings.
     pub context: NodeContext,
-    /// Change of the gap in the step, in m.
-    pub gap_change: f64,
+    /// `u_nu - gap` in m at the start of the step, both as they were then.
+    pub penetration_before: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
     pub pressure: f64,
     /// Share of a change of the unknown that is a change of velocity, at the last linearisation: `c V'(s)`.
@@ -64,7 +64,7 @@ impl<const D: usize> Point<D> {
             unknown: Unknown::Velocity,
             place: [0.0; D],
             context: NodeContext::default(),
-            gap_change: 0.0,
+            penetration_before: 0.0,
             pressure: 0.0,
             theta: 1.0,
             slope: 0.0,
@@ -158,11 +158,16 @@ impl<const D: usize> Point<D> {
 
     /// The normal velocity in m/s that would close the gap in the step, without its sign; 0 for laws without a gap.
     pub fn context_velocity(&self) -> f64 {
-        if self.context.step_length > 0.0 {
+        if self.context.step_length > 0.0 && self.can_touch() {
             (self.context.penetration / self.context.step_length).abs()
         } else {
             0.0
         }
+    }
+
+    /// Whether there is an obstacle along the normal.
+    pub fn can_touch(&self) -> bool {
+        self.context.penetration > f64::NEG_INFINITY
     }
 
     /// Pressure in Pa, given nodal velocities.

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Adhesion;
 use crate::job::Scalar;
 
 /// Boundaries that touch an obstacle, and the laws there.
@@ -17,9 +18,19 @@ pub struct Contact {
     pub quadrature: Quadrature,
     /// The contact pressure -sigma_nu.
     pub normal: NormalLaw,
+    /// A rigid obstacle that may move, for `compliance` and `unilateral` in place of their `gap`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Obstacle>,
     /// The friction traction; absent: sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
+    /// Bonds to the obstacle, made at displacement zero: they pull back what moves away and give way. The bonding b at a node
+    /// falls from 1 as `viscosity b' = -max(b (stiffness R(opening)^2 + tangential_stiffness R(sliding)^2) - energy, 0)`, R
+    /// the cut at `length`, and never comes back; the traction is `b^2 stiffness R(opening)` along the normal and
+    /// `b^2 tangential_stiffness R(sliding)` against the sliding. `contact_pressure` is that of the normal law alone.
+    /// Absent: no bonds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adhesion: Option<Adhesion>,
 }
 
 /// Where on a facet the contact laws hold.
@@ -103,10 +114,11 @@ pub struct Compliance {
     #[serde(default = "one")]
     #[schemars(range(min = 1, max = 10), example = 1.5)]
     pub exponent: f64,
-    /// Distance to the obstacle along the normal, at time t at the point x, y, z.
-    #[serde(default)]
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
+    /// or what [contact.obstacle] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
-    pub gap: Scalar,
+    pub gap: Option<Scalar>,
 }
 
 fn one() -> f64 {
@@ -120,10 +132,11 @@ pub struct Unilateral {
     /// What is bounded.
     #[serde(default)]
     pub bound: Bound,
-    /// Distance to the obstacle along the normal, at time t at the point x, y, z.
-    #[serde(default)]
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
+    /// or what [contact.obstacle] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
-    pub gap: Scalar,
+    pub gap: Option<Scalar>,
 }
 
 /// What a rigid obstacle bounds.
@@ -135,6 +148,44 @@ pub enum Bound {
     Displacement,
     /// The normal velocity never exceeds zero: the body only ever moves away.
     Velocity,
+}
+
+/// A rigid obstacle that may move. The gap is measured from the place where a point of the boundary was at first along its
+/// normal there (deformations are small); where that ray does not meet the obstacle there is no contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Obstacle {
+    /// All that lies beyond a plane, in 2D a line.
+    Plane(Plane),
+    /// A sphere, in 2D a disc.
+    Sphere(Sphere),
+}
+
+/// A plane that bounds an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// A point of the plane, one component an axis: numbers, or expressions in t.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
+    pub point: Vec<Scalar>,
+    /// The plane's normal, out of the obstacle toward the body, of any length: numbers, or expressions in t.
+    #[schemars(example = [0.0, 1.0])]
+    pub normal: Vec<Scalar>,
+}
+
+/// A sphere as an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Its centre, one component an axis: numbers, or expressions in t.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
+    pub centre: Vec<Scalar>,
+    /// Its radius.
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1.0)]
+    pub radius: f64,
+    /// Whether the obstacle is all outside of the sphere, with the body inside.
+    #[serde(default)]
+    pub hollow: bool,
 }
 
 /// The friction law.

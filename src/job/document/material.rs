@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Damage;
+
 /// A material; each effect is there only if its table or key is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -23,6 +25,11 @@ pub struct Material {
     /// Viscoplastic flow; absent: no stress history is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscoplasticity: Option<Viscoplasticity>,
+    /// Isotropic damage d of the cells: of elastic and viscoplastic stress the share 1 - d is left; viscous stress stays whole.
+    /// It grows as `viscosity d' = (1 - d)^exponent max(Y - threshold, 0)`, with the elastic energy per volume
+    /// `Y = s : E^-1 s / 2` of sound material under the same strain, and never heals. Absent: no damage is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Damage>,
 }
 
 /// What a 2D body stands for.

@@ -3,25 +3,29 @@
 //! Doc comments become the text of `solver describe`; the `schemars` attributes become the ranges that
 //! `validate` checks before these structs are filled.
 
+mod adhesion;
 mod boundary;
 mod contact;
+mod damage;
 mod material;
 mod mesh;
 mod output;
 mod time;
 
+pub use adhesion::Adhesion;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
 pub use contact::{
-    Bound, Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Quadrature,
-    SlipWeakening, Symmetry, Tresca, Unilateral,
+    Bound, Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Obstacle, Plane,
+    Quadrature, SlipWeakening, Sphere, Symmetry, Tresca, Unilateral,
 };
+pub use damage::Damage;
 pub use material::{
     DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
     Viscosity,
 };
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
-pub use time::{Accept, Adaptive, Preconditioner, Scheme, Solver, Time};
+pub use time::{Accept, Adaptive, Method, Preconditioner, Scheme, Solver, Time};
 
 use std::collections::BTreeMap;
 

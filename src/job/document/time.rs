@@ -67,6 +67,8 @@ pub struct Solver {
     /// step counts as solved whatever its residual is.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub inclusion_tolerance: f64,
+    /// What solves a step with contact.
+    pub method: Method,
     /// How linear systems are preconditioned.
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step counts as failed.
@@ -84,12 +86,25 @@ impl Default for Solver {
         Self {
             tolerance: 1e-10,
             inclusion_tolerance: 1e-6,
+            method: Method::Newton,
             preconditioner: Preconditioner::Auto,
             max_newton_iterations: 50,
             accept: Vec::new(),
             petsc: BTreeMap::new(),
         }
     }
+}
+
+/// What solves a step with contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Newton's method on the contact graphs.
+    #[default]
+    Newton,
+    /// PETSc's solver for variational inequalities, as an independent check: for jobs whose every contact is `unilateral`,
+    /// on boundaries square to the axes. Its PETSc options begin with bounds_.
+    Vinewtonrsls,
 }
 
 /// How linear systems are preconditioned.

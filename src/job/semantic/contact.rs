@@ -1,16 +1,20 @@
 //! Contact laws: graphs that have a relaxed monotonicity, friction that falls the right way.
 
-use super::boundary::check_flat;
+use super::boundary::{check_flat, check_vector};
 use super::{Findings, MeshNames, items};
-use crate::job::document::{Bound, DampedResponse, Graph, Quadrature, SlipWeakening};
+use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Method, Quadrature, SlipWeakening};
+use crate::job::expression::Scalar;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
+    check_method(findings);
     for contact in items(findings.root, "contact") {
         check_damped_response(findings, &format!("{contact}.normal.damped_response"));
         check_graph(findings, &format!("{contact}.normal.graph.points"));
         check_quadrature(findings, &contact);
+        check_adhesion(findings, &contact);
         check_bound(findings, &format!("{contact}.normal.unilateral"));
+        check_obstacle(findings, &contact);
         let path = format!("{contact}.friction.slip_weakening");
         if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
             && at_rest < dynamic
@@ -18,6 +22,23 @@ pub fn check(findings: &mut Findings<'_>) {
             let message = "the static coefficient is below the dynamic one";
             findings.fault(&format!("{path}.static"), message, format!("it must be at least {dynamic}"));
         }
+    }
+}
+
+/// PETSc's solver for variational inequalities knows bounds only.
+fn check_method(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    if root.read("solver.method") != Some(Method::Vinewtonrsls) {
+        return;
+    }
+    let contacts = items(root, "contact");
+    let bounds = |contact: &String| {
+        let has = |key: &str| root.find(&format!("{contact}.{key}")).is_some();
+        has("normal.unilateral") && !has("friction")
+    };
+    if contacts.is_empty() || !contacts.iter().all(bounds) {
+        let message = "this method solves frictionless contact whose every normal law is `unilateral`";
+        findings.fault("solver.method", message, "use \"newton\", or leave the key out");
     }
 }
 
@@ -38,6 +59,37 @@ fn check_quadrature(findings: &mut Findings<'_>, contact: &str) {
     }
 }
 
+/// Bonds are at nodes, and between what touches at first.
+fn check_adhesion(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let path = format!("{contact}.adhesion");
+    if root.find(&path).is_none() {
+        return;
+    }
+    if root.read::<Quadrature>(&format!("{contact}.quadrature")) == Some(Quadrature::Gauss) {
+        let message = "adhesion does not act at Gauss points";
+        let help = "use \"nodal\", or leave the key out";
+        findings.fault(&format!("{contact}.quadrature"), message, help);
+    }
+    for law in ["compliance", "unilateral"] {
+        let gap = format!("{contact}.normal.{law}.gap");
+        if root.find(&gap).is_some() {
+            let message = "adhesion binds what touches at first: there is no gap";
+            findings.fault(&gap, message, format!("delete it, or [{path}]"));
+        }
+    }
+    if let Some(Adhesion { stiffness, tangential_stiffness, energy, length: Some(length), .. }) =
+        root.read(&path)
+    {
+        let most = (stiffness + tangential_stiffness.unwrap_or(0.0)) * length * length;
+        if most <= energy && most > 0.0 {
+            findings.warnings.push(format!(
+                "{path}: at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
+            ));
+        }
+    }
+}
+
 /// A bound on the velocity knows no gap.
 fn check_bound(findings: &mut Findings<'_>, path: &str) {
     let gap = format!("{path}.gap");
@@ -45,6 +97,50 @@ fn check_bound(findings: &mut Findings<'_>, path: &str) {
         && findings.root.find(&gap).is_some()
     {
         findings.fault(&gap, "a bound on the velocity has no gap", "delete it, or bound the displacement");
+    }
+}
+
+/// Vectors of an obstacle.
+const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.centre"];
+
+/// An obstacle is for laws that know a gap, stands in for it, and moves as one.
+fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let obstacle = format!("{contact}.obstacle");
+    if root.find(&obstacle).is_none() {
+        return;
+    }
+    let law = |name: &str| format!("{contact}.normal.{name}");
+    let known = ["damped_response", "graph"].into_iter().find(|name| root.find(&law(name)).is_some());
+    if let Some(name) = known {
+        let message = format!("`{name}` acts at any distance: it has no obstacle");
+        findings.fault_at_key(&obstacle, message, "delete the obstacle, or use `compliance` or `unilateral`");
+    }
+    if root.read(&law("unilateral.bound")) == Some(Bound::Velocity) {
+        let help = "delete the obstacle, or bound the displacement";
+        findings.fault_at_key(&obstacle, "a bound on the velocity has no obstacle", help);
+    }
+    for gap in ["compliance.gap", "unilateral.gap"].map(law) {
+        if root.find(&gap).is_some() {
+            findings.fault_at_key(
+                &gap,
+                "`gap` beside [contact.obstacle]",
+                "give one of them: the obstacle says how far it is",
+            );
+        }
+    }
+    for vector in OBSTACLE_VECTORS {
+        for component in items(root, &format!("{obstacle}.{vector}")) {
+            if root.read::<Scalar>(&component).is_some_and(|scalar| scalar.depends_on_position()) {
+                let help = "use t only; `gap` in the law may depend on x, y and z";
+                findings.fault(&component, "a rigid obstacle moves as one", help);
+            }
+        }
+    }
+    let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
+    if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
+        let help = "let it point out of the obstacle toward the body";
+        findings.fault(&format!("{obstacle}.plane.normal"), "this normal has no direction", help);
     }
 }
 
@@ -102,6 +198,9 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     for contact in items(findings.root, "contact") {
         for law in ["compliance", "unilateral"] {
             check_flat(findings, &format!("{contact}.normal.{law}.gap"), mesh.dimension);
+        }
+        for vector in OBSTACLE_VECTORS {
+            check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);
         }
     }
 }

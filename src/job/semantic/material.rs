@@ -27,6 +27,10 @@ pub fn check(findings: &mut Findings<'_>) {
             let message = "viscoplasticity without elasticity has no stress to relax";
             findings.fault(&format!("{path}.viscoplasticity"), message, format!("add [{path}.elasticity]"));
         }
+        if present("damage") && !present("elasticity") {
+            let message = "damage without elasticity has nothing to weaken";
+            findings.fault(&format!("{path}.damage"), message, format!("add [{path}.elasticity]"));
+        }
         if let Some(Perzyna { yield_stress, exponent, .. }) =
             root.read(&format!("{path}.viscoplasticity.perzyna"))
             && yield_stress == 0.0

@@ -35,6 +35,11 @@ impl<'a> Findings<'a> {
         Self { root, faults: Vec::new(), warnings: Vec::new() }
     }
 
+    /// A fault at the key under `path`.
+    fn fault_at_key(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
+        self.faults.push(Fault::new(self.root.deepest(path).key.clone(), message, "").help(help));
+    }
+
     /// A fault at the value under `path`.
     fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));

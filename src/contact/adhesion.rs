@@ -1,0 +1,158 @@
+//! Adhesion: bonds between body and obstacle that stretch, pull the body back and give way.
+//!
+//! With the bonding `b` between 0 (broken) and 1 (whole), stiffnesses `c_n`, `c_t` and the truncation `R` of lengths at the
+//! bond's length, the traction on the body is
+//!
+//! ```text
+//! b^2 (c_n R(-u_nu) nu - c_t R(u_tau)),    R(-u_nu) = 0 where u_nu >= 0
+//! viscosity b' = -<b (c_n R(-u_nu)^2 + c_t |R(u_tau)|^2) - energy>_+
+//! ```
+//!
+//! with the normal `nu` out of the body and the displacement `u` since the bonds were made, at `u = 0`. Bonds don't come
+//! back. They store `b^2 F(u)`, `F` the potential of the truncated springs; in slow separation they take up `energy` in all,
+//! and the largest traction is `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational and
+//! numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003),
+//! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
+//! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
+
+use crate::tensor::{Vector, add_scaled, dot, norm};
+
+/// Bonds at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adhesion {
+    /// Traction of whole bonds per opening, in Pa/m.
+    pub stiffness: f64,
+    /// Traction of whole bonds per sliding, in Pa/m.
+    pub tangential_stiffness: f64,
+    /// Energy per area that breaks the bonds (Dupré's), in J/m².
+    pub energy: f64,
+    /// What slows debonding, in J s/m²; 0: nothing.
+    pub viscosity: f64,
+    /// Length in m beyond which the traction grows no more; infinite: never.
+    pub length: f64,
+}
+
+impl Adhesion {
+    /// Opening in m, at least zero, and sliding.
+    fn stretch<const D: usize>(displacement: &Vector<D>, normal: &Vector<D>) -> (f64, Vector<D>) {
+        let along = dot(displacement, normal);
+        ((-along).max(0.0), add_scaled(displacement, -along, normal))
+    }
+
+    /// Traction in Pa of whole bonds on the body.
+    pub fn traction<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let size = norm(&sliding);
+        let cut = if size > self.length { self.length / size } else { 1.0 };
+        let pull = normal.map(|n| self.stiffness * opening.min(self.length) * n);
+        add_scaled(&pull, -self.tangential_stiffness * cut, &sliding)
+    }
+
+    /// Energy in J/m² that whole bonds store: the traction is minus its derivative.
+    pub fn potential<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let of = |length: f64| {
+            let cut = length.min(self.length);
+            cut * (length - 0.5 * cut)
+        };
+        self.stiffness * of(opening) + self.tangential_stiffness * of(norm(&sliding))
+    }
+
+    /// What drives debonding, in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
+    pub fn drive<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let square = |length: f64| length.min(self.length).powi(2);
+        self.stiffness * square(opening) + self.tangential_stiffness * square(norm(&sliding))
+    }
+
+    /// The bonding after a step of this length in s, implicit in the bonding: it never falls below where debonding ends.
+    /// Drive, energy and viscosity may be per area or of a node.
+    pub fn advance(bonding: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> f64 {
+        if bonding * drive <= energy {
+            return bonding;
+        }
+        ((viscosity * bonding + length * energy) / (viscosity + length * drive)).min(bonding)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GLUE: Adhesion =
+        Adhesion { stiffness: 100.0, tangential_stiffness: 40.0, energy: 0.5, viscosity: 2.0, length: 0.2 };
+    const DOWN: [f64; 2] = [0.0, -1.0];
+
+    #[test]
+    fn lifted_and_slid_bonds_pull_back_by_hand() {
+        // Lifted by 0.1 m, slid by 0.05 m.
+        let u = [0.05, 0.1];
+        assert_eq!(GLUE.traction(&u, &DOWN), [-2.0, -10.0]);
+        assert!((GLUE.potential(&u, &DOWN) - (0.5 + 0.05)).abs() < 1e-15);
+        assert!((GLUE.drive(&u, &DOWN) - (1.0 + 0.1)).abs() < 1e-15);
+        let far = [-0.3, 1.0];
+        assert_eq!(GLUE.traction(&far, &DOWN), [8.0, -20.0], "truncated");
+        assert!((GLUE.potential(&far, &DOWN) - (100.0 * 0.18 + 40.0 * 0.04)).abs() < 1e-13);
+        assert_eq!(GLUE.traction(&[0.0, -0.1], &DOWN), [0.0, 0.0], "pressed on: no bond is stretched");
+    }
+
+    #[test]
+    fn bonds_give_way_by_hand() {
+        // Drive 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
+        assert_eq!(Adhesion::advance(1.0, 1.0, 0.5, 2.0, 0.5), 0.9);
+        assert_eq!(Adhesion::advance(1.0, 1.0, 0.5, 0.0, 0.5), 0.5, "without viscosity at once");
+        assert_eq!(Adhesion::advance(0.4, 1.0, 0.5, 2.0, 0.5), 0.4, "the drive is too weak");
+        assert_eq!(Adhesion::advance(0.0, 1e9, 0.0, 2.0, 0.5), 0.0);
+    }
+
+    #[test]
+    fn slow_separation_takes_up_the_energy_and_peaks_at_the_root_of_stiffness_and_energy() {
+        let law = Adhesion { viscosity: 0.0, length: f64::INFINITY, ..GLUE };
+        let (mut bonding, mut dissipated, mut work, mut peak) = (1.0, 0.0, 0.0, 0.0f64);
+        let (steps, end) = (100_000, 5.0);
+        for step in 0..steps {
+            let u = [0.0, end * f64::from(step) / f64::from(steps)];
+            let next = Adhesion::advance(bonding, law.drive(&u, &DOWN), law.energy, law.viscosity, 1.0);
+            dissipated += (bonding * bonding - next * next) * law.potential(&u, &DOWN);
+            bonding = next;
+            let pull = -bonding * bonding * law.traction(&u, &DOWN)[1];
+            work += pull * end / f64::from(steps);
+            peak = peak.max(pull);
+        }
+        assert!((peak / (100.0f64 * 0.5).sqrt() - 1.0).abs() < 1e-3, "peak {peak}");
+        assert!((dissipated / 0.5 - 1.0).abs() < 2e-3, "dissipated {dissipated}");
+        assert!((work / 0.5 - 1.0).abs() < 2e-3, "work {work}");
+    }
+
+    proptest! {
+        #[test]
+        fn bonds_only_break_and_dissipate(
+            u in proptest::array::uniform3(-0.5f64..0.5), bonding in 0.0f64..1.0,
+            viscosity in 0.0f64..10.0, length in 1e-4f64..10.0,
+        ) {
+            let normal = [0.6, 0.0, -0.8];
+            let (drive, potential) = (GLUE.drive(&u, &normal), GLUE.potential(&u, &normal));
+            let next = Adhesion::advance(bonding, drive, GLUE.energy, viscosity, length);
+            prop_assert!((0.0..=bonding).contains(&next));
+            prop_assert!((bonding * bonding - next * next) * potential >= 0.0, "dissipation");
+            prop_assert!(next == bonding || next * drive >= GLUE.energy * (1.0 - 1e-12), "no further than the end");
+        }
+
+        #[test]
+        fn traction_is_minus_the_derivative_of_the_potential(u in proptest::array::uniform3(-0.5f64..0.5)) {
+            let normal = [0.6, 0.0, -0.8];
+            let traction = GLUE.traction(&u, &normal);
+            for i in 0..3 {
+                let h = 1e-6;
+                let at = |sign: f64| {
+                    let mut moved = u;
+                    moved[i] += sign * h;
+                    GLUE.potential(&moved, &normal)
+                };
+                let quotient = (at(1.0) - at(-1.0)) / (2.0 * h);
+                prop_assert!((quotient + traction[i]).abs() < 1e-3, "{} {}", quotient, traction[i]);
+            }
+        }
+    }
+}

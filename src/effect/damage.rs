@@ -1,0 +1,69 @@
+use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
+use crate::{
+    material::{self, ByMaterial},
+    space::{Batch, CellRun, Needs},
+};
+
+/// Isotropic damage `d`, one number for each cell that may be damaged: the elastic and viscoplastic stress counts by the
+/// share `1 - d`, viscous stress in full.
+///
+/// `d_n` follows from `d_{n-1}` and the energy `Y_{n-1}` of `S_{n-1} = E e(u_{n-1}) + H_{n-1}`, so that the loss of elastic
+/// energy in the step is exactly `(d_n - d_{n-1}) Y_{n-1}`, the dissipation; all other terms of the elastic energy count by
+/// `1 - d_n`.
+#[derive(Debug)]
+pub struct Damage {
+    laws: ByMaterial<material::Damage>,
+    damage: CellHistory<1>,
+}
+
+impl Damage {
+    /// Sound cells, for the runs whose material has a law.
+    pub fn new(laws: ByMaterial<material::Damage>, runs: &[CellRun]) -> Self {
+        let damage = CellHistory::new("damage", runs, |material| laws.get(material).is_some());
+        Self { laws, damage }
+    }
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for Damage {
+    fn name(&self) -> &'static str {
+        "damage"
+    }
+
+    fn phases(&self) -> Phases {
+        let stress = Needs { strain: true, elastic_stress: true, ..Needs::default() };
+        Phases { explicit: Some(stress), weakens: true, ..Phases::default() }
+    }
+
+    fn is_everywhere(&self) -> bool {
+        self.laws.is_everywhere()
+    }
+
+    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let (converged, trial) = self.damage.both(batch.number);
+        for (at, ([before], [after])) in converged.iter().zip(trial.iter_mut()).enumerate() {
+            let release_rate = law.release_rate(&batch.elastic_stress[at]);
+            *after = law.advance(*before, release_rate, step.length);
+            energy.damage += batch.cells[at].volume * release_rate * (*after - *before);
+        }
+        batch.integrity.weaken(trial.iter().map(|[damage]| 1.0 - damage));
+    }
+
+    fn weaken(&self, batch: &mut Batch<D, S>) {
+        if self.laws.get(batch.material).is_some() {
+            batch.integrity.weaken(self.damage.converged(batch.number).iter().map(|[damage]| 1.0 - damage));
+        }
+    }
+
+    fn commit(&mut self) {
+        self.damage.commit();
+    }
+
+    fn histories(&self) -> Vec<History<'_>> {
+        vec![self.damage.history()]
+    }
+
+    fn restore(&mut self, name: &str, values: &[f64]) {
+        self.damage.restore(name, values);
+    }
+}

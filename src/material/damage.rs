@@ -1,0 +1,109 @@
+//! Isotropic damage with a rate.
+//!
+//! A cell of damage `d` bears the share `1 - d` of its elastic stress `s`; its energy is `(1 - d) Y` with
+//! `Y = 1/2 s : E^-1 s`, which is the energy released by a unit of damage. Damage grows where `Y` exceeds the threshold,
+//!
+//! ```text
+//! viscosity d' = (1 - d)^exponent <Y - threshold>_+,   d <= largest,
+//! ```
+//!
+//! and never heals: it dissipates `Y d' >= 0`. With exponent 0 this is the law of M. Frémond and B. Nedjar (Damage, gradient
+//! of damage and principle of virtual power, Int. J. Solids Struct. 33 (1996), 1083-1103) in `beta = 1 - d` without the
+//! gradient of damage; for the mathematics see M. Sofonea, W. Han, M. Shillor, Analysis and Approximation of Contact
+//! Problems with Adhesion or Damage, 2006. Without the gradient only the rate spreads damage: the slower the load, the
+//! thinner the band of cells in which it gathers.
+
+use super::Isotropic;
+use crate::tensor::Mandel;
+
+/// A damage law at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damage {
+    /// Energy per volume in Pa above which damage grows.
+    pub threshold: f64,
+    /// What slows it, in Pa s, positive.
+    pub viscosity: f64,
+    /// Power of what is left.
+    pub exponent: f64,
+    /// Damage that is never exceeded, below 1.
+    pub largest: f64,
+    /// The elastic tensor `E`.
+    pub elasticity: Isotropic,
+}
+
+impl Damage {
+    /// `Y` in Pa at an elastic stress in Pa.
+    #[inline(always)]
+    pub fn release_rate<const S: usize>(&self, stress: &Mandel<S>) -> f64 {
+        0.5 * self.elasticity.inverse_square(stress)
+    }
+
+    /// The damage after a step of this length in s at this release rate.
+    #[inline(always)]
+    pub fn advance(&self, damage: f64, release_rate: f64, length: f64) -> f64 {
+        let excess = release_rate - self.threshold;
+        if excess <= 0.0 {
+            return damage;
+        }
+        let left = if self.exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(self.exponent) };
+        (damage + length * left * excess / self.viscosity).min(self.largest).max(damage)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Elasticity, Hypothesis};
+    use proptest::prelude::*;
+
+    const GLASS: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
+
+    fn law(exponent: f64) -> Damage {
+        let elasticity = GLASS.tensor(Hypothesis::PlaneStress);
+        Damage { threshold: 0.5, viscosity: 10.0, exponent, largest: 0.9, elasticity }
+    }
+
+    #[test]
+    fn uniaxial_stress_releases_its_square_over_twice_youngs_modulus() {
+        assert!((law(0.0).release_rate(&[40.0, 0.0, 0.0]) - 0.8).abs() < 1e-14);
+        let space = Damage { elasticity: GLASS.tensor(Hypothesis::Space), ..law(0.0) };
+        assert!((space.release_rate(&[40.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - 0.8).abs() < 1e-14);
+    }
+
+    #[test]
+    fn damage_grows_by_hand() {
+        // Excess 2 Pa over 10 Pa s in 0.5 s: 0.1, times what is left.
+        assert!((law(0.0).advance(0.2, 2.5, 0.5) - 0.3).abs() < 1e-15);
+        assert!((law(1.0).advance(0.2, 2.5, 0.5) - 0.28).abs() < 1e-15);
+        assert!((law(2.0).advance(0.2, 2.5, 0.5) - 0.264).abs() < 1e-15);
+        assert_eq!(law(0.0).advance(0.2, 0.5, 0.5), 0.2, "at the threshold");
+        assert_eq!(law(0.0).advance(0.8, 1e9, 0.5), 0.9, "never beyond the largest");
+    }
+
+    proptest! {
+        #[test]
+        fn damage_never_heals_stays_below_its_largest_and_dissipates(
+            s in proptest::array::uniform3(-200.0f64..200.0),
+            damage in 0.0f64..0.9, length in 1e-4f64..10.0, exponent in 0.0f64..3.0,
+        ) {
+            let law = law(exponent);
+            let release = law.release_rate(&s);
+            let next = law.advance(damage, release, length);
+            prop_assert!(damage <= next && next <= 0.9);
+            prop_assert!(release >= 0.0 && release * (next - damage) >= 0.0);
+            prop_assert!(release > law.threshold || next == damage);
+        }
+
+        #[test]
+        fn the_release_rate_is_the_fall_of_the_energy_with_damage(s in proptest::array::uniform3(-20.0f64..20.0)) {
+            let law = law(0.0);
+            let energy = |d: f64| {
+                let strain = law.elasticity.solve(&s);
+                let borne = s.map(|c| (1.0 - d) * c);
+                0.5 * crate::tensor::dot(&borne, &strain)
+            };
+            let fall = energy(0.2) - energy(0.3);
+            prop_assert!((fall - 0.1 * law.release_rate(&s)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,209 @@
+use super::{DistributedVector, Matrix, check, index, sys};
+use crate::error::{Error, Result};
+use std::{collections::HashMap, ptr};
+
+/// `P K P + k (I - P)`: a constant matrix on a subspace, with a number of its own size on the complement.
+///
+/// `P` acts on each node by itself. The stored entries are those of `K`, so that what was set up for the one (an
+/// ordering, an interpolation) serves the other.
+#[derive(Debug)]
+pub(super) struct ReducedMatrix {
+    pub raw: sys::Mat,
+    /// Components a node.
+    block: usize,
+    /// Where ghost nodes stand behind the owned ones, by their global numbers.
+    ghosts: HashMap<usize, usize>,
+    /// `P e_i` for each component `i`.
+    columns: Vec<DistributedVector>,
+    /// The same of the projection that the matrix was made for.
+    made_for: Vec<DistributedVector>,
+}
+
+impl ReducedMatrix {
+    /// Starts with `P = I`, for vectors laid out like `like`. Collective.
+    pub fn new(constant: &Matrix, like: &DistributedVector, block: usize) -> Result<Self> {
+        let owned = like.owned()?.len() / block;
+        let columns = identity_columns(like, block)?;
+        let made_for = identity_columns(like, block)?;
+        let mut raw = ptr::null_mut();
+        let mut mapping = ptr::null_mut();
+        let (mut indices, mut scalars) = (ptr::null(), 0);
+        let mut ghosts = HashMap::new();
+        // SAFETY: live objects; the handle owns one reference to the copy; the indices are read before they are given back.
+        unsafe {
+            check(sys::MatDuplicate(constant.raw, sys::MAT_COPY_VALUES, &mut raw))?;
+            let mut matrix = Self { raw, block, ghosts: HashMap::new(), columns, made_for };
+            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
+            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
+            check(sys::VecGetLocalToGlobalMapping(like.raw, &mut mapping))?;
+            check(sys::ISLocalToGlobalMappingGetSize(mapping, &mut scalars))?;
+            check(sys::ISLocalToGlobalMappingGetBlockIndices(mapping, &mut indices))?;
+            for node in owned..usize::try_from(scalars).unwrap_or(0) / block {
+                ghosts.insert(usize::try_from(*indices.add(node)).unwrap_or(0), node);
+            }
+            check(sys::ISLocalToGlobalMappingRestoreBlockIndices(mapping, &mut indices))?;
+            matrix.ghosts = ghosts;
+            Ok(matrix)
+        }
+    }
+
+    /// Takes in the projection in use; says whether the matrix was made for another. Collective.
+    pub fn look(&mut self, mut project: impl FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+        let mut changed = false;
+        for (i, column) in self.columns.iter_mut().enumerate() {
+            write_unit(column, i, self.block)?;
+            project(column)?;
+            changed |= !column.equals(&self.made_for[i])?;
+        }
+        Ok(changed)
+    }
+
+    /// Makes the matrix for the projection that was last looked at. Collective.
+    pub fn make(&mut self, constant: &Matrix) -> Result<()> {
+        for (made, column) in self.made_for.iter_mut().zip(&self.columns) {
+            made.copy_from(column)?;
+        }
+        // SAFETY: live matrices of one pattern.
+        check(unsafe { sys::MatCopy(constant.raw, self.raw, sys::SAME_NONZERO_PATTERN) })?;
+        let mut locals = Vec::new();
+        for column in &self.columns {
+            column.update_ghosts()?;
+            locals.push(column.local()?);
+        }
+        let (block, square) = (self.block, self.block * self.block);
+        let projection = |node: usize| -> Vec<f64> {
+            locals.iter().flat_map(|column| column[node * block..][..block].iter().copied()).collect()
+        };
+        let identity: Vec<f64> = (0..square).map(|k| if k % (block + 1) == 0 { 1.0 } else { 0.0 }).collect();
+        let (mut first, mut end) = (0, 0);
+        // SAFETY: live matrix, live integers.
+        check(unsafe { sys::MatGetOwnershipRange(constant.raw, &mut first, &mut end) })?;
+        let first = usize::try_from(first).unwrap_or(0) / block;
+        let owned = self.columns[0].owned()?.len() / block;
+        for node in 0..owned {
+            let mine = projection(node);
+            if mine == identity {
+                continue;
+            }
+            let (columns, rows) = block_row(constant, first + node, block)?;
+            for (at, &global) in columns.iter().enumerate() {
+                let other = if (first..first + owned).contains(&global) {
+                    global - first
+                } else {
+                    *self.ghosts.get(&global).ok_or_else(|| {
+                        Error::Internal(format!("node {global} of a matrix row is no ghost of this rank"))
+                    })?
+                };
+                let theirs = projection(other);
+                let stored: Vec<f64> = (0..square).map(|k| rows[k / block][at * block + k % block]).collect();
+                let mut values = times(&times(&mine, &stored, block), &theirs, block);
+                if global == first + node {
+                    let size = (0..block).map(|i| stored[i * block + i]).sum::<f64>() / block as f64;
+                    values
+                        .iter_mut()
+                        .enumerate()
+                        .for_each(|(k, value)| *value += size * (identity[k] - mine[k]));
+                }
+                self.insert(first + node, global, &values)?;
+                // A row that holds nothing itself is not visited; two that do are both.
+                if theirs == identity {
+                    let across: Vec<f64> =
+                        (0..square).map(|k| values[(k % block) * block + k / block]).collect();
+                    self.insert(global, first + node, &across)?;
+                }
+            }
+        }
+        // SAFETY: live matrix.
+        unsafe {
+            check(sys::MatAssemblyBegin(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
+            check(sys::MatAssemblyEnd(self.raw, sys::MAT_FINAL_ASSEMBLY))
+        }
+    }
+
+    /// Puts a block at a place where one is stored.
+    fn insert(&self, row: usize, column: usize, values: &[f64]) -> Result<()> {
+        let scalars = |node: usize| -> Result<Vec<sys::PetscInt>> {
+            (0..self.block).map(|i| index(node * self.block + i, "global unknown")).collect()
+        };
+        let (rows, columns) = (scalars(row)?, scalars(column)?);
+        let size = index(self.block, "block size")?;
+        // SAFETY: live matrix; as many indices and values as announced, which PETSc copies.
+        check(unsafe {
+            sys::MatSetValues(
+                self.raw,
+                size,
+                rows.as_ptr(),
+                size,
+                columns.as_ptr(),
+                values.as_ptr(),
+                sys::INSERT_VALUES,
+            )
+        })
+    }
+}
+
+impl Drop for ReducedMatrix {
+    fn drop(&mut self) {
+        // SAFETY: this handle owns one reference.
+        unsafe { sys::MatDestroy(&mut self.raw) };
+    }
+}
+
+/// `e_i` at each node, for each component `i`.
+fn identity_columns(like: &DistributedVector, block: usize) -> Result<Vec<DistributedVector>> {
+    let column = |i| {
+        let mut column = like.like()?;
+        write_unit(&mut column, i, block)?;
+        Ok(column)
+    };
+    (0..block).map(column).collect()
+}
+
+/// Writes `e_i` at each node.
+fn write_unit(column: &mut DistributedVector, i: usize, block: usize) -> Result<()> {
+    column.owned_mut()?.chunks_exact_mut(block).for_each(|node| {
+        node.fill(0.0);
+        node[i] = 1.0;
+    });
+    Ok(())
+}
+
+/// The product of two square matrices of `size` rows.
+fn times(a: &[f64], b: &[f64], size: usize) -> Vec<f64> {
+    let entry = |k: usize| (0..size).map(|l| a[k / size * size + l] * b[l * size + k % size]).sum();
+    (0..size * size).map(entry).collect()
+}
+
+/// Global block columns and the scalar rows of an owned block row.
+fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, Vec<Vec<f64>>)> {
+    let mut blocks = Vec::new();
+    let mut rows = Vec::new();
+    for i in 0..block {
+        let row = index(node * block + i, "global unknown")?;
+        let (mut count, mut columns, mut values) = (0, ptr::null(), ptr::null());
+        // SAFETY: an owned row of a live matrix; PETSc's arrays are read before the row is given back.
+        unsafe {
+            check(sys::MatGetRow(matrix.raw, row, &mut count, &mut columns, &mut values))?;
+            let length = usize::try_from(count).unwrap_or(0);
+            let (of, found) =
+                (std::slice::from_raw_parts(columns, length), std::slice::from_raw_parts(values, length));
+            if i == 0 {
+                let firsts = of.iter().step_by(block);
+                blocks = firsts.map(|&column| usize::try_from(column).unwrap_or(0) / block).collect();
+            }
+            rows.push(found.to_vec());
+            check(sys::MatRestoreRow(matrix.raw, row, &mut count, &mut columns, &mut values))?;
+        }
+    }
+    Ok((blocks, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_multiply_as_by_hand() {
+        assert_eq!(times(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0, 7.0, 8.0], 2), [19.0, 22.0, 43.0, 50.0]);
+    }
+}

@@ -1,0 +1,114 @@
+//! Damage against closed forms: a body that is held keeps its strain, so that its damage follows an ordinary differential
+//! equation of its own in every cell.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, brick, crossed, simulation};
+use clarke::{mesh::GlobalMesh, run::Simulation, session::Session};
+
+const MODULUS: f64 = 100.0;
+const RATIO: f64 = 0.25;
+const STRAIN: f64 = 0.1;
+const END: f64 = 0.5;
+
+/// Elastic energy per volume of the strain along x alone.
+fn energy<const S: usize>() -> f64 {
+    let modulus = if S == 3 {
+        MODULUS / (1.0 - RATIO * RATIO)
+    } else {
+        MODULUS * (1.0 - RATIO) / ((1.0 + RATIO) * (1.0 - 2.0 * RATIO))
+    };
+    0.5 * modulus * STRAIN * STRAIN
+}
+
+/// A body held on all sides, stretched along x. A force too small to matter keeps the equations from being all rounding.
+fn job<const D: usize>(hypothesis: &str, damage: &str, steps: usize) -> String {
+    let mut job = format!("{}[time]\nend = {END}\nstep = {}\n", any_mesh::<D>(), END / steps as f64);
+    job += "[solver]\ntolerance = 1e-13\n[material]\n";
+    if D == 2 {
+        job += &format!("hypothesis = \"{hypothesis}\"\n");
+    }
+    job += &format!(
+        "elasticity = {{ youngs_modulus = {MODULUS}, poisson_ratio = {RATIO} }}\nviscosity = {{ volumetric = 1, shear = 20 }}\n\
+         damage = {{ {damage} }}\n"
+    );
+    let sides = ["left", "right", "bottom", "top", "front", "back"];
+    job += &format!("[[support]]\non = {:?}\nfix = \"all\"\n", &sides[..2 * D]);
+    let displacement = &["0.1*x", "0", "0"][..D];
+    let force = &[1e-8; D][..];
+    job += &format!("[[body_force]]\nvalue = {force:?}\n");
+    job + &format!("[initial]\ndisplacement = {displacement:?}\n")
+}
+
+/// The damage of all cells here.
+fn damage<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
+    let histories = run.body.effects.iter().flat_map(|e| e.histories());
+    histories.filter(|h| h.name == "damage").flat_map(|h| h.values.into_owned()).collect()
+}
+
+fn held<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mesh: &GlobalMesh<D>) {
+    let (threshold, viscosity, steps) = (0.2, 0.3, 400);
+    let rate = (energy::<S>() - threshold) / viscosity;
+    let closed: [(i32, &dyn Fn(f64) -> f64); 3] =
+        [(0, &|t| rate * t), (1, &|t| 1.0 - (-rate * t).exp()), (2, &|t| 1.0 - 1.0 / (1.0 + rate * t))];
+    for (exponent, closed) in closed {
+        let law =
+            format!("threshold = {threshold}, viscosity = {viscosity}, exponent = {exponent}, largest = 0.6");
+        let mut run = simulation::<D, S>(session, &job::<D>(hypothesis, &law, steps), mesh);
+        let (mut expected, mut dissipated) = (0.0f64, 0.0);
+        let volume: f64 = run.body.geometry.cells.iter().map(|cell| cell.volume).sum();
+        let [volume] = session.sum([volume]);
+        while run.advance(session).expect("a step").is_some() {
+            let grown = expected + END / steps as f64 * rate * (1.0 - expected).powi(exponent);
+            let grown = grown.min(0.6);
+            dissipated += volume * energy::<S>() * (grown - expected);
+            expected = grown;
+            let off = damage(&run).iter().map(|d| (d - expected).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-8, "{hypothesis} {exponent}, step {}: off by {off}", run.state.step);
+        }
+        let exact = closed(END).min(0.6);
+        assert!((expected / exact - 1.0).abs() < 4e-3, "{hypothesis} {exponent}: {expected} {exact}");
+        let totals = run.totals;
+        let stored = (1.0 - expected) * volume * energy::<S>();
+        assert!((totals.damage_dissipation / dissipated - 1.0).abs() < 1e-7);
+        assert!((totals.elastic_energy / stored - 1.0).abs() < 1e-7);
+        assert!(totals.max_energy_imbalance < 1e-12);
+        let stress = run.body.stress(&run.state).expect("stress");
+        let whole = 2.0 * energy::<S>() / STRAIN;
+        assert!(stress.iter().all(|s| (s[0] / ((1.0 - expected) * whole) - 1.0).abs() < 1e-7));
+    }
+}
+
+/// A law that never sets in, and its absence, give the same numbers to the last bit.
+fn inert(session: &Session, mesh: &GlobalMesh<2>) {
+    let with = job::<2>("plane_stress", "threshold = 1e30, viscosity = 1", 20);
+    let with =
+        with.replace("fix = \"all\"", "fix = [\"y\"]").replace("value = [1e-8", "value = [\"x*sin(9*t)\"");
+    let with = with.replace("[material]\n", "[material]\ndensity = 1\n");
+    let without: String =
+        with.lines().filter(|line| !line.starts_with("damage")).map(|l| format!("{l}\n")).collect();
+    let mut one = simulation::<2, 3>(session, &with, mesh);
+    let mut other = simulation::<2, 3>(session, &without, mesh);
+    assert_eq!((one.body.effects.len(), other.body.effects.len()), (4, 3));
+    while one.advance(session).expect("a step").is_some() {
+        other.advance(session).expect("a step");
+        assert_eq!(
+            *one.state.velocity.owned().expect("values"),
+            *other.state.velocity.owned().expect("values")
+        );
+        assert_eq!(one.totals, other.totals);
+    }
+    assert!(one.totals.external_work != 0.0 && damage(&one).iter().all(|d| *d == 0.0));
+}
+
+pub fn all(session: &Session) {
+    let (plane, space) = (crossed([3, 2]), brick([2, 2, 2]));
+    held::<2, 3>(session, "plane_stress", &plane);
+    held::<2, 4>(session, "plane_strain", &plane);
+    held::<3, 6>(session, "", &space);
+    inert(session, &plane);
+}
+
+#[test]
+fn damage_under_held_strain_follows_its_differential_equation() {
+    run_on(&[1, 2, 3], "damage");
+}
