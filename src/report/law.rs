@@ -4,7 +4,7 @@ use super::scale::{extent, number};
 use crate::{
     contact::{DampedResponse, Graph, Symmetry},
     error::Result,
-    job::{self, NormalLaw, Scalar},
+    job::{self, Contact, NormalLaw, Scalar},
 };
 
 /// Points of a curved law that are joined by straight lines.
@@ -36,11 +36,13 @@ pub struct Branch {
 }
 
 impl Law {
-    /// The law of a contact of a job.
-    pub fn of(law: &NormalLaw) -> Result<Self> {
+    /// The law of a contact of a job; nothing where it depends on the way to an obstacle, which only the run knows.
+    pub fn of(contact: &Contact) -> Result<Option<Self>> {
         let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
         let of_velocity = |graph| Self { shape: Shape::Graph(graph), gap: None };
-        Ok(match law {
+        let of_displacement =
+            |shape, gap: &Option<Scalar>| Self { shape, gap: Some(gap.clone().unwrap_or_default()) };
+        let law = match &contact.normal {
             NormalLaw::DampedResponse(d) => {
                 let symmetry = match d.symmetry {
                     job::Symmetry::Even => Symmetry::Even,
@@ -51,15 +53,14 @@ impl Law {
                 of_velocity(DampedResponse { breakpoints, slopes, symmetry }.graph()?)
             }
             NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
-            NormalLaw::Compliance(c) => Self {
-                shape: Shape::Power { stiffness: c.stiffness, exponent: c.exponent },
-                gap: Some(c.gap.clone()),
-            },
-            NormalLaw::Unilateral(u) => Self {
-                shape: Shape::Graph(wall()?),
-                gap: (u.bound == job::Bound::Displacement).then(|| u.gap.clone()),
-            },
-        })
+            NormalLaw::Unilateral(u) if u.bound == job::Bound::Velocity => of_velocity(wall()?),
+            _ if contact.obstacle.is_some() => return Ok(None),
+            NormalLaw::Compliance(c) => {
+                of_displacement(Shape::Power { stiffness: c.stiffness, exponent: c.exponent }, &c.gap)
+            }
+            NormalLaw::Unilateral(u) => of_displacement(Shape::Graph(wall()?), &u.gap),
+        };
+        Ok(Some(law))
     }
 
     /// What the pressure is a graph of, and its unit.
@@ -98,7 +99,8 @@ impl Law {
             Shape::Power { .. } => nodes.iter().map(|[x, _]| usize::from(*x > 0.0)).collect(),
             Shape::Graph(graph) => {
                 let all = || graph.points().iter().chain(nodes);
-                let reach = |axis: usize| all().fold(0.0, |m, p| f64::max(m, p[axis].abs()));
+                let reach =
+                    |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
                 let steep = reach(1) / reach(0);
                 let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
                 let c = steep.max(2.0 * graph.monotonicity_constant());
@@ -175,15 +177,21 @@ fn graph_branches(graph: &Graph, unit: &str) -> Vec<Branch> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Bound, Compliance, Unilateral};
+    use crate::job::{Bound, Compliance, Quadrature, Unilateral};
+
+    fn law(normal: NormalLaw) -> Law {
+        let on = vec!["bottom".into()];
+        let quadrature = Quadrature::Nodal;
+        let contact = Contact { on, quadrature, normal, obstacle: None, friction: None, adhesion: None };
+        Law::of(&contact).expect("law").expect("graph")
+    }
 
     fn paper() -> Law {
-        Law::of(&NormalLaw::DampedResponse(job::DampedResponse {
+        law(NormalLaw::DampedResponse(job::DampedResponse {
             breakpoints: vec![0.003, 0.005],
             slopes: vec![10.0, -10.0, 10.0],
             symmetry: job::Symmetry::Even,
         }))
-        .expect("law")
     }
 
     #[test]
@@ -208,19 +216,19 @@ mod tests {
 
     #[test]
     fn nodes_at_a_rigid_wall_are_closed_and_others_open() {
-        let gap = Scalar::Number(0.01);
-        let law =
-            Law::of(&NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap })).expect("law");
+        let gap = Some(Scalar::Number(0.01));
+        let law = law(NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap }));
         let at = |u: f64| law.abscissa(0.0, &[0.0, 0.0], u, 0.0);
-        assert_eq!(law.branches_of(&[[at(0.01), 5.0], [at(0.004), 0.0]]), [1, 0]);
+        let nodes = [[at(0.01), 5.0], [at(0.004), 0.0], [f64::NEG_INFINITY, 0.0]];
+        assert_eq!(law.branches_of(&nodes), [1, 0, 0], "the last has nothing to touch");
         let line = law.line(&[[at(0.01), 5.0], [at(0.004), 0.0]]);
         assert_eq!((line[2][0], line[2][1] > 5.0), (0.0, true));
     }
 
     #[test]
     fn springs_are_felt_beyond_their_gap() {
-        let spring = Compliance { stiffness: 100.0, exponent: 2.0, gap: Scalar::Number(0.1) };
-        let law = Law::of(&NormalLaw::Compliance(spring)).expect("law");
+        let spring = Compliance { stiffness: 100.0, exponent: 2.0, gap: Some(Scalar::Number(0.1)) };
+        let law = law(NormalLaw::Compliance(spring));
         let nodes = [[law.abscissa(0.0, &[], 0.3, 0.0), 4.0], [law.abscissa(0.0, &[], 0.05, 0.0), 0.0]];
         assert_eq!(law.branches_of(&nodes), [1, 0]);
         assert_eq!(law.quantity().0, "penetration");

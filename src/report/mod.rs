@@ -143,26 +143,27 @@ fn body_section(page: &mut Page, found: &Found) -> Result<()> {
 }
 
 fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
-    let contacts = found.job.iter().flat_map(|job| &job.contact);
-    let laws: Vec<(&[String], Law)> = contacts
-        .filter_map(|contact| Some((contact.on.as_slice(), Law::of(&contact.normal).ok()?)))
-        .collect();
+    let mut contacts: Vec<(&[String], Option<Law>)> = Vec::new();
+    for contact in found.job.iter().flat_map(|job| &job.contact) {
+        contacts.push((&contact.on, Law::of(contact)?));
+    }
     let mut seen = Vec::new();
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
         seen = profiles.names();
         for name in &seen {
-            let law = laws.iter().find(|(on, _)| on.contains(name)).map(|(_, law)| law);
-            let boundary = Boundary::new(profiles, name, law);
+            let contact = contacts.iter().find(|(on, _)| on.contains(name));
+            let boundary = Boundary::new(profiles, name, contact.and_then(|(_, law)| law.as_ref()));
             let mut pictures = boundary.pictures(found.snapshot.as_ref())?;
-            if let Some(snapshot) = found.snapshot.as_ref().filter(|_| law.is_some()) {
+            if let Some(snapshot) = found.snapshot.as_ref().filter(|_| contact.is_some()) {
                 pictures.extend(boundary.arrows(&Body::new(snapshot), snapshot)?);
             }
-            let heading = format!("{} {name}", if law.is_some() { "Contact boundary" } else { "Boundary" });
+            let heading =
+                format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });
             page.section(&heading, &boundary.branch_table(), pictures);
         }
     }
     let unseen: Vec<&String> =
-        laws.iter().flat_map(|(on, _)| on.iter()).filter(|name| !seen.contains(name)).collect();
+        contacts.iter().flat_map(|(on, _)| on.iter()).filter(|name| !seen.contains(name)).collect();
     if !unseen.is_empty() {
         let words: String = unseen
             .iter()

@@ -79,7 +79,14 @@ impl Newton {
             if !outcome.converged() {
                 return Err(failed(step, outcome.words(), REMEDY));
             }
-            return self.judge(session, body, step, trial, settings, (outcome.iterations, &Effort::default()));
+            return self.judge(
+                session,
+                body,
+                step,
+                trial,
+                settings,
+                (outcome.iterations, &Effort::default()),
+            );
         }
         {
             let mut trial = trial.owned_mut()?;
