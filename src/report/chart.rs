@@ -248,10 +248,7 @@ impl<'a> Chart<'a> {
             plane.draw(&PathElement::new(stroke, rgb([0x55; 3]).stroke_width(FINE as u32))).map_err(words)?;
             let place = (x.low, height);
             plane
-                .draw(
-                    &(EmptyElement::at(place)
-                        + Text::new(name.clone(), fine(4.0, -1.3 * LETTERS), letters())),
-                )
+                .draw(&(EmptyElement::at(place) + Text::new(name.clone(), fine(4.0, 3.0), letters())))
                 .map_err(words)?;
         }
         Ok(())

@@ -101,15 +101,15 @@ fn plain(value: &Value) -> String {
 /// Headings, paragraphs, lists and tables of a Markdown text as HTML; its first heading and the captions of its pictures
 /// apart.
 fn markdown(text: &str, captions: &mut HashMap<String, String>) -> (Option<String>, String) {
+    let text = plain_words(text);
     let (mut title, mut out) = (None, String::new());
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {
-        let line = plain_words(line.trim_end());
-        let line = line.as_str();
+        let line = line.trim_end();
         if line.starts_with('|') {
             let mut rows = vec![cells(line)];
             while let Some(next) = lines.next_if(|next| next.starts_with('|')) {
-                rows.push(cells(&plain_words(next)));
+                rows.push(cells(next));
             }
             let header = rows.remove(0);
             let rule = |row: &Vec<String>| row.iter().all(|cell| cell.chars().all(|c| "-: ".contains(c)));
@@ -144,8 +144,8 @@ fn markdown(text: &str, captions: &mut HashMap<String, String>) -> (Option<Strin
 }
 
 /// Without the marks of emphasis and code.
-fn plain_words(line: &str) -> String {
-    line.replace("**", "").replace('`', "")
+fn plain_words(text: &str) -> String {
+    text.replace("**", "").replace('`', "")
 }
 
 fn cells(line: &str) -> Vec<String> {
