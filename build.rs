@@ -17,7 +17,7 @@ const FUNCTIONS: &[&str] = &[
     "VecCreateMPIWithArray",
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
     "Mat(Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
-    "(VecGetLocalToGlobalMapping|VecEqual|PetscObjectReference|ISLocalToGlobalMapping(GetBlockIndices|RestoreBlockIndices|GetSize))",
+    "(VecEqual|PetscObjectReference)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",
     "MatNullSpace(Create|CreateRigidBody|SetFunction|Destroy)",

@@ -185,6 +185,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if !self.contacts.is_empty() {
             names.push("contact");
         }
+        if self.contacts.iter().any(|contact| contact.friction().is_some()) {
+            names.push("friction");
+        }
         names.extend(self.surface_effects.iter().map(|e| e.name()));
         names
     }

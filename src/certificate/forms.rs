@@ -6,28 +6,33 @@ use crate::{
     error::Result,
     mesh::{Mesh, shape::facet_normal},
     petsc::DistributedVector,
-    tensor::norm,
+    tensor::{dot, norm},
 };
 
-/// Adds `factor * integral over the contact boundary of x_nu w_nu`, exactly, to `forces`; both with ghosts.
+/// Adds the integral over the contact boundary of `normal x_nu w_nu + tangential x_tau . w_tau`, exactly, to `forces`; both
+/// with ghosts.
 pub(super) fn add_trace<const D: usize>(
     mesh: &Mesh<D>,
     contact: &Contact<D>,
-    factor: f64,
+    [normal, tangential]: [f64; 2],
     x: &[f64],
     forces: &mut [f64],
 ) {
     for &facet in contact.facets() {
         let nodes = mesh.facets[facet as usize];
-        let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
-        let measure = norm(&normal);
-        let unit = normal.map(|c| c / measure);
-        let along = nodes.map(|n| (0..D).map(|i| x[n as usize * D + i] * unit[i]).sum::<f64>());
-        let total: f64 = along.iter().sum();
+        let square = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+        let measure = norm(&square);
+        let unit = square.map(|c| c / measure);
+        let weighted = nodes.map(|n| {
+            let value: [f64; D] = std::array::from_fn(|i| x[n as usize * D + i]);
+            let along = dot(&value, &unit);
+            std::array::from_fn(|i| tangential * value[i] + (normal - tangential) * along * unit[i])
+        });
+        let total: [f64; D] = std::array::from_fn(|i| weighted.iter().map(|w: &[f64; D]| w[i]).sum());
         for (a, node) in nodes.iter().enumerate() {
-            let value = factor * measure * (total + along[a]) / (D * (D + 1)) as f64;
             for i in 0..D {
-                forces[*node as usize * D + i] += value * unit[i];
+                forces[*node as usize * D + i] +=
+                    measure * (total[i] + weighted[a][i]) / (D * (D + 1)) as f64;
             }
         }
     }

@@ -2,12 +2,13 @@
 //!
 //! | name | definition | meaning |
 //! |---|---|---|
-//! | `theta` | sup of `sum m_j int w_nu^2` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
+//! | `theta` | sup of `sum (m_j int w_nu^2 + m_t int w_tau^2)` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
 //! | `theta_step` | the same over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
 //!
-//! `m_j` is the steepest fall of a contact graph, `m_A` the smallest eigenvalue of the viscosity. Suprema run over
+//! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
+//! times the largest pressure of the normal law; where that has no bound the fall is not covered, and said so), `m_A` the smallest eigenvalue of the viscosity. Suprema run over
 //! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
 //! viscosity, `m_A` is 0 and `theta` has no meaning.
 
@@ -19,7 +20,12 @@ mod verdict;
 pub use verdict::{Accepted, Verdict};
 
 use crate::{
-    body::Body, effect::Form, error::Result, petsc::DistributedVector, session::Session, state::State,
+    body::Body,
+    effect::{Contact, Form},
+    error::Result,
+    petsc::DistributedVector,
+    session::Session,
+    state::State,
     stepping::LaggedEuler,
 };
 use ascent::{Quotient, climb};
@@ -45,6 +51,9 @@ pub struct Certificates {
     pub trace_norm_squared: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
+    /// What `theta` and `theta_step` say nothing of, in words; absent if there is nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_covered: Vec<String>,
 }
 
 impl Certificates {
@@ -55,11 +64,12 @@ impl Certificates {
         state: &State,
         scheme: &mut LaggedEuler,
     ) -> Result<Self> {
-        let falls = body.contacts.iter().map(|c| c.law.monotonicity_constant());
+        let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
         let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
             viscosity_modulus: body.smallest_viscosity(),
             monotonicity_constant: falls.reduce(f64::max),
+            not_covered: not_covered(&body.contacts),
             ..Self::default()
         };
         let mut find = |kind: Kind| find(session, body, state, scheme, kind);
@@ -90,6 +100,25 @@ impl Certificates {
         }
         Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep)?))
     }
+}
+
+/// What depends on contact pressures that are part of the solution.
+fn not_covered<const D: usize>(contacts: &[Contact<D>]) -> Vec<String> {
+    let mut words = Vec::new();
+    if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
+        words.push(
+            "friction bounds follow the contact pressure: theta holds for given pressures; that they change with the \
+             solution is not covered, and beyond some coefficient there may be several solutions"
+                .into(),
+        );
+    }
+    for fall in contacts.iter().filter_map(Contact::unknown_fall) {
+        words.push(format!(
+            "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
+             bound: theta does not cover it"
+        ));
+    }
+    words
 }
 
 fn find<const D: usize, const S: usize>(
@@ -144,9 +173,9 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (kind, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let fall = contact.law.monotonicity_constant();
-                        let factor = if kind == Kind::TraceNorm { 1.0 } else { fall };
-                        forms::add_trace(&body.mesh, contact, factor, x, y);
+                        let factors =
+                            if kind == Kind::TraceNorm { [1.0, 0.0] } else { contact.known_falls() };
+                        forms::add_trace(&body.mesh, contact, factors, x, y);
                     }
                 });
             }

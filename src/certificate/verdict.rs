@@ -27,6 +27,7 @@ impl Certificates {
     /// `theta_step` is below 1, where it is known.
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: Accepted) -> Verdict {
         let mut verdict = Verdict::default();
+        verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
         if let Some(theta) = self.theta {
             let meaning = if theta < 1.0 {
                 "below 1: the continuous problem has one solution"
@@ -117,6 +118,7 @@ mod tests {
             monotonicity_constant: Some(10.0),
             trace_norm_squared: Some(2.24),
             explicit_step_bound: Some(0.12),
+            not_covered: Vec::new(),
         }
     }
 

@@ -129,6 +129,14 @@ impl Graph {
         self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
     }
 
+    /// The largest pressure in Pa of all points; infinite where there is none.
+    pub fn greatest_pressure(&self) -> f64 {
+        if self.slopes[0] < 0.0 || self.slopes[self.points.len()] > 0.0 {
+            return f64::INFINITY;
+        }
+        self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
+    }
+
     /// Distance of a pair (velocity, pressure) to the graph, both scaled by the graph's own range.
     pub fn distance(&self, velocity: f64, pressure: f64) -> f64 {
         self.distance_in(velocity, pressure, self.reach)
@@ -205,6 +213,14 @@ mod tests {
         assert_eq!(g.potential(1.0), 1.5);
         assert_eq!(g.potential(2.0), 4.0);
         assert_eq!(g.potential(-1.0), -1.0);
+    }
+
+    #[test]
+    fn the_greatest_pressure_is_that_of_a_corner_or_there_is_none() {
+        let bounded = Graph::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 3.0, -0.5).unwrap();
+        assert_eq!(bounded.greatest_pressure(), 2.0);
+        assert_eq!(valley().greatest_pressure(), f64::INFINITY);
+        assert_eq!(Graph::new(vec![[0.0, 0.0]], -1.0, 0.0).unwrap().greatest_pressure(), f64::INFINITY);
     }
 
     #[test]

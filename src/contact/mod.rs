@@ -3,6 +3,7 @@
 mod adhesion;
 mod compliance;
 mod damped_response;
+mod friction;
 mod graph;
 mod normal_law;
 mod obstacle;
@@ -10,6 +11,7 @@ mod obstacle;
 pub use adhesion::Adhesion;
 pub use compliance::Compliance;
 pub use damped_response::{DampedResponse, Symmetry};
+pub use friction::{FrictionLaw, Slip};
 pub use graph::Graph;
 pub use normal_law::{NodeContext, NormalLaw, Resolved};
 pub use obstacle::Gap;

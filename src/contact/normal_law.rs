@@ -128,6 +128,14 @@ impl NormalLaw {
         }
     }
 
+    /// The largest pressure in Pa that it ever gives; infinite where there is none.
+    pub fn greatest_pressure(&self) -> f64 {
+        match self {
+            Self::Graph(graph) => graph.greatest_pressure(),
+            Self::Compliance(_) | Self::Unilateral(_) => f64::INFINITY,
+        }
+    }
+
     /// Distance of a pair (velocity, pressure) to the graph, scaled by the graph's own range, or by this one if the law
     /// depends on the displacement.
     pub fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {

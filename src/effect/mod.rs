@@ -17,7 +17,7 @@ mod viscoplastic_history;
 mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
-pub use contact::{Contact, PointCount, Quadrature, choose_unknowns};
+pub use contact::{COUNTS, Contact, PointCount, Quadrature, choose_unknowns};
 pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;

@@ -5,9 +5,6 @@ use super::source::{Node, Value};
 
 /// Path (`*` is any position in a list), the word that is not available (or any), and what it is called.
 const UNAVAILABLE: &[(&str, Option<&str>, &str)] = &[
-    ("contact.*.friction.tresca", None, "Tresca friction is"),
-    ("contact.*.friction.coulomb", None, "Coulomb friction is"),
-    ("contact.*.friction.slip_weakening", None, "slip weakening friction is"),
     ("time.scheme", Some("implicit_euler"), "the scheme \"implicit_euler\" is"),
     ("time.scheme", Some("bdf2"), "the scheme \"bdf2\" is"),
     ("time.adaptive", None, "adaptive time stepping is"),

@@ -28,6 +28,8 @@ struct Profile<const D: usize> {
 #[derive(Debug)]
 pub struct Profiles<const D: usize> {
     profiles: Vec<Profile<D>>,
+    /// Whether there is friction on one of them.
+    with_friction: bool,
     file: Option<CsvFile>,
 }
 
@@ -43,7 +45,12 @@ impl<const D: usize> Profiles<D> {
             let points = surface_points(session, &body.mesh, &facets)?;
             Ok(Profile { name: name.clone(), facets, points, contact: *contact })
         };
-        Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, file: None })
+        let has_friction = |contact: usize| body.contacts[contact].friction().is_some();
+        Ok(Self {
+            profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?,
+            with_friction: boundaries.iter().any(|(_, contact)| contact.is_some_and(has_friction)),
+            file: None,
+        })
     }
 
     /// Whether there is none.
@@ -55,7 +62,12 @@ impl<const D: usize> Profiles<D> {
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<f64>) -> Result<()> {
         let path = folder.join("profiles.csv");
         let axes = ["x", "y", "z"][..D].join(",");
-        let header = format!("time,profile,{axes},normal_displacement,normal_velocity,contact_pressure");
+        let friction = ["x", "y", "z"][..if self.with_friction { D } else { 0 }]
+            .iter()
+            .map(|axis| format!(",friction_traction_{axis}"))
+            .collect::<String>();
+        let header =
+            format!("time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}");
         self.file = Some(match goes_on_after {
             Some(time) => CsvFile::resume(&path, &header, time)?,
             None => CsvFile::create(&path, &header)?,
@@ -71,10 +83,11 @@ impl<const D: usize> Profiles<D> {
         state: &State,
         stress: &[Mandel<S>],
     ) -> Result<()> {
+        let width = if self.with_friction { 2 * D + 3 } else { D + 3 };
         for profile in &self.profiles {
-            let rows = gather(session, &profile.rows(body, state, stress)?);
+            let rows = gather(session, &profile.rows(body, state, stress, self.with_friction)?);
             let Some(file) = &mut self.file else { continue };
-            let mut rows: Vec<&[f64]> = rows.chunks_exact(D + 3).collect();
+            let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
             rows.sort_by(|a, b| compare(a, b));
             for row in rows {
                 file.row(format_args!("{},{},{}", number(state.time), profile.name, numbers(row)))?;
@@ -90,12 +103,14 @@ impl<const D: usize> Profiles<D> {
 }
 
 impl<const D: usize> Profile<D> {
-    /// Position, normal displacement, normal velocity and contact pressure of each point here.
+    /// Position, normal displacement, normal velocity, contact pressure and, if asked for, friction traction `-sigma_tau` of
+    /// each point here.
     fn rows<const S: usize>(
         &self,
         body: &Body<D, S>,
         state: &State,
         stress: &[Mandel<S>],
+        with_friction: bool,
     ) -> Result<Vec<f64>> {
         let by_stress =
             if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
@@ -117,6 +132,10 @@ impl<const D: usize> Profile<D> {
             };
             out.extend(body.mesh.nodes[node]);
             out.extend([along(&displacement), normal_velocity, pressure]);
+            if with_friction {
+                let known = self.contact.zip(traction.as_ref());
+                out.extend(known.map_or([0.0; D], |(c, t)| body.contacts[c].friction_traction(node, t)));
+            }
         }
         Ok(out)
     }

@@ -32,6 +32,11 @@ impl LinearOutcome {
     pub fn words(&self) -> &'static str {
         linear_reason(self.reason)
     }
+
+    /// The outcome of two solves one after the other.
+    pub(super) fn followed_by(self, next: Self) -> Self {
+        Self { iterations: self.iterations + next.iterations, ..next }
+    }
 }
 
 /// PETSc's `KSPConvergedReason` in words.

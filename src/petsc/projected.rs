@@ -9,7 +9,7 @@ use super::{
 use crate::error::Result;
 use std::{ffi::c_void, ptr};
 
-/// A symmetric operator on a subspace, given by its action.
+/// An operator on a subspace, given by its action.
 pub trait ProjectedOperator {
     /// `y = P B x` for an `x` of the subspace.
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
@@ -157,7 +157,8 @@ impl ProjectedKsp {
         reduced.look(|column| operator.project(column))
     }
 
-    /// Solves `P B x = r` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an error.
+    /// Solves `P B x = r` with a symmetric `P B` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an
+    /// error.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank.
     pub fn solve(
@@ -167,6 +168,26 @@ impl ProjectedKsp {
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
         let stale = self.look(operator, right_hand_side)?;
+        self.attached(operator, |solver| solver.solve_attached(right_hand_side, solution, stale))
+    }
+
+    /// The same with a `P B` that is not symmetric, by GMRES.
+    pub fn solve_unsymmetric(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<ProjectedOutcome> {
+        let stale = self.look(operator, right_hand_side)?;
+        self.attached(operator, |solver| solver.solve_by_gmres(right_hand_side, solution, stale))
+    }
+
+    /// Runs a solve with this operator behind the shell matrix.
+    fn attached(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        solve: impl FnOnce(&mut Self) -> Result<ProjectedOutcome>,
+    ) -> Result<ProjectedOutcome> {
         let callback = Callback::new(operator);
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
         // KSPSolve. The null space is attached for the solve alone, so that its function is never called without.
@@ -175,7 +196,7 @@ impl ProjectedKsp {
             check(sys::MatSetNullSpace(self.shell, self.complement))?;
             check(sys::MatShellSetContext(self.shell, callback.pointer()))?;
         }
-        let outcome = self.solve_attached(right_hand_side, solution, stale);
+        let outcome = solve(self);
         // SAFETY: as above.
         unsafe {
             check(sys::MatShellSetContext(self.shell, ptr::null_mut()))?;
@@ -186,16 +207,23 @@ impl ProjectedKsp {
         outcome
     }
 
+    /// The residual norm at which a solve stops, and its share of the right-hand side.
+    fn target(&mut self, right_hand_side: &DistributedVector) -> Result<(f64, f64)> {
+        let norm = right_hand_side.norm()?;
+        self.smallest = self.smallest.min(norm);
+        let (relative, absolute, _) = self.tolerances;
+        let target = (relative * self.smallest).max(absolute);
+        Ok((target, (target / norm).min(1e-3)))
+    }
+
     fn solve_attached(
         &mut self,
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
         stale: bool,
     ) -> Result<ProjectedOutcome> {
-        let norm = right_hand_side.norm()?;
-        self.smallest = self.smallest.min(norm);
-        let (relative, absolute, iterations) = self.tolerances;
-        let target = (relative * self.smallest).max(absolute);
+        let (target, share) = self.target(right_hand_side)?;
+        let iterations = self.tolerances.2;
         let first = if stale { self.patience.min(iterations) } else { iterations };
         let mut outcome = ProjectedOutcome { linear: NOTHING, indefinite: false, refreshed: false };
         if first > 0 {
@@ -211,20 +239,47 @@ impl ProjectedKsp {
             self.ksp.start(true)?;
             let rest = self.ksp.solve(right_hand_side, solution)?;
             self.ksp.start(false)?;
-            outcome.linear =
-                LinearOutcome { iterations: outcome.linear.iterations + rest.iterations, ..rest };
+            outcome.linear = outcome.linear.followed_by(rest);
         }
         if !INDEFINITE.contains(&outcome.linear.reason) {
             return Ok(outcome);
         }
-        if self.fallback.is_none() {
-            self.fallback = Some(self.ksp.sharing_preconditioner("indefinite_", "gmres")?);
+        let gmres = self.gmres(share, iterations)?;
+        let second = gmres.solve(right_hand_side, solution)?;
+        Ok(ProjectedOutcome { linear: outcome.linear.followed_by(second), indefinite: true, ..outcome })
+    }
+
+    fn solve_by_gmres(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+        stale: bool,
+    ) -> Result<ProjectedOutcome> {
+        let (_, share) = self.target(right_hand_side)?;
+        let iterations = self.tolerances.2;
+        let first = if stale { self.patience.min(iterations).max(1) } else { iterations };
+        let linear = self.gmres(share, first)?.solve(right_hand_side, solution)?;
+        let outcome = ProjectedOutcome { linear, indefinite: false, refreshed: false };
+        if !stale || linear.reason != TOO_MANY {
+            return Ok(outcome);
         }
-        let Some(fallback) = &mut self.fallback else { unreachable!("it was just made") };
-        fallback.set_tolerances((target / norm).min(1e-3), 0.0, iterations)?;
-        let second = fallback.solve(right_hand_side, solution)?;
-        let iterations = outcome.linear.iterations + second.iterations;
-        Ok(ProjectedOutcome { linear: LinearOutcome { iterations, ..second }, indefinite: true, ..outcome })
+        self.refresh()?;
+        let gmres = self.gmres(share, iterations)?;
+        gmres.start(true)?;
+        let rest = gmres.solve(right_hand_side, solution)?;
+        gmres.start(false)?;
+        Ok(ProjectedOutcome { linear: linear.followed_by(rest), refreshed: true, ..outcome })
+    }
+
+    /// GMRES with the same preconditioner, down to this share of the preconditioned right-hand side.
+    fn gmres(&mut self, share: f64, iterations: usize) -> Result<&mut Ksp> {
+        let gmres = match self.fallback.take() {
+            Some(gmres) => gmres,
+            None => self.ksp.sharing_preconditioner("indefinite_", "gmres")?,
+        };
+        let gmres = self.fallback.insert(gmres);
+        gmres.set_tolerances(share, 0.0, iterations)?;
+        Ok(gmres)
     }
 
     /// Makes the preconditioner for the subspace in use. Collective.

@@ -1,6 +1,9 @@
 use super::{DistributedVector, Matrix, check, index, sys};
 use crate::error::{Error, Result};
-use std::{collections::HashMap, ptr};
+use std::{
+    collections::{BTreeSet, HashMap},
+    ptr,
+};
 
 /// `P K P + k (I - P)`: a constant matrix on a subspace, with a number of its own size on the complement.
 ///
@@ -23,26 +26,29 @@ impl ReducedMatrix {
     /// Starts with `P = I`, for vectors laid out like `like`. Collective.
     pub fn new(constant: &Matrix, like: &DistributedVector, block: usize) -> Result<Self> {
         let owned = like.owned()?.len() / block;
-        let columns = identity_columns(like, block)?;
-        let made_for = identity_columns(like, block)?;
+        let first = first_node(constant, block)?;
+        let mut others = BTreeSet::new();
+        for node in 0..owned {
+            let (columns, _) = block_row(constant, first + node, block)?;
+            others.extend(columns.into_iter().filter(|node| !(first..first + owned).contains(node)));
+        }
+        // A row reaches further than the cells of this rank: the ghosts here are all nodes that the rows name.
+        let list: Vec<u32> = others.iter().map(|&node| node as u32).collect();
+        let unit = |i| {
+            let mut column = DistributedVector::ghosted(block, owned, &list)?;
+            write_unit(&mut column, i, block)?;
+            Ok(column)
+        };
+        let columns = (0..block).map(unit).collect::<Result<_>>()?;
+        let made_for = (0..block).map(unit).collect::<Result<_>>()?;
         let mut raw = ptr::null_mut();
-        let mut mapping = ptr::null_mut();
-        let (mut indices, mut scalars) = (ptr::null(), 0);
-        let mut ghosts = HashMap::new();
-        // SAFETY: live objects; the handle owns one reference to the copy; the indices are read before they are given back.
+        // SAFETY: live matrix; the handle owns one reference to the copy.
         unsafe {
             check(sys::MatDuplicate(constant.raw, sys::MAT_COPY_VALUES, &mut raw))?;
-            let mut matrix = Self { raw, block, ghosts: HashMap::new(), columns, made_for };
+            let ghosts = others.into_iter().enumerate().map(|(at, node)| (node, owned + at)).collect();
+            let matrix = Self { raw, block, ghosts, columns, made_for };
             check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
-            check(sys::VecGetLocalToGlobalMapping(like.raw, &mut mapping))?;
-            check(sys::ISLocalToGlobalMappingGetSize(mapping, &mut scalars))?;
-            check(sys::ISLocalToGlobalMappingGetBlockIndices(mapping, &mut indices))?;
-            for node in owned..usize::try_from(scalars).unwrap_or(0) / block {
-                ghosts.insert(usize::try_from(*indices.add(node)).unwrap_or(0), node);
-            }
-            check(sys::ISLocalToGlobalMappingRestoreBlockIndices(mapping, &mut indices))?;
-            matrix.ghosts = ghosts;
             Ok(matrix)
         }
     }
@@ -75,10 +81,7 @@ impl ReducedMatrix {
             locals.iter().flat_map(|column| column[node * block..][..block].iter().copied()).collect()
         };
         let identity: Vec<f64> = (0..square).map(|k| if k % (block + 1) == 0 { 1.0 } else { 0.0 }).collect();
-        let (mut first, mut end) = (0, 0);
-        // SAFETY: live matrix, live integers.
-        check(unsafe { sys::MatGetOwnershipRange(constant.raw, &mut first, &mut end) })?;
-        let first = usize::try_from(first).unwrap_or(0) / block;
+        let first = first_node(constant, block)?;
         let owned = self.columns[0].owned()?.len() / block;
         for node in 0..owned {
             let mine = projection(node);
@@ -149,14 +152,12 @@ impl Drop for ReducedMatrix {
     }
 }
 
-/// `e_i` at each node, for each component `i`.
-fn identity_columns(like: &DistributedVector, block: usize) -> Result<Vec<DistributedVector>> {
-    let column = |i| {
-        let mut column = like.like()?;
-        write_unit(&mut column, i, block)?;
-        Ok(column)
-    };
-    (0..block).map(column).collect()
+/// The first node whose row this rank owns.
+fn first_node(matrix: &Matrix, block: usize) -> Result<usize> {
+    let (mut first, mut end) = (0, 0);
+    // SAFETY: live matrix, live integers.
+    check(unsafe { sys::MatGetOwnershipRange(matrix.raw, &mut first, &mut end) })?;
+    Ok(usize::try_from(first).unwrap_or(0) / block)
 }
 
 /// Writes `e_i` at each node.

@@ -2,14 +2,14 @@
 
 use crate::{
     body::Body,
-    contact::{self, DampedResponse, Gap, Graph, Symmetry},
+    contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
     effect::{
         Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held, Inertia, Load,
         Quadrature, Support, SurfaceEffect, Traction, ViscoplasticHistory, ViscousStress, choose_unknowns,
         fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, NormalLaw, Obstacle, Scalar},
+    job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Obstacle, Scalar},
     material::{
         self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
         Perzyna, Viscoplasticity,
@@ -18,7 +18,7 @@ use crate::{
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{Method, Preconditioner, SolverSettings},
+    stepping::{FrictionIteration, Method, Preconditioner, SolverSettings},
     tensor::Vector,
 };
 
@@ -43,7 +43,11 @@ pub(super) fn body<const D: usize, const S: usize>(
             job::Quadrature::Gauss => Quadrature::Gauss,
         };
         let (law, gap) = session.agree(normal_law(contact))?;
-        contacts.push(Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?);
+        let mut laws = Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?;
+        if let Some(friction) = &contact.friction {
+            session.agree(laws.add_friction(friction_law(friction), &mesh, &fixed))?;
+        }
+        contacts.push(laws);
     }
     let surface_effects = surface_effects(session, job, &mesh)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
@@ -236,6 +240,18 @@ fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
     }
 }
 
+fn friction_law(law: &Friction) -> FrictionLaw {
+    match law {
+        Friction::Tresca(t) => FrictionLaw::Tresca { bound: t.bound },
+        Friction::Coulomb(c) => FrictionLaw::Coulomb { coefficient: c.coefficient },
+        Friction::SlipWeakening(s) => FrictionLaw::SlipWeakening {
+            at_rest: s.at_rest,
+            dynamic: s.dynamic,
+            decay_velocity: s.decay_velocity,
+        },
+    }
+}
+
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
     let mut all: Vec<u32> =
         names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
@@ -314,5 +330,9 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
             job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
         },
         newton_iterations: job.solver.max_newton_iterations as usize,
+        friction: match job.solver.friction {
+            job::FrictionIteration::Newton => FrictionIteration::Newton,
+            job::FrictionIteration::FixedPoint => FrictionIteration::FixedPoint,
+        },
     }
 }

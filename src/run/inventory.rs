@@ -11,6 +11,8 @@ pub struct Inventory {
     pub history_bytes: BTreeMap<String, u64>,
     /// Quadrature points of all contacts.
     pub contact_points: u64,
+    /// Those of them with friction.
+    pub friction_points: u64,
     /// Whether steps are nonlinear, so that Newton's method exists.
     pub newton: bool,
     /// Whether a vector of nodal loads exists.
@@ -31,9 +33,11 @@ impl Inventory {
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }
         let points: usize = body.contacts.iter().map(|c| c.point_count()).sum();
+        let with_friction: usize = body.contacts.iter().map(|c| c.friction_point_count()).sum();
         Self {
             history_bytes,
             contact_points: session.total(points) as u64,
+            friction_points: session.total(with_friction) as u64,
             newton: scheme.is_nonlinear(),
             load_vector: scheme.has_load(),
         }

@@ -328,14 +328,24 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 }
 
-/// What happens at the contact points, where there is any to tell.
+/// What happens at the contact points, where there is any to tell: `branches` counts them by branch of the normal law.
 fn kinds(outcome: &StepOutcome) -> String {
+    let points = &outcome.points;
     let told = [
-        ("open", outcome.points.open),
-        ("sticking", outcome.points.sticking),
+        ("open", points.open),
+        ("held", points.held),
+        ("sticking", points.sticking),
+        ("slipping", points.slipping),
+        ("separated", points.separated),
         ("indefinite", outcome.indefinite_solves),
     ];
-    told.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}  ")).collect()
+    let counts = told.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}  "));
+    let last = points.branches.iter().rposition(|count| *count > 0);
+    let branches: Vec<String> =
+        points.branches[..last.map_or(0, |last| last + 1)].iter().map(usize::to_string).collect();
+    let branches =
+        if branches.is_empty() { String::new() } else { format!("branches {}  ", branches.join("/")) };
+    branches + &counts.collect::<String>()
 }
 
 /// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.

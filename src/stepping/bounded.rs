@@ -3,11 +3,12 @@
 //! `K v - b = 0` but where a bound is reached, and the force there pushes back. It knows nothing of contact graphs and
 //! serves as an independent check of Newton's method on them.
 
+use super::newton::Task;
 use crate::{
     body::Body,
     effect::Contact,
     error::{Error, Result},
-    petsc::{BoundedSnes, DistributedVector, Matrix, NonlinearOutcome, UNBOUNDED},
+    petsc::{BoundedSnes, DistributedVector, NonlinearOutcome, UNBOUNDED},
 };
 
 /// PETSc's solver with its bounds.
@@ -29,11 +30,8 @@ impl Bounded {
     pub fn solve<const D: usize>(
         &mut self,
         contacts: &mut [Contact<D>],
-        matrix: &Matrix,
-        right_hand_side: &DistributedVector,
+        task: Task<'_>,
         trial: &mut DistributedVector,
-        tolerances: (f64, f64),
-        iterations: usize,
     ) -> Result<NonlinearOutcome> {
         self.lower.fill(-UNBOUNDED)?;
         self.upper.fill(UNBOUNDED)?;
@@ -42,7 +40,15 @@ impl Bounded {
             contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
         }
         let bounds = [&self.lower, &self.upper];
-        let outcome = self.snes.solve(matrix, right_hand_side, bounds, trial, tolerances, iterations)?;
+        let iterations = task.settings.newton_iterations;
+        let outcome = self.snes.solve(
+            task.matrix,
+            task.right_hand_side,
+            bounds,
+            trial,
+            task.tolerances(),
+            iterations,
+        )?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {

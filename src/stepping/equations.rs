@@ -59,6 +59,8 @@ pub struct Effort {
     pub indefinite: usize,
     /// How often the preconditioner was made anew.
     pub refreshed: usize,
+    /// Linear systems that were not symmetric: some point slides under a bound that follows the pressure.
+    pub coupled: usize,
     /// Numbers that tell the sets of branches of all points apart, one a linearisation.
     pub sets: Vec<f64>,
 }
@@ -124,11 +126,11 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
+        self.map(x)?;
         {
             let x = x.owned()?;
             self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x));
         }
-        self.map(x)?;
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
         if let Some([values, _]) = ghosted {
             values.copy_from(velocity)?;
@@ -171,10 +173,17 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         direction: &mut DistributedVector,
     ) -> Result<()> {
         let Scratch { velocity, open, ghosted } = &mut *self.scratch;
+        let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
+            && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
         let mut operator = Reduced { matrix: self.matrix, contacts: self.contacts, ghosted };
         open.copy_from(residual)?;
-        operator.project(open)?;
-        let outcome = self.linear_solver.solve(&mut operator, open, velocity)?;
+        operator.reduce(open)?;
+        let outcome = if coupled {
+            self.effort.coupled += 1;
+            self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
+        } else {
+            self.linear_solver.solve(&mut operator, open, velocity)?
+        };
         self.effort.linear_iterations += outcome.linear.iterations;
         self.effort.indefinite += usize::from(outcome.indefinite);
         self.effort.refreshed += usize::from(outcome.refreshed);
@@ -182,7 +191,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             return Err(Error::Failed(outcome.linear.words().into()));
         }
         direction.copy_from(velocity)?;
-        if self.contacts.iter().any(|contact| contact.law.has_vertical_parts()) {
+        if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction().is_some()) {
             self.matrix.multiply(velocity, open)?;
             add_contact(operator.ghosted, self.contacts, velocity, open, Contact::add_slopes)?;
             open.scale(-1.0)?;
@@ -194,18 +203,30 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
-/// `P (K + C') P` in velocities, where `P` holds the points on vertical parts of their graphs.
+/// `P Q (K + C') P` in velocities, where `P` holds the points on vertical parts of their graphs and `Q` takes the unknown
+/// pressures of sliding points out of the equations: the identity, unless friction follows these.
 struct Reduced<'a, const D: usize> {
     matrix: &'a Matrix,
     contacts: &'a [Contact<D>],
     ghosted: &'a mut Option<[DistributedVector; 2]>,
 }
 
+impl<const D: usize> Reduced<'_, D> {
+    /// `x = P Q x`.
+    fn reduce(&mut self, x: &mut DistributedVector) -> Result<()> {
+        {
+            let mut x = x.owned_mut()?;
+            self.contacts.iter().for_each(|contact| contact.reduce(&mut x));
+        }
+        self.project(x)
+    }
+}
+
 impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix.multiply(x, y)?;
         add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)?;
-        self.project(y)
+        self.reduce(y)
     }
 
     fn project(&mut self, x: &mut DistributedVector) -> Result<()> {

@@ -11,7 +11,7 @@ use super::{
     bounded::{self, Bounded},
     equations::Scratch,
     linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, failed},
+    newton::{Newton, REMEDY, Task, failed},
 };
 use crate::{
     body::Body,
@@ -201,7 +201,8 @@ impl LaggedEuler {
             }
             Solver::Newton(newton) => {
                 session.agree(newton.linear_solver.set_constant(&matrix))?;
-                newton.choose_scales(session, &body.contacts, &self.right_hand_side)?;
+                session.agree(newton.linear_solver.linear_solver().set_up())?;
+                newton.choose_scales(session, &body.contacts, &self.right_hand_side, &matrix)?;
             }
         }
         self.matrix = Some((length, matrix));
@@ -345,9 +346,9 @@ impl LaggedEuler {
                     LINEAR_SHARE * tolerance,
                     LINEAR_ITERATIONS,
                 )?;
-                let limits = (tolerance, self.settings);
-                let right_hand_side = &self.right_hand_side;
-                newton.solve(session, body, state, step, matrix, right_hand_side, &mut self.trial, limits)
+                let (right_hand_side, settings) = (&self.right_hand_side, self.settings);
+                let task = Task { step, matrix, right_hand_side, tolerance, settings };
+                newton.solve(session, body, state, task, &mut self.trial)
             }
         }
     }

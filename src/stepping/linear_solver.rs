@@ -27,6 +27,15 @@ pub enum Method {
     VariationalInequality,
 }
 
+/// How friction bounds that follow the contact pressure find it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrictionIteration {
+    /// Within Newton's method.
+    Newton,
+    /// Around Newton's method, which sees given bounds.
+    FixedPoint,
+}
+
 /// How the equations of a step are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
@@ -40,6 +49,8 @@ pub struct SolverSettings {
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step has failed.
     pub newton_iterations: usize,
+    /// How friction bounds find the pressure that they follow.
+    pub friction: FrictionIteration,
 }
 
 /// Most unknowns for which a factorisation is faster than multigrid, by dimension.

@@ -8,4 +8,4 @@ mod newton;
 
 pub use equations::{ContactEquations, Effort, Scratch};
 pub use lagged_euler::{LaggedEuler, StepClock, StepOutcome};
-pub use linear_solver::{Method, Preconditioner, SolverSettings};
+pub use linear_solver::{FrictionIteration, Method, Preconditioner, SolverSettings};

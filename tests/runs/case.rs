@@ -116,6 +116,13 @@ impl Case {
         self.results()
     }
 
+    /// Runs the job, which must succeed, and keeps its folder.
+    #[track_caller]
+    pub fn run_and_keep(self, ranks: usize) -> Self {
+        self.run(ranks);
+        self
+    }
+
     /// Writes the job file and says where it is.
     pub fn written(&self) -> PathBuf {
         let file = self.folder().join("job.toml");

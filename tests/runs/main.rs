@@ -7,6 +7,7 @@ mod check_values;
 mod contact;
 mod effects;
 mod failures;
+mod friction;
 mod hdf5_file;
 mod launch;
 mod materials;

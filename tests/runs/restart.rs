@@ -140,6 +140,27 @@ fn a_run_with_damage_and_adhesion_goes_on_on_any_number_of_ranks() {
 }
 
 #[test]
+fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
+    for law in [
+        "tresca = { bound = 0.2 }",
+        "coulomb = { coefficient = 0.4 }",
+        "slip_weakening = { static = 0.4, dynamic = 0.3, decay_velocity = 0.1 }",
+    ] {
+        let make = || {
+            saving()
+                .set("contact.0.friction", &format!("{{ {law} }}"))
+                .set("contact.0.normal", "{ unilateral = { bound = 'velocity' } }")
+        };
+        compare_with_straight(make, 1, law);
+        compare_with_straight(make, 3, law);
+        let fixed = || make().set("solver.friction", "'fixed_point'");
+        compare_with_straight(fixed, 1, law);
+        let log = make().run_and_keep(1).results().text("run.log");
+        assert!(log.contains("sticking"), "some points stick: {log}");
+    }
+}
+
+#[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");

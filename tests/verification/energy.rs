@@ -58,7 +58,8 @@ fn material(draw: &mut Draw, dynamic: bool) -> String {
 fn contact(draw: &mut Draw) -> String {
     let law = draw.one_of(&["damped", "graph", "jumps", "wall", "moving wall", "one way", "springs"]);
     let anywhere = law == "damped" || law == "graph";
-    let quadrature = if anywhere { draw.one_of(&["nodal", "gauss"]) } else { "nodal" };
+    let friction = draw.one_of(&["none", "tresca", "coulomb", "slip weakening"]);
+    let quadrature = if anywhere && friction == "none" { draw.one_of(&["nodal", "gauss"]) } else { "nodal" };
     let mut text = format!("[[contact]]\non = [\"bottom\"]\nquadrature = \"{quadrature}\"\n");
     let first = draw.between(0.01, 0.1);
     let fall = -draw.between(0.02, 0.2);
@@ -94,6 +95,17 @@ fn contact(draw: &mut Draw) -> String {
                 "[contact.normal.compliance]\nstiffness = {stiffness}\nexponent = {exponent}\ngap = \"{gap} - {high}*t\"\n"
             )
         }
+    };
+    let coefficient = draw.between(0.1, 0.6);
+    text += &match friction {
+        "none" => String::new(),
+        "tresca" => format!("[contact.friction.tresca]\nbound = {coefficient}\n"),
+        "coulomb" => format!("[contact.friction.coulomb]\ncoefficient = {coefficient}\n"),
+        _ => format!(
+            "[contact.friction.slip_weakening]\nstatic = {}\ndynamic = {coefficient}\ndecay_velocity = {}\n",
+            coefficient + 0.1,
+            draw.between(0.5, 2.0)
+        ),
     };
     text
 }

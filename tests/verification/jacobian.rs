@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Compliance, DampedResponse, Gap, Graph, NormalLaw, Symmetry},
+    contact::{Compliance, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, Symmetry},
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     material::{ByMaterial, Isotropic},
     mesh::GlobalMesh,
@@ -33,6 +33,13 @@ fn laws() -> Vec<NormalLaw> {
     laws
 }
 
+const FRICTION: [Option<FrictionLaw>; 4] = [
+    None,
+    Some(FrictionLaw::Tresca { bound: 60.0 }),
+    Some(FrictionLaw::Coulomb { coefficient: 0.6 }),
+    Some(FrictionLaw::SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 }),
+];
+
 fn differences<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let effects: Vec<Box<dyn Effect<D, S>>> = vec![
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
@@ -41,11 +48,14 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     let (body, state) = body::<D, S>(session, whole, &[("left", Held::All)], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
-    let mut facets = body.mesh.boundary("bottom").expect("bottom").facets.clone();
-    facets.extend(&body.mesh.boundary("right").expect("right").facets);
-    facets.sort_unstable();
+    let [bottom, right] =
+        ["bottom", "right"].map(|name| body.mesh.boundary(name).expect("a boundary").facets.clone());
+    let mut both = [&bottom[..], &right[..]].concat();
+    both.sort_unstable();
+    let mut coupled = 0;
     for (law, normal) in laws().into_iter().enumerate() {
-        for quadrature in [Quadrature::Nodal, Quadrature::Gauss] {
+        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction));
+        for (quadrature, friction) in nodal.into_iter().chain([(Quadrature::Gauss, None)]) {
             let (needs_nodes, smooth) = (
                 normal.depends_on_displacement() || normal.has_vertical_parts(),
                 !normal.has_vertical_parts(),
@@ -53,20 +63,31 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             if quadrature == Quadrature::Gauss && needs_nodes {
                 continue;
             }
-            let gap = Gap::Distance(clarke::job::Scalar::Number(0.01));
-            let contact =
-                Contact::new(session, &body.mesh, &facets, quadrature, normal.clone(), gap, &body.fixed)
-                    .expect("contact");
-            assert!(session.total(contact.point_count()) > 0);
-            let mut contacts = [contact];
-            contacts[0].scale = 2.0 * normal.monotonicity_constant() + 30.0;
+            let contact = |facets: &[u32]| {
+                let (law, gap) = (normal.clone(), Gap::Distance(clarke::job::Scalar::Number(0.01)));
+                Contact::new(session, &body.mesh, facets, quadrature, law, gap, &body.fixed).expect("contact")
+            };
+            // Friction of both would act along the edge between them.
+            let mut contacts = if friction.is_none() {
+                vec![contact(&both)]
+            } else {
+                vec![contact(&bottom), contact(&right)]
+            };
+            assert!(session.total(contacts[0].point_count()) > 0);
+            contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant() + 30.0);
+            if let Some(friction) = friction {
+                contacts[0].add_friction(friction, &body.mesh, &body.fixed).expect("friction");
+                assert!(session.total(contacts[0].friction_point_count()) > 0);
+                contacts[0].set_friction(250.0, true);
+            }
             choose_unknowns(&mut contacts, &body.mesh).expect("square corners");
             let mut displacement = vector();
             set_nodal(&body.mesh, &mut displacement, |id, _| {
                 std::array::from_fn(|i| 0.1 * noise((id * D + i) as u64))
             });
             displacement.update_ghosts().expect("ghosts");
-            contacts[0].prepare(0.1, 0.1, &displacement.local().expect("local")).expect("prepared");
+            let displacement = displacement.local().expect("local");
+            contacts.iter_mut().for_each(|c| c.prepare(0.1, 0.1, &displacement).expect("prepared"));
             let mut scratch = Scratch::new(&state.velocity, &contacts).expect("scratch");
             let mut linear_solver = ProjectedKsp::new("", &state.velocity, D).expect("solver");
             linear_solver.linear_solver().set_method("cg").expect("cg");
@@ -109,7 +130,10 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             equations.solve_jacobian(&derivative, &mut second).expect("solved");
             second.add_scaled(-1.0, &direction).expect("add");
             let missed = second.norm().expect("norm") / direction.norm().expect("norm");
-            assert!(missed < 1e-8, "{D}D, law {law}, {quadrature:?}: the direction is missed by {missed}");
+            assert!(
+                missed < 1e-8,
+                "{D}D, law {law}, {quadrature:?}, {friction:?}: the direction is missed by {missed}"
+            );
 
             let h = 1e-5;
             point.add_scaled(h, &direction).expect("add");
@@ -120,8 +144,9 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             let size = derivative.norm().expect("norm");
             derivative.add_scaled(-0.5 / h, &above).expect("add");
             let error = derivative.norm().expect("norm") / size;
-            assert!(error < 1e-8, "{D}D, law {law}, {quadrature:?}: relative error {error}");
+            assert!(error < 1e-8, "{D}D, law {law}, {quadrature:?}, {friction:?}: relative error {error}");
             assert_eq!(equations.effort.residuals, 2);
+            coupled += equations.effort.coupled;
             assert!(smooth || quadrature == Quadrature::Nodal);
 
             matrix.multiply(&direction, &mut second).expect("product");
@@ -129,6 +154,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             assert!(second.norm().expect("norm") > 1e-3 * size, "contact has its share in the difference");
         }
     }
+    assert!(coupled > 0, "sliding and pressure meet");
 }
 
 pub fn compare(session: &Session) {

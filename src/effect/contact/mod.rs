@@ -11,23 +11,30 @@
 //! ```
 //!
 //! In terms of `dv` the Jacobian is symmetric: `K + sum w f^2 c (1 - theta) / theta m m^T`, and `dv . m = 0` where `theta = 0`.
+//! With friction the tangential velocity at nodal points gives way to the parameter of the friction graph in the same way;
+//! see [`friction`].
+//!
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
 mod bounds;
+mod count;
+mod friction;
 mod point;
 mod unknowns;
 
 use crate::{
-    contact::{Gap, NodeContext, NormalLaw},
-    error::Result,
+    contact::{FrictionLaw, Gap, NodeContext, NormalLaw},
+    error::{Error, Result},
     mesh::{Mesh, shape::facet_normal},
     session::Session,
     space::{facet_rule, surface_points},
-    tensor::norm,
+    tensor::{Vector, norm},
 };
+use friction::Friction;
 use point::{Point, Unknown};
 
+pub use count::{COUNTS, PointCount};
 pub use unknowns::choose_unknowns;
 
 /// Where on a facet the law holds.
@@ -50,16 +57,8 @@ pub struct Contact<const D: usize> {
     pub scale: f64,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
+    friction: Option<Friction<D>>,
     needs_ghosts: bool,
-}
-
-/// Points of a contact boundary by what happens there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PointCount {
-    /// On a vertical part of the graph: stuck in a jump, or held by an obstacle.
-    pub sticking: usize,
-    /// Without pressure.
-    pub open: usize,
 }
 
 impl<const D: usize> Contact<D> {
@@ -91,7 +90,92 @@ impl<const D: usize> Contact<D> {
         }
         let scale = 2.0 * law.monotonicity_constant() + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
-        Ok(Self { law, gap, scale, facets: facets.to_vec(), points, needs_ghosts })
+        Ok(Self { law, gap, scale, facets: facets.to_vec(), points, friction: None, needs_ghosts })
+    }
+
+    /// Adds friction, for which `fixed` has one flag a local component; before [`choose_unknowns`]. Refuses supports that
+    /// leave no tangent, or no pressure where the law needs one.
+    pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, fixed: &[bool]) -> Result<()> {
+        if self.needs_ghosts {
+            return Err(Error::Refused(
+                "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
+            ));
+        }
+        self.friction = Some(Friction::new(law, &self.points, mesh, fixed)?);
+        Ok(())
+    }
+
+    /// The friction law, if there is friction.
+    pub fn friction(&self) -> Option<FrictionLaw> {
+        self.friction.as_ref().map(|friction| friction.law)
+    }
+
+    /// Points with friction on this rank.
+    pub fn friction_point_count(&self) -> usize {
+        self.friction.as_ref().map_or(0, |friction| friction.points.len())
+    }
+
+    /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound follows the contact
+    /// pressure while a step is solved.
+    pub fn set_friction(&mut self, scale: f64, follows: bool) {
+        if let Some(friction) = &mut self.friction {
+            friction.scale = scale;
+            friction.follows = follows && friction.law.follows_pressure();
+        }
+    }
+
+    /// `c` in the parameter of the friction graph in Pa s/m; 0 without friction.
+    pub fn friction_scale(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |friction| friction.scale)
+    }
+
+    /// Holds the friction bounds at the pressures of now.
+    pub fn take_pressures(&mut self) {
+        if let Some(friction) = &mut self.friction {
+            friction.take_pressures(&self.points);
+        }
+    }
+
+    /// Steepest fall of the friction graphs of points here in Pa s/m, at the pressures of now.
+    pub fn steepest_friction_fall(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, Friction::steepest_fall)
+    }
+
+    /// The steepest falls in Pa s/m of the normal and of the friction graph, as far as they are known before a step: friction
+    /// that follows a pressure without bounds counts as not falling; see [`unknown_fall`](Self::unknown_fall).
+    pub fn known_falls(&self) -> [f64; 2] {
+        let friction = self.friction().map_or(0.0, |friction| friction.steepest_fall());
+        let most = self.law.greatest_pressure();
+        let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
+        [self.law.monotonicity_constant(), tangential]
+    }
+
+    /// The steepest fall of the friction coefficient in s/m, where the pressure that multiplies it has no bound.
+    pub fn unknown_fall(&self) -> Option<f64> {
+        let fall = self.friction()?.steepest_fall();
+        (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
+    }
+
+    /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.
+    pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
+        self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
+    }
+
+    /// Whether the last linearisation is not symmetric at points here.
+    pub fn is_coupled(&self) -> bool {
+        self.friction.as_ref().is_some_and(Friction::is_coupled)
+    }
+
+    /// Adds a unit velocity along a tangent at each point with friction to nodal values.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        if let Some(friction) = &self.friction {
+            friction.add_unit_sliding(nodal);
+        }
+    }
+
+    /// `integral of w_tau^2` over the points with friction on this rank.
+    pub fn tangential_square(&self, nodal: &[f64]) -> f64 {
+        self.friction.as_ref().map_or(0.0, |friction| friction.square(nodal))
     }
 
     /// Whether velocities of ghost nodes are read and forces on them written.
@@ -147,6 +231,9 @@ impl<const D: usize> Contact<D> {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             point.pressure = point.along(traction);
         }
+        if let Some(friction) = &mut self.friction {
+            friction.recall(&self.points, traction);
+        }
     }
 
     /// Turns velocities into unknowns, with the pressures that the law gives them; where its graph has vertical parts,
@@ -161,6 +248,9 @@ impl<const D: usize> Contact<D> {
             };
             point.add_along(pressure / (self.scale * point.stretch), values);
         }
+        if let Some(friction) = &self.friction {
+            friction.unmap(values);
+        }
     }
 
     /// Turns unknowns at owned nodes into velocities, and takes the pressures that go with them.
@@ -172,6 +262,9 @@ impl<const D: usize> Contact<D> {
             point.pressure = found.pressure;
             point.add_along(found.velocity / point.stretch - along, values);
         }
+        if let Some(friction) = &mut self.friction {
+            friction.map(&self.points, values);
+        }
     }
 
     /// Adds the contact forces in N to `forces`: of the last mapped unknowns, elsewhere of these velocities.
@@ -179,15 +272,21 @@ impl<const D: usize> Contact<D> {
         for point in &self.points {
             point.push(point.pressure_at(&self.law, velocity), forces);
         }
+        if let Some(friction) = &self.friction {
+            friction.add_forces(forces);
+        }
     }
 
-    /// Takes the derivative of the law at these unknowns at owned nodes.
+    /// Takes the derivative of the laws at these unknowns at owned nodes, which must be the last mapped ones.
     pub fn linearise_parameters(&mut self, values: &[f64]) {
         let (law, scale) = (&self.law, self.scale);
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let derivative = point.resolve(law, scale, point.along(values)).derivative;
             point.theta = scale * derivative;
             point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
+        }
+        if let Some(friction) = &mut self.friction {
+            friction.linearise(values);
         }
     }
 
@@ -207,6 +306,9 @@ impl<const D: usize> Contact<D> {
             point.change = scale * point.stretch * (1.0 - point.theta) * along;
             point.add_along((point.theta - 1.0) * along, values);
         }
+        if let Some(friction) = &mut self.friction {
+            friction.map_direction(&self.points, values);
+        }
     }
 
     /// Adds the change of the contact forces: of the last mapped direction, elsewhere of this change of velocity.
@@ -217,6 +319,9 @@ impl<const D: usize> Contact<D> {
                 Unknown::Velocity => point.push(point.slope * point.normal_component(direction), forces),
                 Unknown::Held => {}
             }
+        }
+        if let Some(friction) = &self.friction {
+            friction.add_derivative(forces);
         }
     }
 
@@ -231,12 +336,26 @@ impl<const D: usize> Contact<D> {
                 Unknown::Held => {}
             }
         }
+        if let Some(friction) = &self.friction {
+            friction.add_slopes(&self.points, direction, forces);
+        }
+    }
+
+    /// Brings equations at owned nodes into the form in which unknown pressures of sliding points do not occur; then
+    /// [`project`](Self::project) leaves those of the velocities.
+    pub fn reduce(&self, values: &mut [f64]) {
+        if let Some(friction) = &self.friction {
+            friction.reduce(&self.points, values);
+        }
     }
 
     /// Removes from nodal values what moves points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
         for point in self.points.iter().filter(|p| p.theta == 0.0) {
             point.add_along(-point.along(values), values);
+        }
+        if let Some(friction) = &self.friction {
+            friction.project(values);
         }
     }
 
@@ -250,6 +369,9 @@ impl<const D: usize> Contact<D> {
                 (1.0 / point.theta - 1.0) * point.along(values)
             };
             point.add_along(change, values);
+        }
+        if let Some(friction) = &self.friction {
+            friction.unmap_direction(&self.points, self.scale, open, values);
         }
     }
 
@@ -266,33 +388,26 @@ impl<const D: usize> Contact<D> {
             };
             branch.min(255) as u8
         }));
+        if let Some(friction) = &self.friction {
+            out.extend(friction.motions(velocity).map(|motion| motion as u8));
+        }
     }
 
     /// A number that tells sets of points on the same branches of the last linearisation from others.
     pub fn set_digest(&self) -> u64 {
-        let bits: Vec<u8> =
-            self.points.iter().flat_map(|p| [p.theta, p.slope]).flat_map(f64::to_le_bytes).collect();
+        let normal = self.points.iter().flat_map(|p| [p.theta, p.slope]);
+        let numbers = normal.chain(self.friction.iter().flat_map(Friction::numbers));
+        let bits: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
         xxhash_rust::xxh3::xxh3_64(&bits)
     }
 
-    /// Counts the points by what happens there.
-    pub fn count(&self, velocity: &[f64]) -> PointCount {
-        let mut count = PointCount::default();
-        for point in &self.points {
-            count.open += usize::from(point.pressure_at(&self.law, velocity) == 0.0);
-            if point.unknown == Unknown::Parameter {
-                let parameter = self.scale * point.normal_component(velocity) + point.pressure;
-                let found = self.law.resolve(parameter, self.scale, point.context);
-                count.sticking += usize::from(found.derivative == 0.0);
-            }
-        }
-        count
-    }
-
-    /// Adds the tractions in Pa on the body's obstacle, `-sigma_nu` along the free normal, to nodal values.
+    /// Adds the tractions in Pa on the body's obstacle to nodal values: `-sigma_nu` along the free normal, and `-sigma_tau`.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_along(point.pressure_at(&self.law, velocity), nodal);
+        }
+        if let Some(friction) = &self.friction {
+            friction.add_tractions(nodal);
         }
     }
 
@@ -318,6 +433,9 @@ impl<const D: usize> Contact<D> {
             sums[0] += point.weight * (work - stored + numerical);
             sums[1] += point.weight * numerical;
         }
+        if let Some(friction) = &self.friction {
+            sums[0] += length * friction.power(velocity);
+        }
         sums
     }
 
@@ -331,26 +449,33 @@ impl<const D: usize> Contact<D> {
         self.points.iter().map(energy).sum()
     }
 
-    /// Largest normal velocity and largest pressure at points here, without signs.
-    pub fn range(&self, velocity: &[f64]) -> [f64; 2] {
-        self.points.iter().fold([0.0; 2], |[v, p], point| {
+    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs.
+    pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
+        let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
             let along = point.normal_component(velocity).abs().max(point.context_velocity());
             [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
-        })
+        });
+        let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
+        [normal[0], normal[1], sliding[0], sliding[1]]
     }
 
-    /// Largest scaled distance of (normal velocity, pressure from equilibrium) to the graph. `residual` holds what is
+    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
     /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own.
-    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 2]) -> f64 {
+    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
         // The pressure that would change the velocities by as much as they are counts where there is no other.
-        let range = [range[0], range[1].max(self.scale * range[0])];
+        let sliding = [range[2], range[3]];
+        // So does the velocity that the pressures would change.
+        let range = [range[0].max(range[1] / self.scale), range[1].max(self.scale * range[0])];
         let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
         let distance = |p: &Point<D>| {
             let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
             self.law.distance(p.normal_component(velocity), pressure, p.context, range)
         };
-        free.map(distance).fold(0.0, f64::max)
+        let normal = free.map(distance).fold(0.0, f64::max);
+        let friction = self.friction.as_ref();
+        friction
+            .map_or(normal, |f| normal.max(f.inclusion_residual(&self.points, velocity, residual, sliding)))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::{
     mesh::Mesh,
     tensor::dot,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Cosine below which directions at a node count as orthogonal.
 const ORTHOGONAL: f64 = 1e-9;
@@ -29,6 +29,8 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
             around.entry(point.node()).or_default().push((number, at));
         }
     }
+    keep_tangents_free_of_normals(contacts, &around);
+    let with_friction = refuse_shared_tangents(contacts, mesh)?;
     for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {
         let direction = |&(number, at): &(usize, usize)| contacts[number].points[at].direction;
         let skew = (1..places.len()).any(|i| {
@@ -36,6 +38,13 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         });
         if !skew {
             continue;
+        }
+        if with_friction.contains(&node) {
+            return Err(Error::Refused(format!(
+                "contact at {:?} m: boundaries meet at an angle that is not square, and friction acts there; round the edge \
+                 with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
+                mesh.nodes[node]
+            )));
         }
         for (number, at) in places {
             if contacts[number].law.has_vertical_parts() {
@@ -50,4 +59,42 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         }
     }
     Ok(())
+}
+
+/// Friction at an edge acts along what is a tangent of every contact boundary there.
+fn keep_tangents_free_of_normals<const D: usize>(
+    contacts: &mut [Contact<D>],
+    around: &BTreeMap<usize, Vec<(usize, usize)>>,
+) {
+    let normal = |&(number, at): &(usize, usize)| ((number, at), contacts[number].points[at].direction);
+    let normals: BTreeMap<usize, Vec<_>> =
+        around.iter().map(|(&node, places)| (node, places.iter().map(normal).collect())).collect();
+    for (number, contact) in contacts.iter_mut().enumerate() {
+        let Some(friction) = &mut contact.friction else { continue };
+        for point in &mut friction.points {
+            let own = (number, point.at);
+            let others = normals.get(&point.node).into_iter().flatten();
+            others.filter(|(at, _)| *at != own).for_each(|(_, direction)| point.give_up(direction));
+        }
+        friction.keep_points_with_tangents();
+    }
+}
+
+/// The nodes with friction; a direction can only bear that of one boundary.
+fn refuse_shared_tangents<const D: usize>(
+    contacts: &[Contact<D>],
+    mesh: &Mesh<D>,
+) -> Result<BTreeSet<usize>> {
+    let mut nodes = BTreeSet::new();
+    let frictions = contacts.iter().filter_map(|contact| contact.friction.as_ref());
+    for point in frictions.flat_map(|friction| &friction.points) {
+        if !nodes.insert(point.node) {
+            return Err(Error::Refused(format!(
+                "friction at {:?} m: two boundaries with friction meet at an edge there, and both would act along it; give \
+                 friction to one of them only, or round the edge",
+                mesh.nodes[point.node]
+            )));
+        }
+    }
+    Ok(nodes)
 }

@@ -25,7 +25,7 @@ pub use material::{
 };
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
-pub use time::{Accept, Adaptive, Method, Preconditioner, Scheme, Solver, Time};
+pub use time::{Accept, Adaptive, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time};
 
 use std::collections::BTreeMap;
 

@@ -74,6 +74,8 @@ pub struct Solver {
     /// Newton iterations after which a step counts as failed.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
+    /// How friction bounds that follow the contact pressure find it.
+    pub friction: FrictionIteration,
     /// Warnings that should not stop the run.
     pub accept: Vec<Accept>,
     /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
@@ -89,6 +91,7 @@ impl Default for Solver {
             method: Method::Newton,
             preconditioner: Preconditioner::Auto,
             max_newton_iterations: 50,
+            friction: FrictionIteration::Newton,
             accept: Vec::new(),
             petsc: BTreeMap::new(),
         }
@@ -120,6 +123,17 @@ pub enum Preconditioner {
     Gamg,
     /// Hypre's algebraic multigrid.
     Boomeramg,
+}
+
+/// How friction bounds that follow the contact pressure find it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FrictionIteration {
+    /// Within Newton's method, whose linear systems are then not symmetric; the fixed point is the way out where it fails.
+    #[default]
+    Newton,
+    /// Around Newton's method, which sees given bounds, until they no longer change.
+    FixedPoint,
 }
 
 /// A refusal that the user takes upon himself.

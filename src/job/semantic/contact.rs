@@ -42,11 +42,15 @@ fn check_method(findings: &mut Findings<'_>) {
     }
 }
 
-/// Gauss points know neither jumps nor the displacement.
+/// Gauss points know neither jumps nor the displacement nor friction.
 fn check_quadrature(findings: &mut Findings<'_>, contact: &str) {
     let root = findings.root;
     if root.read::<Quadrature>(&format!("{contact}.quadrature")) != Some(Quadrature::Gauss) {
         return;
+    }
+    if root.find(&format!("{contact}.friction")).is_some() {
+        let message = "friction does not act at Gauss points";
+        findings.fault(&format!("{contact}.quadrature"), message, "use \"nodal\", or leave the key out");
     }
     let graph: Option<Graph> = root.read(&format!("{contact}.normal.graph"));
     let jumps = graph.is_some_and(|graph| graph.points.windows(2).any(|pair| pair[0][0] == pair[1][0]));

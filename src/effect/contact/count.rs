@@ -1,0 +1,73 @@
+//! Contact points by what happens there.
+
+use super::{
+    Contact,
+    friction::{Friction, Motion},
+    point::Unknown,
+};
+
+/// Branches of normal laws that are told apart; the last takes in all that follow.
+const BRANCHES: usize = 8;
+
+/// How many numbers a [`PointCount`] is.
+pub const COUNTS: usize = BRANCHES + 5;
+
+/// Points of contact boundaries by what happens there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PointCount {
+    /// On a vertical part of the normal graph: at rest in a jump, or held by an obstacle.
+    pub held: usize,
+    /// Without pressure.
+    pub open: usize,
+    /// On each branch of the normal law, in the order of velocity; the last entry takes in all that follow.
+    pub branches: [usize; BRANCHES],
+    /// With friction and at rest under it.
+    pub sticking: usize,
+    /// With friction and sliding.
+    pub slipping: usize,
+    /// With friction whose bound follows a pressure that is not there.
+    pub separated: usize,
+}
+
+impl PointCount {
+    /// As an array, for sums over ranks.
+    pub fn to_array(self) -> [f64; COUNTS] {
+        let mut out = [0.0; COUNTS];
+        let numbers = [self.held, self.open, self.sticking, self.slipping, self.separated];
+        out.iter_mut().zip(numbers.into_iter().chain(self.branches)).for_each(|(o, n)| *o = n as f64);
+        out
+    }
+
+    /// Back from the array.
+    pub fn from_array(numbers: [f64; COUNTS]) -> Self {
+        let [held, open, sticking, slipping, separated, branches @ ..] = numbers.map(|n| n as usize);
+        Self { held, open, branches, sticking, slipping, separated }
+    }
+}
+
+impl<const D: usize> Contact<D> {
+    /// Counts the points here by what happens there.
+    pub fn count(&self, velocity: &[f64]) -> PointCount {
+        let mut count = PointCount::default();
+        for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {
+            count.open += usize::from(point.pressure_at(&self.law, velocity) == 0.0);
+            let along = point.normal_component(velocity);
+            let branch = if point.unknown == Unknown::Parameter {
+                let found = self.law.resolve(self.scale * along + point.pressure, self.scale, point.context);
+                count.held += usize::from(found.derivative == 0.0);
+                found.branch
+            } else {
+                self.law.branch(along, point.context)
+            };
+            count.branches[branch.min(BRANCHES - 1)] += 1;
+        }
+        for motion in self.friction.iter().flat_map(|f: &Friction<D>| f.motions(velocity)) {
+            match motion {
+                Motion::Sticks => count.sticking += 1,
+                Motion::Slides => count.slipping += 1,
+                Motion::Separated => count.separated += 1,
+            }
+        }
+        count
+    }
+}

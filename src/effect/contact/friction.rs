@@ -1,0 +1,424 @@
+//! Friction at the nodal points of a contact boundary.
+//!
+//! Along the tangents of a point the unknown of a step is the parameter `s = c v + q` of the friction law's radial graph, over
+//! `c`; `v` is the sliding velocity and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
+//!
+//! ```text
+//! v = V(|s|, p) e                      dv = (V' e e^T + V / |s| (I - e e^T)) ds + V_p e dp
+//! q = s - c v                          dq = ds - c dv
+//! ```
+//!
+//! `p` is the contact pressure, which the bound follows in Newton's method, or a pressure that the fixed-point iteration
+//! holds. In terms of `dv`, where a point slides, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; where it sticks
+//! `dv = 0`. Where the normal graph is vertical, `dp` is what the normal equation of the node leaves open: `mu e` times that
+//! equation is taken from the tangential ones ([`Friction::reduce`]).
+
+use super::point::{Point, Unknown};
+use crate::{
+    contact::FrictionLaw,
+    error::{Error, Result},
+    mesh::Mesh,
+    tensor::{Vector, dot, norm},
+};
+
+/// A length below which a direction is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// A friction law with its points.
+#[derive(Debug)]
+pub(super) struct Friction<const D: usize> {
+    pub law: FrictionLaw,
+    /// `c` in the parameter `s = c v + q`, in Pa s/m.
+    pub scale: f64,
+    /// Whether the bound follows the pressure while a step is solved.
+    pub follows: bool,
+    pub points: Vec<TangentialPoint<D>>,
+}
+
+/// The tangential side of a nodal point.
+#[derive(Debug, Clone)]
+pub(super) struct TangentialPoint<const D: usize> {
+    /// Its number among the points of the contact.
+    pub at: usize,
+    pub node: usize,
+    weight: f64,
+    /// Orthonormal; `count` of them are used.
+    tangents: [Vector<D>; D],
+    count: usize,
+    /// The contact pressure in Pa that the bound goes by.
+    pub pressure: f64,
+    /// `q` in Pa at the last evaluation.
+    pub traction: Vector<D>,
+    /// The last linearisation.
+    tangent: Tangent<D>,
+    /// Change of `q` along the last direction.
+    change: Vector<D>,
+}
+
+/// The derivative at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Tangent<const D: usize> {
+    sticks: bool,
+    /// `e`.
+    toward: Vector<D>,
+    /// `c V'` and `c V / |s|`.
+    theta: [f64; 2],
+    /// `g'` and `g / V`.
+    slopes: [f64; 2],
+    /// `mu`: change of the bound with the contact pressure, if it follows that.
+    coefficient: f64,
+}
+
+/// What happens at a point with friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Motion {
+    Sticks,
+    Slides,
+    /// The law's bound follows a pressure that is not there.
+    Separated,
+}
+
+impl<const D: usize> Tangent<D> {
+    fn free() -> Self {
+        Self { sticks: false, toward: [0.0; D], theta: [1.0; 2], slopes: [0.0; 2], coefficient: 0.0 }
+    }
+}
+
+impl<const D: usize> Friction<D> {
+    /// Puts the law on the points of a contact; refuses supports that leave no clear tangent, or no pressure.
+    pub fn new(law: FrictionLaw, points: &[Point<D>], mesh: &Mesh<D>, fixed: &[bool]) -> Result<Self> {
+        let mut out = Vec::new();
+        for (at, point) in points.iter().enumerate() {
+            let node = point.node();
+            let axes = (0..D).filter(|i| !fixed[node * D + i]);
+            let free: Vec<Vector<D>> =
+                axes.map(|axis| std::array::from_fn(|i| f64::from(u8::from(i == axis)))).collect();
+            if free.is_empty() {
+                continue;
+            }
+            let (held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
+            if held && law.follows_pressure() {
+                return Err(Error::Refused(format!(
+                    "friction at {place:?} m: a support holds the normal of the contact there and carries its pressure, so \
+                     that the bound of this friction law is not known; free the normal component there, or use tresca"
+                )));
+            }
+            if !held && point.stretch < 1.0 - ROUNDING {
+                return Err(Error::Refused(format!(
+                    "friction at {place:?} m: a support holds a component that is neither along the normal of the contact \
+                     nor square to it, so that no free direction is a tangent; hold all components there, or none"
+                )));
+            }
+            let (tangents, count) = span_without(&free, &[point.direction]);
+            out.push(TangentialPoint {
+                at,
+                node,
+                weight: point.weight,
+                tangents,
+                count,
+                pressure: 0.0,
+                traction: [0.0; D],
+                tangent: Tangent::free(),
+                change: [0.0; D],
+            });
+        }
+        Ok(Self { law, scale: 1.0, follows: law.follows_pressure(), points: out })
+    }
+
+    /// Forgets points that have no tangent.
+    pub fn keep_points_with_tangents(&mut self) {
+        self.points.retain(|point| point.count > 0);
+    }
+
+    /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
+    pub fn recall(&mut self, points: &[Point<D>], traction: &[f64]) {
+        for point in &mut self.points {
+            point.traction = point.along(traction);
+            point.pressure = points[point.at].pressure;
+        }
+    }
+
+    /// Goes by the pressures of `points` from now on.
+    pub fn take_pressures(&mut self, points: &[Point<D>]) {
+        self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
+    }
+
+    /// Turns velocities into unknowns.
+    pub fn unmap(&self, values: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(1.0 / self.scale, &point.traction, values));
+    }
+
+    /// Turns unknowns into velocities, after `points` took their pressures.
+    pub fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
+        let (law, scale) = (self.law, self.scale);
+        if self.follows {
+            self.take_pressures(points);
+        }
+        for point in &mut self.points {
+            let unknown = point.along(values);
+            let length = norm(&unknown);
+            let found = law.resolve(scale * length, scale, point.pressure);
+            let shares =
+                if length > 0.0 { [found.speed / length, found.traction / length] } else { [0.0; 2] };
+            point.traction = unknown.map(|x| shares[1] * x);
+            // In two terms, so that a point that sticks has no velocity whatever the rounding.
+            let back = unknown.map(|x| shares[0] * x);
+            point.set(&back, values);
+        }
+    }
+
+    /// Takes the derivative of the law at these unknowns, after `points` took their pressures.
+    pub fn linearise(&mut self, values: &[f64]) {
+        let (law, scale) = (self.law, self.scale);
+        for point in &mut self.points {
+            let unknown = point.along(values);
+            let length = norm(&unknown);
+            let found = law.resolve(scale * length, scale, point.pressure);
+            point.tangent = if found.derivative == 0.0 {
+                Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
+            } else if length == 0.0 || found.speed == 0.0 {
+                // Without a bound, at rest.
+                Tangent::free()
+            } else {
+                Tangent {
+                    sticks: false,
+                    toward: unknown.map(|x| x / length),
+                    theta: [scale * found.derivative, found.speed / length],
+                    slopes: [found.slope, found.traction / found.speed],
+                    coefficient: if self.follows { found.coefficient } else { 0.0 },
+                }
+            };
+        }
+    }
+
+    /// Turns a change of the unknowns into the change of the velocities, after `points` took the change of pressures.
+    pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
+        let scale = self.scale;
+        for point in &mut self.points {
+            let unknown = point.along(values);
+            let Tangent { toward, theta, coefficient, .. } = point.tangent;
+            let ahead = dot(&toward, &unknown);
+            let pressed = coefficient * points[point.at].change / scale;
+            let velocity: Vector<D> = std::array::from_fn(|i| {
+                theta[1] * (unknown[i] - ahead * toward[i]) + theta[0] * (ahead - pressed) * toward[i]
+            });
+            point.change = std::array::from_fn(|i| scale * (unknown[i] - velocity[i]));
+            point.set(&velocity, values);
+        }
+    }
+
+    /// Adds the forces of the last evaluation.
+    pub fn add_forces(&self, forces: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(point.weight, &point.traction, forces));
+    }
+
+    /// Adds the change of the forces along the last direction.
+    pub fn add_derivative(&self, forces: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(point.weight, &point.change, forces));
+    }
+
+    /// Adds the tractions to nodal values.
+    pub fn add_tractions(&self, nodal: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(1.0, &point.traction, nodal));
+    }
+
+    /// Adds the change of the forces with the velocity where points slide; nothing of the pressure of vertical graphs.
+    pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
+        for point in self.points.iter().filter(|p| !p.tangent.sticks) {
+            let normal = &points[point.at];
+            let pressed = normal.slope * normal.along(direction);
+            point.add(point.weight, &point.sliding_change(direction, pressed), forces);
+        }
+    }
+
+    /// Takes the normal equations of nodes with a vertical normal graph from the tangential ones, where the bound follows
+    /// the pressure.
+    pub fn reduce(&self, points: &[Point<D>], values: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
+            let normal = &points[point.at];
+            if normal.theta == 0.0 {
+                let open = normal.along(values);
+                point.add(-point.tangent.coefficient * open, &point.tangent.toward, values);
+            }
+        }
+    }
+
+    /// Removes from nodal values what moves points that stick.
+    pub fn project(&self, values: &mut [f64]) {
+        self.points.iter().filter(|p| p.tangent.sticks).for_each(|point| point.set(&[0.0; D], values));
+    }
+
+    /// Turns a change of velocities into the change of the unknowns, after that was done along the normals.
+    pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
+        for point in &self.points {
+            if point.tangent.sticks {
+                let open = point.along(open);
+                point.set(&open.map(|force| force / (self.scale * point.weight)), values);
+            } else {
+                let normal = &points[point.at];
+                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(values);
+                point.add(1.0 / self.scale, &point.sliding_change(values, pressed), values);
+            }
+        }
+    }
+
+    /// Whether, at the last linearisation, some point slides under a bound that follows the pressure.
+    pub fn is_coupled(&self) -> bool {
+        self.points.iter().any(|p| p.tangent.coefficient > 0.0)
+    }
+
+    /// What the last linearisation is made of, to tell it from others.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
+    }
+
+    /// Largest fall of the graphs of all points in Pa s/m, at the pressures the bounds go by.
+    pub fn steepest_fall(&self) -> f64 {
+        let most = self.points.iter().fold(0.0, |most, point| f64::max(most, point.pressure));
+        self.law.steepest_fall() * most
+    }
+
+    /// What happens at each point.
+    pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
+        self.points.iter().map(|point| {
+            if self.law.follows_pressure() && point.pressure <= 0.0 {
+                return Motion::Separated;
+            }
+            let sliding = point.along(velocity);
+            let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
+            let found = self.law.resolve(norm(&parameter), self.scale, point.pressure);
+            if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }
+        })
+    }
+
+    /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
+    pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
+        // Points are ordered by node, at most one a node.
+        let found = self.points.binary_search_by_key(&node, |point| point.node);
+        found.map_or([0.0; D], |at| self.points[at].along(nodal))
+    }
+
+    /// Work in W of friction against these velocities.
+    pub fn power(&self, velocity: &[f64]) -> f64 {
+        self.points.iter().map(|p| p.weight * dot(&p.traction, &p.along(velocity))).sum()
+    }
+
+    /// Largest sliding velocity and largest traction or bound at points here.
+    pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
+        self.points.iter().fold([0.0; 2], |[v, q], point| {
+            let bound = self.law.bound(0.0, points[point.at].pressure);
+            [v.max(norm(&point.along(velocity))), q.max(norm(&point.traction)).max(bound)]
+        })
+    }
+
+    /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
+    /// `range`; at most by a factor of the square root of 2 too large. `residual` holds the open forces in N.
+    pub fn inclusion_residual(
+        &self,
+        points: &[Point<D>],
+        velocity: &[f64],
+        residual: &[f64],
+        range: [f64; 2],
+    ) -> f64 {
+        let range = [range[0].max(range[1] / self.scale), range[1].max(self.scale * range[0])];
+        let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let distance = |point: &TangentialPoint<D>| {
+            let (sliding, open) = (point.along(velocity), point.along(residual));
+            let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
+            let pressure = points[point.at].pressure;
+            let (speed, size) = (norm(&sliding), norm(&traction));
+            let beyond = (size - self.law.bound(0.0, pressure)).max(0.0);
+            let to_rest = (speed / speeds).hypot(beyond / tractions);
+            if speed == 0.0 {
+                return to_rest;
+            }
+            let bound = self.law.bound(speed, pressure) / speed;
+            let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
+            to_rest.min(norm(&off) / tractions)
+        };
+        self.points.iter().map(distance).fold(0.0, f64::max)
+    }
+
+    /// Adds a unit velocity along the first tangent of each point to nodal values.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(1.0, &point.tangents[0], nodal));
+    }
+
+    /// `integral of w_tau^2` over the points here.
+    pub fn square(&self, nodal: &[f64]) -> f64 {
+        self.points.iter().map(|p| p.weight * p.along(nodal).iter().map(|x| x * x).sum::<f64>()).sum()
+    }
+}
+
+impl<const D: usize> TangentialPoint<D> {
+    /// Gives up what is not orthogonal to this direction.
+    pub fn give_up(&mut self, direction: &Vector<D>) {
+        let mut along = [0.0; D];
+        for tangent in &self.tangents[..self.count] {
+            let share = dot(tangent, direction);
+            (0..D).for_each(|i| along[i] += share * tangent[i]);
+        }
+        let size = norm(&along);
+        if size > ROUNDING {
+            let along = along.map(|x| x / size);
+            (self.tangents, self.count) = span_without(&self.tangents[..self.count], &[along]);
+        }
+    }
+
+    /// The part of a nodal value along the tangents.
+    fn along(&self, nodal: &[f64]) -> Vector<D> {
+        let value = &nodal[self.node * D..][..D];
+        let mut out = [0.0; D];
+        for tangent in &self.tangents[..self.count] {
+            let along: f64 = (0..D).map(|i| tangent[i] * value[i]).sum();
+            (0..D).for_each(|i| out[i] += along * tangent[i]);
+        }
+        out
+    }
+
+    /// Adds to a nodal value.
+    fn add(&self, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
+        let target = &mut nodal[self.node * D..][..D];
+        (0..D).for_each(|i| target[i] += factor * vector[i]);
+    }
+
+    /// Replaces the part of a nodal value along the tangents.
+    fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
+        let now = self.along(nodal);
+        let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
+        self.add(1.0, &change, nodal);
+    }
+
+    /// Change of the traction at a point that slides, with a change of the velocity and of the pressure.
+    fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
+        let Tangent { toward, slopes, coefficient, .. } = self.tangent;
+        let velocity = self.along(direction);
+        let ahead = dot(&toward, &velocity);
+        std::array::from_fn(|i| {
+            slopes[1] * (velocity[i] - ahead * toward[i])
+                + (slopes[0] * ahead + coefficient * pressed) * toward[i]
+        })
+    }
+}
+
+/// An orthonormal basis of what these orthonormal vectors span, without these orthonormal or zero directions.
+fn span_without<const D: usize>(vectors: &[Vector<D>], directions: &[Vector<D>]) -> ([Vector<D>; D], usize) {
+    let (mut basis, mut count) = ([[0.0; D]; D], 0);
+    for vector in vectors {
+        let mut left = *vector;
+        // Twice, so that what is left is orthogonal to rounding.
+        for _ in 0..2 {
+            for known in directions.iter().chain(&basis[..count]) {
+                let along = dot(known, &left);
+                (0..D).for_each(|i| left[i] -= along * known[i]);
+            }
+        }
+        // Of D vectors, those that lack a dimension of their span can't all be shorter than this.
+        let size = norm(&left);
+        if size > 0.9 / (D as f64).sqrt() {
+            basis[count] = left.map(|x| x / size);
+            count += 1;
+        }
+    }
+    (basis, count)
+}

@@ -1,0 +1,154 @@
+//! Friction: closed forms of blocks that slide, stop and stick, and what a job with friction leaves.
+
+use crate::{
+    case::Case,
+    results::{Results, Table, assert_same_answer, relative_difference},
+};
+
+const GRAVITY: f64 = 9.81;
+
+fn centre(results: &Results) -> Table {
+    results.table("probes.csv").only("probe", "centre")
+}
+
+#[test]
+fn a_block_slides_to_a_stop_after_the_distance_and_time_of_a_mass_point_and_stays() {
+    let deceleration = 0.5 * GRAVITY;
+    let (distance, time) = (0.5 / deceleration, 1.0 / deceleration);
+    let mut misses = Vec::new();
+    for step in [0.002, 0.001] {
+        let probes = "[{name = 'centre', point = [0.2, 0.05]}, {name = 'foot', point = [0.2, 0]}]";
+        let case = Case::of("sliding_block").set("time.step", &step.to_string()).set("output.probe", probes);
+        let results = case.run(1);
+        let foot = results.table("probes.csv").only("probe", "foot");
+        let (times, velocities) = (foot.numbers("time"), foot.numbers("velocity_x"));
+        for (t, v) in times.iter().zip(velocities) {
+            if *t > time + step {
+                assert!(v.abs() < 1e-15, "its foot moves with {v} m/s at {t} s");
+            }
+            if *t < time - step {
+                assert!((v - (1.0 - deceleration * t)).abs() < 1e-3, "{v} m/s at {t} s");
+            }
+        }
+        let rest = centre(&results).last("velocity_x");
+        assert!(rest.abs() < 1e-7, "it creeps with {rest} m/s");
+        misses.push(distance - centre(&results).last("displacement_x"));
+        assert!(results.number("max_energy_imbalance") < 1e-10);
+        let dissipated = results.table("history.csv").last("contact_dissipation");
+        assert!(
+            (dissipated / 20.0 - 1.0).abs() < 0.01,
+            "{dissipated} J of kinetic energy went into friction"
+        );
+    }
+    assert!((misses[0] - 0.001).abs() < 2e-4 && (misses[1] - 0.0005).abs() < 1e-4, "first order: {misses:?}");
+}
+
+#[test]
+fn a_pushed_block_sticks_just_below_the_bound_and_speeds_up_just_above() {
+    let bound = 0.5 * GRAVITY * 1000.0;
+    let pushed = |share: f64| {
+        Case::of("sliding_block")
+            .set("initial.velocity", "[0, 0]")
+            .set("body_force", &format!("[{{ value = [{}, {}] }}]", share * bound, -1000.0 * GRAVITY))
+            .run_and_keep(1)
+    };
+    let below = centre(&pushed(0.98).results()).last("velocity_x");
+    assert!(below.abs() < 2e-4, "{below}");
+    let (above, expected) = (centre(&pushed(1.02).results()).last("velocity_x"), 0.02 * 0.5 * GRAVITY * 0.25);
+    assert!((above / expected - 1.0).abs() < 0.02, "{above} instead of {expected}");
+}
+
+#[test]
+fn friction_keeps_the_direction_of_sliding_in_space() {
+    let probes = centre(&Case::of("oblique_sliding").run(2));
+    for (time, (x, y)) in probes
+        .numbers("time")
+        .iter()
+        .zip(probes.numbers("velocity_x").iter().zip(probes.numbers("velocity_y")))
+    {
+        let expected = 0.5 - 0.2 * time;
+        assert!(
+            (x - 0.8 * expected).abs() < 1e-4 && (y - 0.6 * expected).abs() < 1e-4,
+            "{x} {y} at {time} s"
+        );
+    }
+}
+
+#[test]
+fn friction_gives_the_same_answer_on_any_number_of_ranks() {
+    for (job, end) in [("sliding_block", "0.21"), ("oblique_sliding", "0.5"), ("slip_weakening_block", "2.8")]
+    {
+        let make = || Case::of(job).set("time.end", end).set("solver.tolerance", "1e-11");
+        let alone = make().run_and_keep(1);
+        for ranks in [2, 3] {
+            let other = make().run_and_keep(ranks);
+            let what = format!("{job} on {ranks} ranks");
+            assert_same_answer(&alone.results(), &other.results(), 1e-7, &what);
+        }
+    }
+}
+
+#[test]
+fn the_fixed_point_finds_what_newtons_method_finds() {
+    for (job, end) in [("sliding_block", "0.21"), ("slip_weakening_block", "2.8")] {
+        let make = || Case::of(job).set("time.end", end);
+        let newton = make().run_and_keep(1);
+        let fixed = make().set("solver.friction", "'fixed_point'").run_and_keep(1);
+        assert_same_answer(&newton.results(), &fixed.results(), 1e-6, job);
+        assert!(fixed.results().number("newton_iterations") > newton.results().number("newton_iterations"));
+    }
+}
+
+#[test]
+fn a_job_with_friction_says_so_and_one_without_has_nothing_of_it() {
+    let with = Case::of("oblique_sliding").set("time.end", "0.1").run_and_keep(1);
+    let without =
+        Case::of("oblique_sliding").set("time.end", "0.1").without("contact.0.friction").run_and_keep(1);
+    let (a, b) = (with.results(), without.results());
+    let effects =
+        |r: &Results| r.summary()["effects"].as_array().expect("a list").contains(&"friction".into());
+    assert!(effects(&a) && !effects(&b));
+    assert_eq!(a.summary()["inventory"]["friction_points"], 20);
+    assert_eq!(b.summary()["inventory"]["friction_points"], 0);
+    let columns = a.table("profiles.csv").columns;
+    assert_eq!(
+        columns[6..],
+        [
+            "normal_velocity",
+            "contact_pressure",
+            "friction_traction_x",
+            "friction_traction_y",
+            "friction_traction_z"
+        ]
+    );
+    assert_eq!(b.table("profiles.csv").columns.len(), 8);
+    let size = |r: &Results, c: &str| r.table("profiles.csv").last(c);
+    assert!((size(&a, "friction_traction_x").hypot(size(&a, "friction_traction_y")) - 20.0).abs() < 1e-6);
+    assert!(a.text("run.log").contains("slipping 20  ") && !b.text("run.log").contains("slipping"));
+    assert!(b.table("history.csv").last("contact_dissipation").abs() < 1e-9);
+}
+
+#[test]
+fn friction_that_can_not_be_right_is_refused_in_words() {
+    let block = || Case::of("sliding_block");
+    let held = |on: &str, fix: &str| block().set("support", &format!("[{{ on = ['{on}'], fix = {fix} }}]"));
+    held("left", "['y']").run_with(1, &[]).expect(2).says("a support holds the normal of the contact there");
+    held("left", "'all'").set("time.end", "0.002").run(1);
+    let brick = Case::of("oblique_sliding").set("contact.0.on", "['bottom', 'left']");
+    brick.run_with(2, &[]).expect(2).says("two boundaries with friction meet at an edge there");
+}
+
+#[test]
+fn friction_and_another_contact_share_an_edge() {
+    let channel = "[{ on = ['bottom'], normal.unilateral = {}, friction.tresca.bound = 20 }, \
+                    { on = ['left', 'right'], normal.unilateral = { gap = 0 } }]";
+    let case = Case::of("oblique_sliding")
+        .set("contact", channel)
+        .set("initial.velocity", "[0, 0.5, 0]")
+        .set("output.profile", "[{ on = 'bottom' }]");
+    let results = case.run(2);
+    let found = centre(&results).last("velocity_y");
+    assert!((found - 0.3).abs() < 1e-3, "{found}");
+    let tractions = results.table("profiles.csv").numbers("friction_traction_y");
+    assert!(relative_difference(&tractions[tractions.len() - 20..], &[20.0; 20]) < 0.01);
+}
