@@ -2,8 +2,9 @@
 
 use super::{
     colour::{Colour, Shades, VIRIDIS, dimmed, hex},
+    frame::{Frame, colour_bar},
     paint::{Edges, Triangle, paint},
-    picture::{LETTERS, Picture, WIDTH, open_svg, text},
+    picture::{Picture, open_svg, text},
     scale::{Scale, extent, number},
     view::{Face, View, faces, outline},
 };
@@ -12,9 +13,6 @@ use std::fmt::Write;
 
 /// Displacements are drawn at most this large, as a share of the body.
 const VISIBLE: f64 = 0.12;
-const TALLEST: f64 = 620.0;
-const LEFT: f64 = 56.0;
-const TOP: f64 = 54.0;
 
 /// The body as it is drawn.
 pub struct Body<'a> {
@@ -38,14 +36,6 @@ pub struct Coloured<'a> {
     pub unit: &'a str,
     /// Its shades.
     pub shades: Shades,
-}
-
-/// Where the body stands in a drawing.
-struct Frame {
-    low: [f64; 2],
-    zoom: f64,
-    width: f64,
-    height: f64,
 }
 
 impl<'a> Body<'a> {
@@ -205,16 +195,8 @@ impl<'a> Body<'a> {
             let bodies = self.places.iter().chain(&self.snapshot.nodes).map(flat);
             bodies.chain(points.iter().copied())
         };
-        let [(left, width), (bottom, height)] = [0, 1].map(|axis| {
-            let (low, high) = extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0));
-            (low, (high - low).max(f64::MIN_POSITIVE))
-        });
-        let below = 3.2 * LETTERS;
-        let room = [WIDTH - LEFT - right, TALLEST - TOP - below];
-        let zoom = (room[0] / width).min(room[1] / height);
-        let tall = (zoom * height).max(if right > 60.0 { 190.0 } else { 60.0 });
-        let low = [left - 0.5 * (room[0] / zoom - width), bottom - 0.5 * (tall / zoom - height)];
-        Frame { low, zoom, width: room[0], height: TOP + tall + below }
+        let ranges = [0, 1].map(|axis| extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0)));
+        Frame::around(ranges, right)
     }
 
     /// Axes and the undeformed outline of a plane body; directions of the axes in space.
@@ -236,31 +218,7 @@ impl<'a> Body<'a> {
             }
             out.push_str("\"/>\n");
         }
-        let floor = frame.height - 3.2 * LETTERS;
-        let across = frame.scale(0, frame.width);
-        let up = frame.scale(1, floor - TOP);
-        out.push_str("<g stroke=\"#555\" fill=\"none\">");
-        let _ = write!(out, "<path d=\"M{LEFT} {TOP}V{floor:.1}H{:.1}\"/>", LEFT + frame.width);
-        let tick = |scale: &Scale, value: f64| value / scale.factor;
-        for (value, _) in &across.ticks {
-            let x = frame.place([tick(&across, *value), 0.0])[0];
-            let _ = write!(out, "<path d=\"M{x:.1} {floor:.1}v5\"/>");
-        }
-        for (value, _) in &up.ticks {
-            let y = frame.place([0.0, tick(&up, *value)])[1];
-            let _ = write!(out, "<path d=\"M{LEFT} {y:.1}h-5\"/>");
-        }
-        out.push_str("</g>\n");
-        for (value, word) in &across.ticks {
-            out += &text(frame.place([tick(&across, *value), 0.0])[0], floor + 1.3 * LETTERS, "middle", word);
-        }
-        for (value, word) in &up.ticks {
-            let y = frame.place([0.0, tick(&up, *value)])[1];
-            out += &text(LEFT - 9.0, y + 0.35 * LETTERS, "end", word);
-        }
-        out +=
-            &text(LEFT + 0.5 * frame.width, frame.height - 8.0, "middle", &across.words(self.axes[0], "m"));
-        out + &text(6.0, TOP - 14.0, "start", &up.words(self.axes[1], "m"))
+        out + &frame.axes(self.axes)
     }
 
     fn directions(&self, frame: &Frame) -> String {
@@ -280,41 +238,6 @@ impl<'a> Body<'a> {
         }
         out
     }
-}
-
-impl Frame {
-    fn place(&self, point: [f64; 2]) -> [f64; 2] {
-        let floor = self.height - 3.2 * LETTERS;
-        [LEFT + self.zoom * (point[0] - self.low[0]), floor - self.zoom * (point[1] - self.low[1])]
-    }
-
-    fn scale(&self, axis: usize, length: f64) -> Scale {
-        let high = self.low[axis] + length / self.zoom;
-        Scale::linear([self.low[axis], high].into_iter(), false)
-    }
-}
-
-/// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
-/// name of the picture keeps them apart.
-fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
-    let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
-    let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
-    for stop in 0..=16 {
-        let share = f64::from(stop) / 16.0;
-        let _ = write!(out, "<stop offset=\"{share}\" stop-color=\"{}\"/>", hex(shades.at(share)));
-    }
-    let _ = writeln!(
-        out,
-        "</linearGradient></defs>\n<rect x=\"{x}\" y=\"{top}\" width=\"20\" height=\"{:.1}\" stroke=\"#555\" \
-         fill=\"url(#{name}-shades)\"/>",
-        bottom - top
-    );
-    for (value, word) in &scale.ticks {
-        let y = bottom - (bottom - top) * (value - scale.low) / (scale.high - scale.low);
-        let _ = writeln!(out, "<path stroke=\"#555\" d=\"M{} {y:.1}h5\"/>", x + 20.0);
-        out += &text(x + 29.0, y + 0.35 * LETTERS, "start", word);
-    }
-    out + &text(WIDTH - 6.0, TOP - 14.0, "end", words)
 }
 
 fn size(snapshot: &Snapshot) -> f64 {

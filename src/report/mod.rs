@@ -11,6 +11,7 @@ mod chart;
 mod colour;
 mod facts;
 mod found;
+mod frame;
 mod history;
 mod law;
 mod markup;
