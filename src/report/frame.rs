@@ -2,7 +2,7 @@
 
 use super::{
     colour::{Shades, hex},
-    picture::{LETTERS, WIDTH, text},
+    picture::{LETTERS, WIDTH, plain_name, text},
     scale::Scale,
 };
 use std::fmt::Write;
@@ -46,6 +46,7 @@ impl Frame {
 
     /// Axes of a plane drawing with these names.
     pub fn axes(&self, names: [&str; 2]) -> String {
+        // Writing to a String cannot fail.
         let mut out = String::new();
         let floor = self.height - 3.2 * LETTERS;
         let across = self.scale(0, self.width);
@@ -77,6 +78,7 @@ impl Frame {
 /// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
 /// name of the picture keeps them apart.
 pub fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
+    let name = plain_name(name);
     let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
     let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
     for stop in 0..=16 {

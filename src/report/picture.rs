@@ -30,8 +30,7 @@ pub struct Picture {
 impl Picture {
     /// A drawing with its words; the name is made fit for a file.
     pub fn new(name: &str, alt: impl Into<String>, caption: impl Into<String>, svg: String) -> Self {
-        let name =
-            name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect();
+        let name = plain_name(name);
         Self { name, alt: alt.into(), caption: caption.into(), svg }
     }
 
@@ -63,6 +62,11 @@ impl Picture {
         resvg::render(&tree, zoom, &mut pixels.as_mut());
         pixels.encode_png().map_err(|error| fault(error.to_string()))
     }
+}
+
+/// A name fit for a file and for an id of a page.
+pub fn plain_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
 }
 
 /// The opening tag of a drawing of this height.
