@@ -38,6 +38,7 @@ const ITERATIONS: usize = 60;
 
 /// Constants of the problem; null where they have no meaning.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Certificates {
     /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
     pub theta: Option<f64>,
