@@ -4,6 +4,7 @@ use crate::{
     error::{Error, Exit, Result},
     job::{self, Job, Loaded},
     output::{inspect::inspect, parallel_file::given_up},
+    report::report,
     run::{self, Clock, Start},
     session::{Mpi, Session},
     study,
@@ -139,7 +140,7 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
         Some(Command::Study { study, overrides, ablate }) => run_study(&study, &overrides, ablate),
-        Some(Command::Report { .. }) => Err(Error::Refused("solver report is not available yet".into())),
+        Some(Command::Report { folder }) => report_on(&folder),
         None => match &cli.run {
             Some(arguments) => run_job(arguments),
             None => Err(Error::Refused("name a job file; see solver --help".into())),
@@ -230,6 +231,30 @@ fn say(text: &str) -> Result<Exit> {
 /// Prints; a closed pipe is no fault.
 fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+}
+
+/// Makes a report on one process; under a launcher the others wait for its outcome, so that all end alike.
+fn report_on(folder: &Path) -> Result<Exit> {
+    let make = || {
+        let made = report(folder)?;
+        for missing in &made.missing {
+            let _ = writeln!(std::io::stderr(), "missing: {}", missing.trim_end());
+        }
+        print(&format!("{} with {} pictures", made.page.display(), made.pictures));
+        Ok(Exit::Done)
+    };
+    if launched_rank().is_none() {
+        return make();
+    }
+    let mpi = Mpi::start()?;
+    let session = mpi.session()?;
+    let outcome = session.agree(if session.is_first() { make() } else { Ok(Exit::Done) });
+    Ok(outcome.unwrap_or_else(|error| {
+        if !matches!(error, Error::Elsewhere { .. }) {
+            print_error(&error);
+        }
+        error.exit()
+    }))
 }
 
 fn run_job(arguments: &RunArguments) -> Result<Exit> {

@@ -22,4 +22,5 @@ pub mod certificate;
 pub mod output;
 pub mod run;
 pub mod study;
+pub mod report;
 pub mod cli;

@@ -32,7 +32,7 @@ use crate::{
     stepping::Stepper,
 };
 use ascent::{Quotient, climb};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Relative change at which a supremum counts as found.
 const TOLERANCE: f64 = 1e-5;
@@ -40,7 +40,8 @@ const TOLERANCE: f64 = 1e-5;
 const ITERATIONS: usize = 60;
 
 /// Constants of the problem; null where they have no meaning.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Certificates {
     /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
     pub theta: Option<f64>,

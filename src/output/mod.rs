@@ -8,6 +8,7 @@ pub mod csv;
 mod field;
 pub mod field_output;
 mod field_slab;
+pub mod field_snapshot;
 pub mod fields;
 pub mod history;
 pub mod hyperslab;

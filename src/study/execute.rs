@@ -70,7 +70,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
 /// One run; the PETSc options it asks for are taken back, so that the next one starts like it. Collective.
 fn run_once(session: &Session, planned: &Planned) -> Result<Exit> {
     let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
-    let ended = run::run(session, planned.loaded.clone(), &Start::Anew, clock);
+    let ended = run::run(session, planned.loaded.clone(), &Start::Over, clock);
     for name in planned.loaded.job.solver.petsc.keys() {
         session.agree(clear_option(name))?;
     }

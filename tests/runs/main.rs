@@ -1,6 +1,7 @@
 //! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
 
 mod adaptive;
+mod browser;
 mod case;
 mod certificates;
 mod check_values;
@@ -15,6 +16,7 @@ mod outputs;
 mod ranks;
 mod readers;
 mod regions;
+mod report;
 mod restart;
 mod results;
 mod schemes;

@@ -1,0 +1,120 @@
+//! The mesh and the newest fields of a `fields.vtkhdf`, read in one process, without MPI.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// The body and its fields at the last time in the file.
+#[derive(Debug, Clone, Default)]
+pub struct Snapshot {
+    /// Its time in s; 0 where the file has no steps yet.
+    pub time: f64,
+    /// Times in the file, in s.
+    pub times: Vec<f64>,
+    /// Coordinates of the nodes in m.
+    pub nodes: Vec<[f64; 3]>,
+    /// Nodes of all cells, one cell after the other.
+    pub cells: Vec<u32>,
+    /// Nodes of a cell: 3 for triangles, 4 for tetrahedra.
+    pub corners: usize,
+    /// Displacement of the nodes in m.
+    pub displacement: Option<Vec<[f64; 3]>>,
+    /// Velocity of the nodes in m/s.
+    pub velocity: Option<Vec<[f64; 3]>>,
+    /// Von Mises norm of the stress of the cells in Pa.
+    pub von_mises: Option<Vec<f64>>,
+}
+
+impl Snapshot {
+    /// Reads the file.
+    pub fn read(path: &Path) -> Result<Self> {
+        std::fs::File::open(path).map_err(|error| Error::unreadable(path, error))?;
+        let refused = |words: &str| Error::unreadable(path, words);
+        let file = hdf5::File::open(path).map_err(|_| refused("it is not an HDF5 file, or a damaged one"))?;
+        if !(file.link_exists("VTKHDF") && file.link_exists("Mesh") && file.link_exists("Fields")) {
+            return Err(refused("it is not a field file of this program"));
+        }
+        let snapshot = read(&file).map_err(|error| Error::unreadable(path, error))?;
+        if !snapshot.is_sound() {
+            return Err(refused("its mesh and fields do not fit together"));
+        }
+        Ok(snapshot)
+    }
+
+    /// 2 or 3.
+    pub fn dimension(&self) -> usize {
+        self.corners - 1
+    }
+
+    /// Nodes of each cell.
+    pub fn cells(&self) -> impl Iterator<Item = &[u32]> {
+        self.cells.chunks_exact(self.corners)
+    }
+
+    fn is_sound(&self) -> bool {
+        let nodes = self.nodes.len();
+        let fits = |field: &Option<Vec<[f64; 3]>>| field.as_ref().is_none_or(|f| f.len() == nodes);
+        matches!(self.corners, 3 | 4)
+            && !self.cells.is_empty()
+            && self.cells.len().is_multiple_of(self.corners)
+            && self.cells.iter().all(|node| (*node as usize) < nodes)
+            && fits(&self.displacement)
+            && fits(&self.velocity)
+            && self.von_mises.as_ref().is_none_or(|f| f.len() * self.corners == self.cells.len())
+    }
+}
+
+fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
+    let cells = file.dataset("Mesh/cells")?;
+    let corners = cells.shape().get(1).copied().unwrap_or(0);
+    let nodes = triples(&file.dataset("VTKHDF/Points")?.read_raw::<f64>()?);
+    let unknown = u32::MAX;
+    let cells = cells.read_raw::<i64>()?.into_iter().map(|n| u32::try_from(n).unwrap_or(unknown)).collect();
+    let mut snapshot = Snapshot { nodes, cells, corners, ..Snapshot::default() };
+    if !file.link_exists("VTKHDF/Steps") {
+        return Ok(snapshot);
+    }
+    let steps: i64 = file.group("VTKHDF/Steps")?.attr("NSteps")?.read_scalar()?;
+    snapshot.times = file.dataset("VTKHDF/Steps/Values")?.read_raw::<f64>()?;
+    snapshot.times.truncate(usize::try_from(steps).unwrap_or(0));
+    let Some(&time) = snapshot.times.last() else { return Ok(snapshot) };
+    snapshot.time = time;
+    let newest = |name: &str| -> hdf5::Result<Option<Vec<f64>>> {
+        let group = format!("Fields/{name}");
+        if !file.link_exists(&group) {
+            return Ok(None);
+        }
+        file.dataset(&format!("{group}/{}", steps - 1))?.read_raw::<f64>().map(Some)
+    };
+    snapshot.displacement = newest("displacement")?.as_deref().map(triples);
+    snapshot.velocity = newest("velocity")?.as_deref().map(triples);
+    snapshot.von_mises = newest("von_mises")?;
+    Ok(snapshot)
+}
+
+fn triples(flat: &[f64]) -> Vec<[f64; 3]> {
+    flat.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn foreign_and_cut_files_are_refused_with_the_reason() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("fields.vtkhdf");
+        assert!(Snapshot::read(&path).expect_err("missing").to_string().contains("fields.vtkhdf"));
+        std::fs::write(&path, "cut").expect("written");
+        assert!(Snapshot::read(&path).expect_err("cut").to_string().contains("damaged"));
+        hdf5::File::create(&path).expect("create").close().expect("close");
+        assert!(Snapshot::read(&path).expect_err("foreign").to_string().contains("not a field file"));
+    }
+
+    #[test]
+    fn a_cell_with_a_node_that_is_not_there_is_no_mesh() {
+        let mesh =
+            Snapshot { nodes: vec![[0.0; 3]; 3], cells: vec![0, 1, 2], corners: 3, ..Snapshot::default() };
+        assert!(mesh.is_sound());
+        assert!(!Snapshot { cells: vec![0, 1, 3], ..mesh }.is_sound());
+    }
+}

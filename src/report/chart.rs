@@ -1,0 +1,350 @@
+//! Charts: lines and points over axes, drawn by plotters. Its SVG needs no font; legend and axis names are set above the
+//! axes, where they cover no data and stay legible on a small screen.
+
+use super::{
+    colour::{Colour, INK, LINES},
+    picture::{LETTERS, WIDTH, text_width},
+    scale::{Scale, extent},
+};
+use crate::error::{Error, Result};
+use plotters::coord::{
+    Shift,
+    ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter},
+};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+const HEIGHT: f64 = 380.0;
+/// Plotters rounds to whole pixels; it is given so many for a unit of the drawing that this is not seen.
+const FINE: i32 = 4;
+/// Points of a line beyond which it is thinned; more than twice the pixels of any screen it is read on.
+const ENOUGH: usize = 3000;
+/// Values that differ by less than this share of their size are steady.
+const STEADY: f64 = 0.02;
+/// Marks along a line that tell it from others without colour.
+const MARKS: usize = 9;
+
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// A line through them, with few marks.
+    Line,
+    /// A line, and a dot at each.
+    Dotted,
+    /// Dots only.
+    Dots,
+}
+
+/// Points with a name.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// Name in the legend; none is shown if it is empty.
+    pub label: String,
+    /// The points, unscaled.
+    pub points: Vec<[f64; 2]>,
+    /// How they are drawn.
+    pub look: Look,
+    /// In which colour.
+    pub colour: Colour,
+}
+
+impl Series {
+    /// A series in the colour that belongs to its place among its likes.
+    pub fn new(place: usize, label: impl Into<String>, look: Look, points: Vec<[f64; 2]>) -> Self {
+        Self { label: label.into(), points, look, colour: LINES[place % LINES.len()] }
+    }
+}
+
+/// A quantity along an axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis<'a> {
+    /// What it is.
+    pub quantity: &'a str,
+    /// Its unit, empty for pure numbers.
+    pub unit: &'a str,
+}
+
+/// A part of the horizontal axis with a background.
+#[derive(Debug, Clone)]
+pub struct Band {
+    /// Where it starts and ends, unscaled.
+    pub span: [f64; 2],
+    /// Its background.
+    pub colour: Colour,
+    /// What stands at its top.
+    pub label: String,
+}
+
+/// A chart.
+#[derive(Debug, Clone)]
+pub struct Chart<'a> {
+    /// To the right.
+    pub x: Axis<'a>,
+    /// Upwards.
+    pub y: Axis<'a>,
+    /// Whether y is shown by its powers of ten.
+    pub logarithmic: bool,
+    /// Whether the vertical axis starts at zero.
+    pub from_zero: bool,
+    /// What is drawn.
+    pub series: Vec<Series>,
+    /// Behind it.
+    pub bands: Vec<Band>,
+    /// Horizontal lines with their names.
+    pub levels: Vec<(f64, String)>,
+}
+
+type Axes = Cartesian2d<Marked, Marked>;
+type Area<'a, C> = DrawingArea<SVGBackend<'a>, C>;
+
+/// An axis that is marked where its scale says.
+#[derive(Clone)]
+struct Marked {
+    scale: Scale,
+    room: f64,
+}
+
+impl Ranged for Marked {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let range = self.range();
+        let share = (value - range.start) / (range.end - range.start);
+        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
+        self.scale.ticks.iter().map(|tick| tick.0).collect()
+    }
+
+    fn range(&self) -> std::ops::Range<f64> {
+        self.scale.low - self.room..self.scale.high + self.room
+    }
+}
+
+impl ValueFormatter<f64> for Marked {
+    fn format_ext(&self, value: &f64) -> String {
+        let tick = self.scale.ticks.iter().find(|tick| tick.0 == *value);
+        tick.map(|tick| tick.1.clone()).unwrap_or_default()
+    }
+}
+
+impl<'a> Chart<'a> {
+    /// A chart of these series over linear axes.
+    pub fn new(x: Axis<'a>, y: Axis<'a>, series: Vec<Series>) -> Self {
+        Self { x, y, logarithmic: false, from_zero: false, series, bands: vec![], levels: vec![] }
+    }
+
+    /// The drawing as an `svg` element.
+    pub fn svg(&self) -> Result<String> {
+        let mut svg = String::new();
+        let size = [WIDTH, HEIGHT].map(|size| (size * f64::from(FINE)) as u32);
+        let area = SVGBackend::with_string(&mut svg, size.into()).into_drawing_area();
+        let drawn = self.draw(&area);
+        drop(area);
+        drawn.map_err(|words| {
+            Error::Internal(format!("a chart of {} cannot be drawn: {words}", self.y.quantity))
+        })?;
+        let fine = format!("<svg width=\"{}\" height=\"{}\"", size[0], size[1]);
+        Ok(svg.replacen(&fine, &format!("<svg width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1))
+    }
+
+    fn scales(&self) -> (Scale, Scale) {
+        let coordinate =
+            |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
+        let levels = self.levels.iter().map(|level| level.0);
+        let (low, high) = extent(coordinate(1)).unwrap_or((0.0, 0.0));
+        // What hardly changes is shown as that, not as a curve.
+        let steady = high - low < STEADY * low.abs().max(high.abs());
+        let y = coordinate(1).chain(levels).chain((self.from_zero || steady).then_some(0.0));
+        let y = if self.logarithmic { Scale::logarithmic(y) } else { Scale::linear(y, true) };
+        (Scale::linear(coordinate(0), false), y)
+    }
+
+    fn draw(&self, area: &Area<Shift>) -> std::result::Result<(), String> {
+        let (x, y) = self.scales();
+        area.fill(&WHITE).map_err(words)?;
+        let top = self.draw_legend(area, &y)?;
+        let (_, below) = area.split_vertically(top);
+        let room = 0.02 * (x.high - x.low);
+        let mut chart = ChartBuilder::on(&below)
+            .margin_right(18 * FINE)
+            .margin_top(8 * FINE)
+            .x_label_area_size(48 * FINE)
+            .y_label_area_size(76 * FINE)
+            .build_cartesian_2d(Marked { scale: x.clone(), room }, Marked { scale: y.clone(), room: 0.0 })
+            .map_err(words)?;
+        let plane = chart.plotting_area().clone();
+        self.draw_bands(&plane, &x, &y)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(rgb([0xd9; 3]).stroke_width(FINE as u32))
+            .axis_style(rgb([0x55; 3]).stroke_width(FINE as u32))
+            .label_style(letters())
+            .x_desc(x.words(self.x.quantity, self.x.unit))
+            .set_all_tick_mark_size(5 * FINE)
+            .axis_desc_style(letters())
+            .draw()
+            .map_err(words)?;
+        self.draw_levels(&plane, &x, &y)?;
+        for (place, series) in self.series.iter().enumerate() {
+            draw_series(&plane, series, place, &x, &y)?;
+        }
+        area.present().map_err(words)
+    }
+
+    /// The name of the vertical axis, and below it the names of the series; gives the height they take.
+    fn draw_legend(&self, area: &Area<Shift>, y: &Scale) -> std::result::Result<i32, String> {
+        let row = 1.4 * LETTERS;
+        let mut line = 4.0;
+        area.draw_text(&y.words(self.y.quantity, self.y.unit), &letters(), fine(6.0, line)).map_err(words)?;
+        line += row;
+        let named: Vec<(usize, &Series)> =
+            self.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty()).collect();
+        let mut across = 8.0;
+        for (place, series) in &named {
+            let width = 44.0 + text_width(&series.label);
+            if across > 8.0 && across + width > WIDTH {
+                (across, line) = (8.0, line + row);
+            }
+            let middle = line + 0.55 * LETTERS;
+            if series.look != Look::Dots {
+                let stroke = vec![fine(across, middle), fine(across + 28.0, middle)];
+                area.draw(&PathElement::new(stroke, rgb(series.colour).stroke_width(2 * FINE as u32)))
+                    .map_err(words)?;
+            }
+            mark(area, fine(across + 14.0, middle), *place, series)?;
+            area.draw_text(&series.label, &letters(), fine(across + 34.0, line)).map_err(words)?;
+            across += width;
+        }
+        Ok(fine(0.0, line + if named.is_empty() { 0.0 } else { row }).1)
+    }
+
+    fn draw_bands(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
+        for band in &self.bands {
+            let (Some(from), Some(to)) = (x.place(band.span[0]), x.place(band.span[1])) else { continue };
+            let area = Rectangle::new([(from, y.low), (to, y.high)], rgb(band.colour).filled());
+            plane.draw(&area).map_err(words)?;
+            let width = plane.map_coordinate(&(to, y.high)).0 - plane.map_coordinate(&(from, y.high)).0;
+            if f64::from(width) > f64::from(FINE) * text_width(&band.label) {
+                let style = letters().pos(Pos::new(HPos::Center, VPos::Top));
+                let place = (0.5 * (from + to), y.high);
+                plane
+                    .draw(&(EmptyElement::at(place) + Text::new(band.label.clone(), (0, 4 * FINE), style)))
+                    .map_err(words)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_levels(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
+        for (level, name) in &self.levels {
+            let Some(height) = y.place(*level) else { continue };
+            let room = 0.02 * (x.high - x.low);
+            let stroke = vec![(x.low - room, height), (x.high + room, height)];
+            plane.draw(&PathElement::new(stroke, rgb([0x55; 3]).stroke_width(FINE as u32))).map_err(words)?;
+            let place = (x.low, height);
+            plane
+                .draw(&(EmptyElement::at(place) + Text::new(name.clone(), fine(4.0, 3.0), letters())))
+                .map_err(words)?;
+        }
+        Ok(())
+    }
+}
+
+fn draw_series(
+    plane: &Area<Axes>,
+    series: &Series,
+    place: usize,
+    x: &Scale,
+    y: &Scale,
+) -> std::result::Result<(), String> {
+    let shown = series.points.iter().filter_map(|p| Some((x.place(p[0])?, y.place(p[1])?)));
+    let shown = thinned(shown.collect());
+    if series.look != Look::Dots && shown.len() > 1 {
+        plane
+            .draw(&PathElement::new(shown.clone(), rgb(series.colour).stroke_width(2 * FINE as u32)))
+            .map_err(words)?;
+    }
+    let every = match series.look {
+        Look::Line if series.label.is_empty() && shown.len() > 1 => usize::MAX,
+        Look::Line => shown.len().div_ceil(MARKS).max(1),
+        Look::Dotted | Look::Dots => 1,
+    };
+    let first =
+        if every == usize::MAX { usize::MAX } else { (place * every / LINES.len()).min(shown.len() / 2) };
+    let (across, down) = plane.get_pixel_range();
+    let (pixels, corner) = (plane.strip_coord_spec(), (across.start, down.start));
+    for at in (first..shown.len()).step_by(every) {
+        let pixel = plane.map_coordinate(&shown[at]);
+        mark(&pixels, (pixel.0 - corner.0, pixel.1 - corner.1), place, series)?;
+    }
+    Ok(())
+}
+
+/// A mark whose shape tells series apart without colour.
+fn mark(
+    area: &Area<Shift>,
+    at: (i32, i32),
+    place: usize,
+    series: &Series,
+) -> std::result::Result<(), String> {
+    let style = rgb(series.colour).filled();
+    let corners = |around: &[(i32, i32)]| {
+        around.iter().map(|c| (at.0 + FINE * c.0, at.1 + FINE * c.1)).collect::<Vec<_>>()
+    };
+    let drawn = match place % 4 {
+        0 => area.draw(&Circle::new(at, 4 * FINE, style)),
+        1 => area.draw(&Polygon::new(corners(&[(-4, -4), (4, -4), (4, 4), (-4, 4)]), style)),
+        2 => area.draw(&TriangleMarker::new(at, 6 * FINE, style)),
+        _ => area.draw(&Polygon::new(corners(&[(-6, 0), (0, -6), (6, 0), (0, 6)]), style)),
+    };
+    drawn.map_err(words)
+}
+
+/// So many points that no more could be seen: of each group the first, the lowest, the highest and the last.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    if points.len() <= ENOUGH {
+        return points;
+    }
+    let group = (4 * points.len()).div_ceil(ENOUGH);
+    let mut kept = Vec::with_capacity(ENOUGH + 4);
+    for group in points.chunks(group) {
+        let by = |sign: f64| {
+            let ranked = group.iter().enumerate().map(|(at, p)| (at, sign * p.1));
+            ranked.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |found| found.0)
+        };
+        let mut places = [0, by(-1.0), by(1.0), group.len() - 1];
+        places.sort_unstable();
+        kept.extend(
+            places
+                .iter()
+                .enumerate()
+                .filter(|(n, at)| *n == 0 || places[n - 1] != **at)
+                .map(|(_, at)| group[*at]),
+        );
+    }
+    kept
+}
+
+/// A place of the drawing in plotters' pixels.
+fn fine(x: f64, y: f64) -> (i32, i32) {
+    let pixel = |along: f64| (along * f64::from(FINE)).round() as i32;
+    (pixel(x), pixel(y))
+}
+
+fn rgb(colour: Colour) -> RGBColor {
+    RGBColor(colour[0], colour[1], colour[2])
+}
+
+/// Plotters shows a text of size s in letters of s / 1.24.
+fn letters() -> TextStyle<'static> {
+    ("sans-serif", 1.24 * LETTERS * f64::from(FINE)).into_font().color(&rgb(INK))
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}

@@ -1,0 +1,142 @@
+//! The tables a run leaves, read back.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Columns of numbers and words.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    header: Vec<String>,
+    rows: Vec<Vec<f64>>,
+    /// The words of the one column that has words, by row.
+    words: Vec<String>,
+}
+
+impl Table {
+    /// Reads a table whose column `named`, if it has one, holds words and all others numbers. A last row that is not
+    /// whole, as a run leaves it that died, does not count.
+    pub fn read(path: &Path, named: &str) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
+        Self::parse(&text, named).map_err(|words| Error::unreadable(path, words))
+    }
+
+    fn parse(text: &str, named: &str) -> std::result::Result<Self, String> {
+        let mut lines = text.lines().enumerate().peekable();
+        let (_, first) = lines.next().ok_or("it is empty")?;
+        let header: Vec<String> = first.split(',').map(|name| name.trim().to_owned()).collect();
+        let mut table = Self { header, ..Self::default() };
+        while let Some((at, line)) = lines.next() {
+            match table.row(line, named) {
+                Ok(()) => {}
+                Err(_) if lines.peek().is_none() => {}
+                Err(words) => return Err(format!("line {}: {words}", at + 1)),
+            }
+        }
+        Ok(table)
+    }
+
+    fn row(&mut self, line: &str, named: &str) -> std::result::Result<(), String> {
+        let cells: Vec<&str> = line.split(',').collect();
+        if cells.len() != self.header.len() {
+            return Err(format!("{} columns, the header has {}", cells.len(), self.header.len()));
+        }
+        let mut row = Vec::with_capacity(cells.len());
+        let mut word = String::new();
+        for (name, cell) in self.header.iter().zip(&cells) {
+            if name == named {
+                word = (*cell).to_owned();
+                row.push(0.0);
+            } else {
+                row.push(cell.trim().parse::<f64>().map_err(|_| format!("{cell:?} is no number ({name})"))?);
+            }
+        }
+        self.rows.push(row);
+        self.words.push(word);
+        Ok(())
+    }
+
+    /// Names of the columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// Whether it has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// A column, if there is one of this name.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let at = self.header.iter().position(|column| column == name)?;
+        Some(self.rows.iter().map(|row| row[at]).collect())
+    }
+
+    /// Points of one column over another.
+    pub fn curve(&self, x: &str, y: &str) -> Vec<[f64; 2]> {
+        let (x, y) = (self.column(x).unwrap_or_default(), self.column(y).unwrap_or_default());
+        x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()
+    }
+
+    /// The words of the rows, each once, in order.
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for word in &self.words {
+            if names.last() != Some(word) && !names.contains(word) {
+                names.push(word.clone());
+            }
+        }
+        names
+    }
+
+    /// The rows of this name.
+    pub fn of(&self, name: &str) -> Self {
+        self.filtered(|at| self.words[at] == name)
+    }
+
+    /// The rows with the largest number in this column.
+    pub fn last(&self, column: &str) -> Self {
+        let values = self.column(column).unwrap_or_default();
+        let last = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        self.filtered(|at| values.get(at) == Some(&last))
+    }
+
+    fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
+        self.picked(&(0..self.rows.len()).filter(|at| keep(*at)).collect::<Vec<_>>())
+    }
+
+    /// The rows with these numbers, in this order.
+    pub fn picked(&self, rows: &[usize]) -> Self {
+        Self {
+            header: self.header.clone(),
+            rows: rows.iter().map(|at| self.rows[*at].clone()).collect(),
+            words: rows.iter().map(|at| self.words[*at].clone()).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_found_by_name_and_last_time() {
+        let text = "time,profile,x\n0,left,1\n0,right,2\n1,left,3\n1,left,4\n1,right,5\n";
+        let table = Table::parse(text, "profile").expect("table");
+        assert_eq!(table.names(), ["left", "right"]);
+        assert_eq!(table.of("left").last("time").column("x"), Some(vec![3.0, 4.0]));
+        assert_eq!(table.column("y"), None);
+    }
+
+    #[test]
+    fn a_cut_last_row_is_passed_over_and_any_other_fault_is_named_with_its_line() {
+        assert_eq!(Table::parse("step,time\n1,0.5\n2", "").expect("table").len(), 1);
+        let fault = Table::parse("step,time\n1,half\n2,1\n", "").expect_err("fault");
+        assert!(fault.contains("line 2") && fault.contains("half"), "{fault}");
+        assert!(Table::parse("", "").is_err());
+    }
+}

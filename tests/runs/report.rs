@@ -1,0 +1,261 @@
+//! The page that `solver report` makes of a run.
+
+use crate::{case::Case, launch};
+use resvg::usvg::roxmltree::{Document, Node, ParsingOptions};
+use std::path::{Path, PathBuf};
+
+/// Makes the report of a finished case.
+#[track_caller]
+pub fn report(folder: &Path) -> PathBuf {
+    launch::run_alone(&["report".as_ref(), folder.as_os_str()]).expect(0);
+    folder.join("report/index.html")
+}
+
+fn parsed(html: &str) -> Document<'_> {
+    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    Document::parse_with_options(html, options).expect("well-formed")
+}
+
+fn elements<'a, 'i>(page: &'a Document<'i>, tag: &str) -> Vec<Node<'a, 'i>> {
+    page.descendants().filter(|node| node.tag_name().name() == tag).collect()
+}
+
+fn words(node: Node) -> String {
+    node.descendants().filter_map(|inner| inner.text().filter(|_| inner.is_text())).collect()
+}
+
+/// The cell behind the one with these words.
+fn fact(page: &Document, name: &str) -> String {
+    let header = elements(page, "th").into_iter().find(|th| words(*th) == name).expect(name);
+    words(header.next_sibling_element().expect("value"))
+}
+
+fn files(folder: &Path, ending: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("folder").map(|entry| entry.expect("entry").path());
+    let mut names: Vec<String> = entries
+        .filter(|path| path.extension().is_some_and(|extension| extension == ending))
+        .map(|path| path.file_stem().expect("name").to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Every picture of the page is named, drawn, and stands beside it as SVG and PNG; nothing leads out of the page.
+#[track_caller]
+fn check_page(page: &Path) -> Vec<String> {
+    let html = std::fs::read_to_string(page).expect("page");
+    assert!(html.len() < 2_000_000, "{} bytes", html.len());
+    for outside in ["http:", "https:", "src=\"/", "url(/", "@import", "<script"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    let document = parsed(&html);
+    let mut names = Vec::new();
+    for figure in elements(&document, "figure") {
+        let name = figure.attribute("id").expect("id").to_owned();
+        let drawing = figure.first_element_child().expect("drawing");
+        assert_eq!(drawing.attribute("role"), Some("img"), "{name}");
+        assert!(drawing.attribute("aria-label").is_some_and(|alt| alt.len() > 10), "{name}");
+        assert!(words(figure.last_element_child().expect("caption")).len() > 10, "{name}");
+        let shapes = drawing
+            .descendants()
+            .filter(|n| ["path", "polyline", "rect", "image"].contains(&n.tag_name().name()));
+        assert!(shapes.count() > 3, "{name} is empty");
+        names.push(name);
+    }
+    let mut ids: Vec<&str> = document.descendants().filter_map(|node| node.attribute("id")).collect();
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "an id stands twice");
+    for link in elements(&document, "a") {
+        let target =
+            link.attribute("href").and_then(|href| href.strip_prefix('#')).expect("a place of the page");
+        assert!(ids.binary_search(&target).is_ok(), "{target}");
+    }
+    let levels = elements(&document, "h1").len();
+    assert_eq!(levels, 1, "one main heading");
+    let folder = page.parent().expect("folder");
+    let mut sorted = names.clone();
+    sorted.sort();
+    assert_eq!(files(folder, "svg"), sorted);
+    assert_eq!(files(folder, "png"), sorted);
+    for name in &sorted {
+        let svg = std::fs::read_to_string(folder.join(format!("{name}.svg"))).expect("SVG");
+        assert_eq!(parsed(&svg).root_element().tag_name().name(), "svg");
+        let png = std::fs::read(folder.join(format!("{name}.png"))).expect("PNG");
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+        assert_eq!(u32::from_be_bytes([png[16], png[17], png[18], png[19]]), 1120, "width of {name}");
+    }
+    names
+}
+
+/// The square whose numbers an independent program gave.
+pub fn square() -> Case {
+    Case::square(8)
+}
+
+#[test]
+fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
+    let case = square();
+    case.run(2);
+    let out = case.folder().join("out");
+    let page = report(&out);
+    let names = check_page(&page);
+    for name in [
+        "speed",
+        "von_mises",
+        "bottom_normal_velocity",
+        "bottom_contact_pressure",
+        "bottom_normal_displacement",
+        "bottom_on_law",
+        "bottom_normal_velocity_arrows",
+        "bottom_contact_pressure_arrows",
+        "probes_displacement_y",
+        "probes_velocity_x",
+        "energies",
+        "dissipation",
+        "energy_imbalance",
+        "newton_iterations",
+        "dt",
+        "inclusion_residual",
+        "wall_seconds",
+    ] {
+        assert!(names.iter().any(|other| other == name), "{name} is not in {names:?}");
+    }
+    let html = std::fs::read_to_string(&page).expect("page");
+    let document = parsed(&html);
+    assert_eq!(
+        words(elements(&document, "h1")[0]),
+        "Dynamic viscoplastic contact with normal damped response"
+    );
+    assert_eq!(fact(&document, "status"), "completed");
+    assert_eq!(fact(&document, "cells"), "128");
+    assert_eq!(fact(&document, "largest von Mises stress at the end"), "26.042 Pa");
+    let caption = |name: &str| {
+        let figure =
+            elements(&document, "figure").into_iter().find(|f| f.attribute("id") == Some(name)).expect(name);
+        words(figure.last_element_child().expect("caption"))
+    };
+    assert!(
+        caption("bottom_normal_velocity").contains("from 0 to 0.0060276 m/s"),
+        "{}",
+        caption("bottom_normal_velocity")
+    );
+    assert!(caption("bottom_normal_displacement").contains("to 0.035476 m,"));
+    assert!(
+        caption("von_mises").contains("to 26.042 Pa") && caption("von_mises").contains("displacement × ")
+    );
+    assert!(html.contains("below 1: the continuous problem has one solution"));
+    assert!(html.contains("yield_stress = 19.0") && !html.contains("class=\"missing\""));
+}
+
+#[test]
+fn each_node_of_the_contact_boundary_is_counted_on_the_branch_it_sits_on() {
+    let case = square();
+    let results = case.run(1);
+    let out = case.folder().join("out");
+    let html = std::fs::read_to_string(report(&out)).expect("page");
+    let document = parsed(&html);
+    let profiles = results.text("profiles.csv");
+    let velocities: Vec<f64> = profiles
+        .lines()
+        .filter(|line| line.starts_with("1,bottom"))
+        .map(|line| line.split(',').nth(5).expect("column").parse().expect("number"))
+        .collect();
+    assert_eq!(velocities.len(), 9);
+    let between = |low: f64, high: f64| velocities.iter().filter(|v| (low..high).contains(*v)).count();
+    let counted: Vec<String> = elements(&document, "tr")
+        .into_iter()
+        .filter(|row| row.first_element_child().is_some_and(|cell| words(cell).starts_with('S')))
+        .map(|row| words(row.children().filter(Node::is_element).nth(3).expect("nodes")))
+        .collect();
+    let known = [0, 0, 0, between(0.0, 0.003), between(0.003, 0.005), between(0.005, 1.0)];
+    assert_eq!(counted, known.map(|count| count.to_string()));
+}
+
+#[test]
+fn the_page_of_a_solid_run_shows_its_surface_and_maps_of_its_contact_boundary() {
+    let case = Case::cube(3).set("output.profile", "[{on = 'bottom'}]");
+    case.run(2);
+    let names = check_page(&report(&case.folder().join("out")));
+    for name in
+        ["speed", "von_mises", "bottom_contact_pressure", "bottom_on_law", "probes_velocity_z", "energies"]
+    {
+        assert!(names.iter().any(|other| other == name), "{name} is not in {names:?}");
+    }
+}
+
+#[test]
+fn a_report_is_the_same_on_one_and_several_processes() {
+    let case = Case::square(4);
+    case.run(1);
+    let out = case.folder().join("out");
+    let alone = std::fs::read(report(&out)).expect("page");
+    let said = launch::run(2, &["report".as_ref(), out.as_os_str()]).expect(0).says("report/index.html with");
+    assert_eq!(said.stdout.matches("index.html").count(), 1, "{}", said.stdout);
+    assert!(alone == std::fs::read(out.join("report/index.html")).expect("page"));
+}
+
+#[test]
+fn missing_and_damaged_files_are_named_and_the_rest_is_shown() {
+    let case = Case::square(4);
+    case.run(1);
+    let out = case.folder().join("out");
+    for name in ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf"] {
+        let text = std::fs::read(out.join(name)).expect("file");
+        std::fs::remove_file(out.join(name)).expect("removed");
+        check_missing(&out, name, "it is not there");
+        std::fs::write(out.join(name), "[{,\nx y\nz").expect("written");
+        check_missing(&out, name, name);
+        std::fs::write(out.join(name), text).expect("written");
+    }
+    let html = std::fs::read_to_string(report(&out)).expect("page");
+    assert!(!html.contains("class=\"missing\""));
+}
+
+#[track_caller]
+fn check_missing(out: &Path, name: &str, why: &str) {
+    drop(std::fs::remove_dir_all(out.join("report")));
+    let page = report(out);
+    assert!(check_page(&page).len() > 3, "without {name}");
+    let html = std::fs::read_to_string(page).expect("page");
+    let document = parsed(&html);
+    let said: Vec<String> = elements(&document, "li").into_iter().map(words).collect();
+    assert!(
+        said.iter().any(|line| line.starts_with(&format!("{name}: ")) && line.contains(why)),
+        "{name}: {said:?}"
+    );
+}
+
+#[test]
+fn a_failed_run_says_so_with_its_error() {
+    let case = Case::square(4);
+    case.run(1);
+    let out = case.folder().join("out");
+    let summary = std::fs::read_to_string(out.join("summary.json")).expect("summary");
+    let failed = summary
+        .replace("\"completed\"", "\"failed\"")
+        .replace("\"error\": null", "\"error\": \"a <step> failed\"");
+    std::fs::write(out.join("summary.json"), failed).expect("written");
+    let html = std::fs::read_to_string(report(&out)).expect("page");
+    let document = parsed(&html);
+    assert_eq!(fact(&document, "status"), "failed");
+    assert_eq!(fact(&document, "error"), "a <step> failed");
+}
+
+#[test]
+fn a_folder_without_a_run_is_refused_with_the_remedy() {
+    let folder = tempfile::tempdir().expect("folder");
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).expect("folder");
+    let refused = |path: &Path, words: &str| {
+        launch::run_alone(&["report".as_ref(), path.as_os_str()]).expect(2).says(words);
+        let outcome = launch::run(2, &["report".as_ref(), path.as_os_str()]).expect(2);
+        assert_eq!(outcome.stderr.matches(words).count(), 1, "{}", outcome.stderr);
+    };
+    refused(&empty, "is not the output folder of a run: it holds none of job.toml");
+    refused(&folder.path().join("nowhere"), "nowhere is not there");
+    let case = Case::square(4);
+    refused(&case.written(), "that is a job; give the folder that its run left");
+    assert!(!empty.join("report").exists());
+}
