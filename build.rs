@@ -16,7 +16,7 @@ const FUNCTIONS: &[&str] = &[
     "Vec(Copy|Scale|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize)",
     "VecCreateMPIWithArray",
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
-    "Mat(Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
+    "Mat(Norm|Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
     "(VecEqual|PetscObjectReference)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",

@@ -58,7 +58,14 @@ impl Graph {
             return Resolved { velocity: v, pressure: s - c * v, derivative: 0.0, branch };
         }
         let derivative = 1.0 / (c + slope);
-        let advance = (s - c * v - p) * derivative;
+        // From the corner or from rest, whichever is nearer: a corner far off would cost digits.
+        let from_corner = s - (c * v + p);
+        if s.abs() < from_corner.abs() {
+            let at_rest = p - slope * v;
+            let velocity = (s - at_rest) * derivative;
+            return Resolved { velocity, pressure: at_rest + slope * velocity, derivative, branch };
+        }
+        let advance = from_corner * derivative;
         Resolved { velocity: v + advance, pressure: p + slope * advance, derivative, branch }
     }
 

@@ -88,6 +88,14 @@ impl Matrix {
         check(unsafe { sys::MatMult(self.raw, x.raw, result.raw) })
     }
 
+    /// The largest sum of a row's entries without signs, over all ranks. Collective.
+    pub fn norm(&self) -> Result<f64> {
+        let mut norm = 0.0;
+        // SAFETY: live matrix and a live number.
+        check(unsafe { sys::MatNorm(self.raw, sys::NORM_INFINITY, &mut norm) })?;
+        Ok(norm)
+    }
+
     /// Stored scalar entries over all ranks. Collective.
     pub fn stored_entries(&self) -> Result<f64> {
         let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();

@@ -42,6 +42,10 @@ pub struct ProjectedKsp {
     /// The smallest right-hand side since the tolerances were set.
     smallest: f64,
     patience: usize,
+    /// Whether the next solve is the first since the tolerances were set.
+    first: bool,
+    /// Whether the preconditioner is one for subspaces.
+    reducing: bool,
 }
 
 /// How a solve on a subspace ended.
@@ -60,6 +64,10 @@ const INDEFINITE: [i32; 2] = [-8, -10];
 
 /// PETSc's reason for a solve that has used up its iterations.
 const TOO_MANY: i32 = -3;
+
+/// Directions that a subspace lacks, from which on it has a preconditioner of its own: below, that of the constant matrix
+/// needs as many more iterations at most.
+const WORTH: f64 = 16.0;
 
 /// A solve of no iterations.
 const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, residual: f64::INFINITY };
@@ -80,6 +88,8 @@ impl ProjectedKsp {
             tolerances: (1e-5, 0.0, 10_000),
             smallest: f64::INFINITY,
             patience: usize::MAX,
+            first: true,
+            reducing: false,
         };
         // SAFETY: the handle owns one reference each to the shell matrix and the null space from their creation on; the
         // shell is only multiplied inside `solve`, which sets its context.
@@ -115,6 +125,7 @@ impl ProjectedKsp {
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         self.tolerances = (relative, absolute, iterations);
         self.smallest = f64::INFINITY;
+        self.first = true;
         Ok(())
     }
 
@@ -128,6 +139,7 @@ impl ProjectedKsp {
     /// The preconditioner is set up with the constant matrix alone: multigrid would smooth with the operator otherwise.
     pub fn set_constant(&mut self, constant: &Matrix) -> Result<()> {
         self.reduced = None;
+        self.reducing = false;
         self.constant = Some(constant.share()?);
         self.precondition_with(constant.raw)
     }
@@ -144,17 +156,32 @@ impl ProjectedKsp {
         }
     }
 
-    /// Takes in the subspace in use; says whether the preconditioner is that of another. Collective.
-    fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<bool> {
-        let Some(constant) = &self.constant else { return Ok(false) };
+    /// Takes in the subspace in use; says whether the preconditioner is that of another, and whether it was made anew for
+    /// this one. Collective.
+    fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<[bool; 2]> {
+        let Some(constant) = &self.constant else { return Ok([false; 2]) };
         if self.patience == usize::MAX || !operator.may_project() {
-            return Ok(false);
+            return Ok([false; 2]);
         }
         let reduced = match &mut self.reduced {
             Some(reduced) => reduced,
             none => none.insert(ReducedMatrix::new(constant, like, self.block)?),
         };
-        reduced.look(|column| operator.project(column))
+        let stale = reduced.look(|column| operator.project(column))?;
+        if !std::mem::take(&mut self.first) {
+            return Ok([stale && self.reducing, false]);
+        }
+        // What a step starts with depends on its own subspace alone, not on steps before, which a restart does not know.
+        let worth = reduced.removed()? >= WORTH;
+        if worth && stale {
+            self.refresh()?;
+        } else if !worth && self.reducing {
+            let raw = constant.raw;
+            reduced.forget()?;
+            self.precondition_with(raw)?;
+        }
+        self.reducing = worth;
+        Ok([false, worth && stale])
     }
 
     /// Solves `P B x = r` with a symmetric `P B` for an `r` of the subspace. Collective. Non-convergence is an outcome, not an
@@ -167,8 +194,10 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        let stale = self.look(operator, right_hand_side)?;
-        self.attached(operator, |solver| solver.solve_attached(right_hand_side, solution, stale))
+        let [stale, refreshed] = self.look(operator, right_hand_side)?;
+        let outcome =
+            self.attached(operator, |solver| solver.solve_attached(right_hand_side, solution, stale))?;
+        Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
     /// The same with a `P B` that is not symmetric, by GMRES.
@@ -178,8 +207,10 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        let stale = self.look(operator, right_hand_side)?;
-        self.attached(operator, |solver| solver.solve_by_gmres(right_hand_side, solution, stale))
+        let [stale, refreshed] = self.look(operator, right_hand_side)?;
+        let outcome =
+            self.attached(operator, |solver| solver.solve_by_gmres(right_hand_side, solution, stale))?;
+        Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
     /// Runs a solve with this operator behind the shell matrix.

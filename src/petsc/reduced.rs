@@ -18,6 +18,8 @@ pub(super) struct ReducedMatrix {
     ghosts: HashMap<usize, usize>,
     /// `P e_i` for each component `i`.
     columns: Vec<DistributedVector>,
+    /// All components of all nodes.
+    directions: f64,
     /// The same of the projection that the matrix was made for.
     made_for: Vec<DistributedVector>,
 }
@@ -40,13 +42,17 @@ impl ReducedMatrix {
             Ok(column)
         };
         let columns = (0..block).map(unit).collect::<Result<_>>()?;
-        let made_for = (0..block).map(unit).collect::<Result<_>>()?;
+        let made_for: Vec<DistributedVector> = (0..block).map(unit).collect::<Result<_>>()?;
+        let mut directions = 0.0;
+        for column in &made_for {
+            directions += column.norm()?.powi(2);
+        }
         let mut raw = ptr::null_mut();
         // SAFETY: live matrix; the handle owns one reference to the copy.
         unsafe {
             check(sys::MatDuplicate(constant.raw, sys::MAT_COPY_VALUES, &mut raw))?;
             let ghosts = others.into_iter().enumerate().map(|(at, node)| (node, owned + at)).collect();
-            let matrix = Self { raw, block, ghosts, columns, made_for };
+            let matrix = Self { raw, block, ghosts, columns, directions: directions.round(), made_for };
             check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
             Ok(matrix)
@@ -62,6 +68,23 @@ impl ReducedMatrix {
             changed |= !column.equals(&self.made_for[i])?;
         }
         Ok(changed)
+    }
+
+    /// Takes the matrix to be made for no projection.
+    pub fn forget(&mut self) -> Result<()> {
+        for (i, made) in self.made_for.iter_mut().enumerate() {
+            write_unit(made, i, self.block)?;
+        }
+        Ok(())
+    }
+
+    /// How many directions the projection that was last looked at removes. Collective.
+    pub fn removed(&self) -> Result<f64> {
+        let mut left = 0.0;
+        for column in &self.columns {
+            left += column.norm()?.powi(2);
+        }
+        Ok((self.directions - left).round())
     }
 
     /// Makes the matrix for the projection that was last looked at. Collective.

@@ -42,6 +42,8 @@ enum Solver {
 pub(super) struct StepSolver {
     settings: SolverSettings,
     matrix: Option<(f64, Matrix)>,
+    /// Norm of the matrix in N s/m.
+    matrix_norm: f64,
     solver: Solver,
 }
 
@@ -100,7 +102,12 @@ impl StepSolver {
                 flow,
             }))
         };
-        Ok(Self { settings: SolverSettings { preconditioner, ..settings }, matrix: None, solver })
+        Ok(Self {
+            settings: SolverSettings { preconditioner, ..settings },
+            matrix: None,
+            matrix_norm: 0.0,
+            solver,
+        })
     }
 
     /// Whether steps are solved by Newton's method.
@@ -145,6 +152,7 @@ impl StepSolver {
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
         }
+        self.matrix_norm = matrix.norm()?;
         self.matrix = Some((length, matrix));
         Ok(())
     }
@@ -184,7 +192,9 @@ impl StepSolver {
                 "check loads and initial values; use smaller steps",
             ));
         }
-        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding);
+        // No residual below the rounding of `K v` is asked for, however small the forces that are left.
+        let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
+        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
         let Some((_, matrix)) = &self.matrix else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };

@@ -34,7 +34,7 @@ impl Effect<2, 3> for Faulty {
     }
 
     fn phases(&self) -> Phases {
-        Phases { matrix: true, explicit: Some(Needs::default()), energy: None, stress: None }
+        Phases { matrix: true, explicit: Some(Needs::default()), ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {
