@@ -41,7 +41,7 @@ fn kill(case: &Case, running: &mut Running, moment: Moment, whole: Duration, ran
 }
 
 fn half_written(folder: &Path) -> bool {
-    let names = folder.exists().then(|| crate::results::names(folder)).unwrap_or_default();
+    let names = if folder.exists() { crate::results::names(folder) } else { Vec::new() };
     names.iter().any(|name| name.ends_with(".h5.part"))
 }
 

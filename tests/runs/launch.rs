@@ -158,7 +158,8 @@ impl Running {
         process.is_some_and(|process| send(signal, process))
     }
 
-    /// Whether the run has not ended.
+    /// Whether the run has not ended; for the tests of faults.
+    #[allow(dead_code)]
     pub fn goes_on(&mut self) -> bool {
         self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
     }
