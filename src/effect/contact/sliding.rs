@@ -9,7 +9,7 @@ use crate::{
 };
 
 impl<const D: usize> Contact<D> {
-    /// Adds friction, for which `fixed` has one flag a local component; before [`choose_unknowns`]. Refuses supports that
+    /// Adds friction, for which `fixed` has one flag a local component; before [`choose_unknowns`](super::choose_unknowns). Refuses supports that
     /// leave no tangent, or no pressure where the law needs one.
     pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, fixed: &[bool]) -> Result<()> {
         if self.needs_ghosts {
