@@ -75,7 +75,7 @@ impl Compliance {
             }
             let newton = at - value / (1.0 + ratio * self.stiffness_at(at));
             let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - at).abs() <= 4.0 * f64::EPSILON * excess {
+            if (next - at).abs() <= 4.0 * f64::EPSILON * next {
                 return next;
             }
             at = next;

@@ -327,7 +327,7 @@ mod tests {
             let by_potential = (g.potential(v + h) - g.potential(v - h)) / (2.0 * h);
             prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v).abs()));
             let size = v.abs() + g.pressure(v).abs() / g.reach[1];
-            prop_assert!(g.distance(v, g.pressure(v)) < 1e-14 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            prop_assert!(g.distance(v, g.pressure(v)) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
             for w in [v - 1.0, v + 0.3] {
                 let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
                 prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);

@@ -114,10 +114,10 @@ impl Case {
         launch::run(ranks, &self.arguments(arguments))
     }
 
-    /// Runs the job, which must succeed.
+    /// Runs the job, which must succeed, over whatever ran in its folder before.
     #[track_caller]
     pub fn run(&self, ranks: usize) -> Results {
-        self.run_with(ranks, &[]).expect(0);
+        self.run_with(ranks, &["--force"]).expect(0);
         self.results()
     }
 
