@@ -28,7 +28,7 @@ job = re.sub(r"cells\s*=.*", f"cells = [{cells}, {cells}]", job)
 job = re.sub(r"\[contact\.normal\.damped_response\].*?\n\n", f"[contact.normal]\n{law}\n\n", job, flags=re.S)
 open(file, "w").write(job + '[output]\nfolder = "out"\n')
 PYTHON
-        if "$solver" "$work/job.toml" > "$work/log" 2>&1; then
+        if "$solver" run "$work/job.toml" --force > "$work/log" 2>&1; then
             python3 - "$work/out/history.csv" "${law%%|*}" "$cells" <<'PYTHON'
 import csv, statistics, sys
 counts = [int(row["newton_iterations"]) for row in csv.DictReader(open(sys.argv[1]))]
