@@ -4,6 +4,8 @@ mod adaptive;
 mod attempts;
 mod bdf2;
 mod bounded;
+mod condensed;
+mod condensed_matrix;
 mod equations;
 mod flow;
 mod implicit;

@@ -2,25 +2,20 @@
 
 use super::{
     bounded::{self, Bounded},
-    equations::Scratch,
+    condensed::Condensed,
     flow::{Flow, FlowStart},
     linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, Task, failed},
+    newton::{From, Newton, REMEDY, Task, failed},
     stepper::StepOutcome,
 };
 use crate::{
     body::Body,
-    effect::Step,
+    effect::{Contact, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, has_option},
+    petsc::{DistributedVector, Ksp, Matrix, has_option},
     session::Session,
     state::State,
 };
-
-/// Linear solves stop at this share of what the step needs.
-const LINEAR_SHARE: f64 = 0.3;
-/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
-const LINEAR_REDUCTION: f64 = 1e-3;
 
 /// What a step brings to its solution.
 pub(super) struct Known<'a> {
@@ -36,6 +31,7 @@ pub(super) struct Known<'a> {
 enum Solver {
     Linear(Ksp),
     Newton(Box<Newton>),
+    Condensed(Box<Condensed>),
 }
 
 /// The matrix for steps of one length, and what solves with it.
@@ -65,42 +61,7 @@ impl StepSolver {
             ksp.apply_options()?;
             Solver::Linear(ksp)
         } else {
-            let mut snes = Snes::new("", &state.velocity, D)?;
-            snes.apply_options()?;
-            let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
-            preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
-            linear_solver.linear_solver().apply_options()?;
-            let flow = if flows { Some(Flow::new(&state.velocity)?) } else { None };
-            let scratch = Scratch::new(&state.velocity, &body.contacts)?;
-            let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            let bounded = match settings.method {
-                Method::Newton => None,
-                Method::VariationalInequality => {
-                    session.agree(bounded::refuse(body))?;
-                    if flows {
-                        return Err(Error::Refused(
-                            "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
-                             [time] scheme = \"lagged_euler\""
-                                .into(),
-                        ));
-                    }
-                    Some(Bounded::new(&state.velocity)?)
-                }
-            };
-            linear_solver.set_patience(preconditioner.patience(D));
-            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
-            Solver::Newton(Box::new(Newton {
-                snes,
-                bounded,
-                linear_solver,
-                scratch,
-                before,
-                after,
-                scales,
-                start,
-                chosen_search,
-                flow,
-            }))
+            Self::choose_newton(session, body, state, settings, preconditioner)?
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
@@ -110,9 +71,63 @@ impl StepSolver {
         })
     }
 
+    /// Newton's method on the contact alone, where all else can be eliminated, or on the whole body.
+    fn choose_newton<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        settings: SolverSettings,
+        preconditioner: Preconditioner,
+    ) -> Result<Solver> {
+        let unknowns = body.mesh.total_nodes * D;
+        let whole = session.ranks() == 1 || preconditioner.is_redundant(session.ranks(), unknowns);
+        let chosen = has_option("pc_type")? || has_option("ksp_type")?;
+        if preconditioner == Preconditioner::Cholesky
+            && settings.method == Method::Newton
+            && whole
+            && !chosen
+            && !body.flows()
+            && !body.contacts.iter().any(Contact::needs_ghosts)
+        {
+            let condensed = Condensed::new(session, body, state.contact_traction.is_some())?;
+            return Ok(Solver::Condensed(Box::new(condensed)));
+        }
+        Self::whole_newton(session, body, &state.velocity, settings, preconditioner)
+    }
+
+    /// Newton's method on the whole body, for velocities laid out like `like`.
+    fn whole_newton<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        like: &DistributedVector,
+        settings: SolverSettings,
+        preconditioner: Preconditioner,
+    ) -> Result<Solver> {
+        let unknowns = body.mesh.total_nodes * D;
+        let mut newton = Newton::new(like, &body.contacts)?;
+        preconditioner.configure(newton.linear_solver.linear_solver(), session.ranks(), unknowns)?;
+        newton.linear_solver.linear_solver().apply_options()?;
+        newton.linear_solver.set_patience(preconditioner.patience(D));
+        if body.flows() {
+            newton.flow = Some(Flow::new(like)?);
+        }
+        if settings.method == Method::VariationalInequality {
+            session.agree(bounded::refuse(body))?;
+            if body.flows() {
+                return Err(Error::Refused(
+                    "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
+                     [time] scheme = \"lagged_euler\""
+                        .into(),
+                ));
+            }
+            newton.bounded = Some(Bounded::new(like)?);
+        }
+        Ok(Solver::Newton(Box::new(newton)))
+    }
+
     /// Whether steps are solved by Newton's method.
     pub fn is_nonlinear(&self) -> bool {
-        matches!(self.solver, Solver::Newton(_))
+        !matches!(self.solver, Solver::Linear(_))
     }
 
     /// The preconditioner in use.
@@ -129,14 +144,24 @@ impl StepSolver {
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         length: f64,
         like: &DistributedVector,
     ) -> Result<()> {
         self.matrix = None;
         let rows = session.agree(body.matrix(session, length))?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        drop(rows);
+        if let Solver::Condensed(condensed) = &mut self.solver {
+            if condensed.prepare(session, body, rows)? {
+                self.matrix_norm = matrix.norm()?;
+                self.matrix = Some((length, matrix));
+                return Ok(());
+            }
+            let (settings, chosen) = (self.settings, self.settings.preconditioner);
+            self.solver = Self::whole_newton(session, body, like, settings, chosen)?;
+        } else {
+            drop(rows);
+        }
         if self.settings.preconditioner == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
@@ -151,6 +176,7 @@ impl StepSolver {
                 session.agree(newton.linear_solver.linear_solver().set_up())?;
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
+            Solver::Condensed(_) => {}
         }
         self.matrix_norm = matrix.norm()?;
         self.matrix = Some((length, matrix));
@@ -168,6 +194,7 @@ impl StepSolver {
     /// Applies the preconditioner. Collective.
     pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.solve_linear(r, z),
             Solver::Linear(ksp) => ksp.precondition(r, z),
             Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
         }
@@ -198,6 +225,9 @@ impl StepSolver {
         let Some((_, matrix)) = &self.matrix else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
+        let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };
+        let task =
+            Task { step, matrix, right_hand_side: forces, tolerance, settings: self.settings, flow: start };
         match &mut self.solver {
             Solver::Linear(ksp) => {
                 ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
@@ -207,16 +237,8 @@ impl StepSolver {
                 }
                 Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
             }
-            Solver::Newton(newton) => {
-                newton.linear_solver.set_tolerances(
-                    LINEAR_REDUCTION,
-                    LINEAR_SHARE * tolerance,
-                    LINEAR_ITERATIONS,
-                )?;
-                let (right_hand_side, settings) = (forces, self.settings);
-                let task = Task { step, matrix, right_hand_side, tolerance, settings, flow: start };
-                newton.solve(session, body, state, task, trial)
-            }
+            Solver::Newton(newton) => newton.solve(session, body, from, task, trial),
+            Solver::Condensed(condensed) => condensed.solve(session, body, from, task, trial),
         }
     }
 }

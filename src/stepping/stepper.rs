@@ -132,7 +132,7 @@ impl Stepper {
     pub fn prepare_length<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         length: f64,
     ) -> Result<()> {
         self.prepare_matrix(session, body, length)
@@ -142,7 +142,7 @@ impl Stepper {
     fn prepare_matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         length: f64,
     ) -> Result<()> {
         if self.solver.is_prepared_for(length) {

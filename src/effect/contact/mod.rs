@@ -20,6 +20,7 @@
 mod blend;
 mod bounds;
 mod count;
+mod directions;
 mod friction;
 mod point;
 mod sliding;
@@ -37,6 +38,7 @@ use friction::Friction;
 use point::{Point, Unknown, gauss_points};
 
 pub use count::{COUNTS, PointCount};
+pub use directions::{ContactNode, contact_nodes};
 pub use unknowns::choose_unknowns;
 
 /// Where on a facet the law holds.
@@ -115,11 +117,6 @@ impl<const D: usize> Contact<D> {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_along(point.stretch, nodal);
         }
-    }
-
-    /// Adds the nodal forces of a pressure of 1 Pa; nodal quadrature.
-    pub fn add_unit_pressure(&self, forces: &mut [f64]) {
-        self.points.iter().filter(|_| !self.needs_ghosts).for_each(|point| point.push(1.0, forces));
     }
 
     /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
@@ -274,6 +271,20 @@ impl<const D: usize> Contact<D> {
         }
         if let Some(friction) = &self.friction {
             friction.project(values);
+        }
+    }
+
+    /// Removes from nodal values what moves any nodal point.
+    pub fn hold(&self, values: &mut [f64]) {
+        for point in &self.points {
+            match point.unknown {
+                Unknown::Parameter => point.add_along(-point.along(values), values),
+                Unknown::Velocity => values[point.node() * D..][..D].fill(0.0),
+                Unknown::Held => {}
+            }
+        }
+        if let Some(friction) = &self.friction {
+            friction.hold(values);
         }
     }
 
