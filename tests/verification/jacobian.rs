@@ -118,6 +118,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 linear_solver: &mut linear_solver,
                 session,
                 stop_at_cycles: false,
+                equilibrated: false,
                 effort: Effort::default(),
             };
             equations.linearise(&point).expect("linearised");
