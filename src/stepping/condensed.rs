@@ -142,6 +142,11 @@ impl Condensed {
         })
     }
 
+    /// The motions that the contacts of a body see, over all ranks. Collective.
+    pub fn motions_of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
+        session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
+    }
+
     /// Factors the matrix that has these rows on this rank; says whether it could. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,

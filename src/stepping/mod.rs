@@ -20,7 +20,7 @@ mod stepper;
 
 pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
-pub use linear_solver::{FrictionIteration, Method, Preconditioner, SolverSettings};
+pub use linear_solver::{FrictionIteration, Method, Preconditioner, Service, SolverSettings};
 pub use scheme::Scheme;
 pub use step_length::{SNAP, next_step};
 pub use stepper::{StepClock, StepOutcome, Stepper};

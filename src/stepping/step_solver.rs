@@ -4,7 +4,7 @@ use super::{
     bounded::{self, Bounded},
     condensed::Condensed,
     flow::{Flow, FlowStart},
-    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
+    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, Service, SolverSettings},
     newton::{From, Newton, REMEDY, Task, failed},
     stepper::StepOutcome,
 };
@@ -16,6 +16,9 @@ use crate::{
     session::Session,
     state::State,
 };
+
+/// Motions of contact nodes whose dense matrix costs no more than the factorisation.
+const MOST_MOTIONS: usize = 4_000;
 
 /// What a step brings to its solution.
 pub(super) struct Known<'a> {
@@ -52,7 +55,12 @@ impl StepSolver {
         settings: SolverSettings,
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
-        let preconditioner = settings.preconditioner.resolve(D, unknowns);
+        let preconditioner = settings.preconditioner.resolve(Service {
+            dimension: D,
+            unknowns,
+            ranks: session.ranks(),
+            steps: settings.steps,
+        });
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
             let mut ksp = Ksp::new("")?;
@@ -88,6 +96,7 @@ impl StepSolver {
             && !chosen
             && !body.flows()
             && !body.contacts.iter().any(Contact::needs_ghosts)
+            && Condensed::motions_of(session, body) <= MOST_MOTIONS
         {
             let condensed = Condensed::new(session, body, state.contact_traction.is_some())?;
             return Ok(Solver::Condensed(Box::new(condensed)));
