@@ -136,6 +136,19 @@ impl Graph {
         self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
     }
 
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
+    /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
+    pub fn growth_constants(&self) -> [f64; 2] {
+        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
+        if slope == f64::INFINITY {
+            return [f64::INFINITY; 2];
+        }
+        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
+        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
+        let corners = self.points.iter().map(|point| excess(*point));
+        [corners.fold(self.pressure(0.0).abs(), f64::max), slope]
+    }
+
     /// The largest pressure in Pa of all points; infinite where there is none.
     pub fn greatest_pressure(&self) -> f64 {
         if self.slopes[0] < 0.0 || self.slopes[self.points.len()] > 0.0 {
@@ -228,6 +241,21 @@ mod tests {
         assert_eq!(bounded.greatest_pressure(), 2.0);
         assert_eq!(valley().greatest_pressure(), f64::INFINITY);
         assert_eq!(Graph::new(vec![[0.0, 0.0]], -1.0, 0.0).unwrap().greatest_pressure(), f64::INFINITY);
+    }
+
+    #[test]
+    fn growth_constants_by_hand() {
+        assert_eq!(valley().growth_constants(), [2.0, 3.0], "2 Pa at rest, a slope of 3 at last");
+        let growth = |points, before, after| Graph::new(points, before, after).unwrap().growth_constants();
+        // The corner at 2 m/s is 7 - 2 * 0.5 = 6 Pa above the cone; the line through it has 3 Pa at rest.
+        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), [6.0, 0.5]);
+        // A jump at rest counts with both ends, one beside it with what is left beyond the cone.
+        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), [4.0, 1.0]);
+        assert_eq!(growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0), [3.0, 2.0], "a law that falls for good");
+        // The line 2 v + 1 is 1 Pa above the cone 2 |v| from rest on, its corner 1 Pa below.
+        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), [1.0, 2.0]);
+        assert_eq!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY), [f64::INFINITY; 2], "a wall");
+        assert_eq!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0), [f64::INFINITY; 2]);
     }
 
     #[test]
@@ -328,6 +356,8 @@ mod tests {
             prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v).abs()));
             let size = v.abs() + g.pressure(v).abs() / g.reach[1];
             prop_assert!(g.distance(v, g.pressure(v)) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            let [at_rest, slope] = g.growth_constants();
+            prop_assert!(g.pressure(v).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
             for w in [v - 1.0, v + 0.3] {
                 let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
                 prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);

@@ -364,3 +364,21 @@ impl<const D: usize> ProjectedOperator for Inside<'_, D> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn branches_that_come_back_after_others_are_told_with_their_period() {
+        let period = |sets: &[f64]| Effort { sets: sets.to_vec(), ..Effort::default() }.period();
+        assert_eq!(period(&[]), None);
+        assert_eq!(period(&[1.0]), None);
+        assert_eq!(period(&[1.0, 2.0, 3.0]), None, "all of them new");
+        assert_eq!(period(&[1.0, 2.0, 2.0]), None, "they stay");
+        assert_eq!(period(&[1.0, 2.0, 1.0]), Some(2));
+        assert_eq!(period(&[5.0, 1.0, 2.0, 3.0, 1.0]), Some(3));
+        assert_eq!(period(&[1.0, 2.0, 1.0, 3.0, 1.0]), Some(2), "the last time counts");
+        assert!(cycle(2).contains("that it had 2 iterations before"));
+    }
+}
