@@ -23,7 +23,7 @@ const FUNCTIONS: &[&str] = &[
     "MatNullSpace(Create|CreateRigidBody|SetFunction|Destroy)",
     "KSP(Create|Destroy|SetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
-    "KSP(SetOptionsPrefix|GetType|SetPC)",
+    "KSP(SetOptionsPrefix|GetType|SetPC|ConvergedDefaultSetUIRNorm)",
     "PCShell(SetApply|SetContext|GetContext)",
     "PC(Apply|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",

@@ -154,11 +154,11 @@ impl NormalLaw {
         }
     }
 
-    /// Distance of a pair (velocity, pressure) to the graph, scaled by the graph's own range, or by this one if the law
-    /// depends on the displacement.
+    /// Distance of a pair (velocity, pressure) to the graph, scaled by this range, or by that of the graph's corners where
+    /// it has any and they are larger.
     pub fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
         match self {
-            Self::Graph(graph) => graph.distance(velocity, pressure),
+            Self::Graph(graph) => graph.distance(velocity, pressure, range),
             Self::Compliance(_) => (self.pressure(velocity, node) - pressure).abs() / range[1],
             Self::Unilateral(wall) => wall.distance_in(velocity - node.closing_velocity(), pressure, range),
         }

@@ -231,6 +231,31 @@ impl StepSolver {
         // No residual below the rounding of `K v` is asked for, however small the forces that are left.
         let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
+        let solved = self.solve_to(session, body, state, (step, start), (forces, tolerance), trial);
+        let Err(Error::Failed(_)) = &solved else { return solved };
+        // The start may be much less than the solution, above all at rest.
+        let mut answer = forces.like()?;
+        self.precondition(forces, &mut answer)?;
+        let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
+        if floor.is_finite() && floor > tolerance {
+            if !self.is_nonlinear() {
+                trial.copy_from(&answer)?;
+            }
+            return self.solve_to(session, body, state, (step, start), (forces, floor), trial);
+        }
+        solved
+    }
+
+    /// Solves a step to this residual norm in N. Collective.
+    fn solve_to<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        (step, start): (Step, Option<FlowStart<'_>>),
+        (forces, tolerance): (&DistributedVector, f64),
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
         let Some((_, matrix)) = &self.matrix else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };

@@ -301,7 +301,7 @@ impl<const D: usize> Friction<D> {
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
-        self.points.iter().map(distance).fold(0.0, f64::max)
+        super::inclusion::worst(self.points.iter().map(distance))
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.

@@ -22,6 +22,7 @@ mod bounds;
 mod count;
 mod directions;
 mod friction;
+mod inclusion;
 mod point;
 mod sliding;
 mod tangential_point;
@@ -378,34 +379,5 @@ impl<const D: usize> Contact<D> {
             Ok(point.weight * law.energy(point.normal_component(displacement) - gap))
         };
         self.points.iter().map(energy).sum()
-    }
-
-    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs.
-    pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
-        let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
-            let along = point.normal_component(velocity).abs().max(point.context_velocity());
-            [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
-        });
-        let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
-        [normal[0], normal[1], sliding[0], sliding[1]]
-    }
-
-    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
-    /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own.
-    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
-        // The pressure that would change the velocities by as much as they are counts where there is no other.
-        let sliding = [range[2], range[3]];
-        // So does the velocity that the pressures would change.
-        let range = [range[0].max(range[1] / self.scale), range[1].max(self.scale * range[0])];
-        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
-        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
-        let distance = |p: &Point<D>| {
-            let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
-            self.law.distance(p.normal_component(velocity), pressure, p.context, range)
-        };
-        let normal = free.map(distance).fold(0.0, f64::max);
-        let friction = self.friction.as_ref();
-        friction
-            .map_or(normal, |f| normal.max(f.inclusion_residual(&self.points, velocity, residual, sliding)))
     }
 }
