@@ -11,6 +11,7 @@ mod implicit_euler;
 mod lagged_euler;
 mod linear_solver;
 mod newton;
+mod rungs;
 mod scheme;
 mod step_length;
 mod step_solver;

@@ -6,13 +6,14 @@ use super::{
     flow::{Flow, FlowStart},
     linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
     newton::{Newton, REMEDY, Task, failed},
+    rungs::{self, Krylov, Rung, Rungs},
     stepper::StepOutcome,
 };
 use crate::{
     body::Body,
     effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp, Snes, has_option},
+    petsc::{DistributedVector, Ksp, Matrix, Snes, has_option},
     session::Session,
     state::State,
 };
@@ -33,18 +34,30 @@ pub(super) struct Known<'a> {
 }
 
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
-enum Solver {
+pub(super) enum Solver {
     Linear(Ksp),
     Newton(Box<Newton>),
+}
+
+/// A step's length with the length of the rung whose preconditioner serves it, both as matrices have them, in s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lengths {
+    pub matrix: f64,
+    pub rung: f64,
 }
 
 /// The matrix for steps of one length, and what solves with it.
 pub(super) struct StepSolver {
     settings: SolverSettings,
-    matrix: Option<(f64, Matrix)>,
-    /// Norm of the matrix in N s/m.
+    /// The matrix that the preconditioner in use is of.
+    rung: Option<(f64, Matrix)>,
+    /// The matrix of steps that are of no rung's length.
+    between: Option<(f64, Matrix)>,
+    /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
+    /// What else is kept.
+    rungs: Option<Rungs>,
 }
 
 impl StepSolver {
@@ -59,17 +72,11 @@ impl StepSolver {
         let preconditioner = settings.preconditioner.resolve(D, unknowns);
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
-            let mut ksp = Ksp::new("")?;
-            preconditioner.configure(&mut ksp, session.ranks(), unknowns)?;
-            ksp.start_from_solution()?;
-            ksp.apply_options()?;
-            Solver::Linear(ksp)
+            Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
         } else {
             let mut snes = Snes::new("", &state.velocity, D)?;
             snes.apply_options()?;
-            let mut linear_solver = ProjectedKsp::new("", &state.velocity, D)?;
-            preconditioner.configure(linear_solver.linear_solver(), session.ranks(), unknowns)?;
-            linear_solver.linear_solver().apply_options()?;
+            let linear_solver = rungs::projected::<D>(session, preconditioner, unknowns, &state.velocity)?;
             let flow = if flows { Some(Flow::new(&state.velocity)?) } else { None };
             let scratch = Scratch::new(&state.velocity, &body.contacts)?;
             let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
@@ -87,7 +94,6 @@ impl StepSolver {
                     Some(Bounded::new(&state.velocity)?)
                 }
             };
-            linear_solver.set_patience(preconditioner.patience(D));
             let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
             Solver::Newton(Box::new(Newton {
                 snes,
@@ -104,9 +110,11 @@ impl StepSolver {
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
-            matrix: None,
+            rung: None,
+            between: None,
             matrix_norm: 0.0,
             solver,
+            rungs: None,
         })
     }
 
@@ -120,30 +128,77 @@ impl StepSolver {
         self.settings.preconditioner
     }
 
-    /// Whether the matrix is that of this length.
-    pub fn is_prepared_for(&self, length: f64) -> bool {
-        self.matrix.as_ref().is_some_and(|(known, _)| *known == length)
+    /// Whether the matrices are those of these lengths.
+    pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
+        let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
+        let rung = length(&self.rung);
+        rung == Some(lengths.rung) && length(&self.between).or(rung) == Some(lengths.matrix)
     }
 
-    /// Assembles the matrix of this length and sets its preconditioner up; `like` is laid out as velocities are. Collective.
+    /// Assembles the matrix of this length and sets the preconditioner of its rung up, unless they are there; says whether a
+    /// preconditioner was made. `like` is laid out as velocities are. Collective.
     pub fn prepare<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        lengths: Lengths,
+        like: &DistributedVector,
+    ) -> Result<bool> {
+        self.between = None;
+        let made = self.rung.as_ref().is_none_or(|(known, _)| *known != lengths.rung)
+            && self.change_rung(session, body, lengths.rung, like)?;
+        if lengths.matrix != lengths.rung {
+            self.between = Some((lengths.matrix, assembled(session, body, lengths.matrix)?));
+        }
+        self.matrix_norm = self.matrix()?.norm()?;
+        if let (Solver::Linear(ksp), Some((_, rung))) = (&mut self.solver, &self.rung) {
+            ksp.set_matrices(self.between.as_ref().map_or(rung, |(_, matrix)| matrix), rung)?;
+        }
+        Ok(made)
+    }
+
+    /// Brings the rung of this length into use; says whether it had to be made. Collective.
+    fn change_rung<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
         length: f64,
         like: &DistributedVector,
-    ) -> Result<()> {
-        self.matrix = None;
-        let rows = session.agree(body.matrix(session, length))?;
-        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        drop(rows);
-        if self.settings.preconditioner == Preconditioner::Gamg {
+    ) -> Result<bool> {
+        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
+        let found = self.rungs.as_mut().and_then(|rungs| rungs.take(length));
+        let (is_there, mut next) = match found {
+            Some(Rung { matrix, krylov, .. }) => (Some(matrix), Some(krylov)),
+            None => (None, None),
+        };
+        if let Some((length, matrix)) = self.rung.take() {
+            let rungs = match &mut self.rungs {
+                Some(rungs) => rungs,
+                none => {
+                    let bytes = 12.0 * matrix.stored_entries()?;
+                    let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
+                    none.insert(Rungs::new(kept - 1))
+                }
+            };
+            let mut krylov = match next.take() {
+                Some(krylov) => krylov,
+                None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+            };
+            krylov.exchange(&mut self.solver);
+            rungs.put(Rung { length, matrix, krylov });
+        }
+        if let Some(matrix) = is_there {
+            self.rung = Some((length, matrix));
+            return Ok(false);
+        }
+        let mut matrix = assembled(session, body, length)?;
+        if chosen == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
         }
         match &mut self.solver {
             Solver::Linear(ksp) => {
-                ksp.set_matrix(&matrix)?;
+                ksp.set_matrices(&matrix, &matrix)?;
                 session.agree(ksp.set_up())?;
             }
             Solver::Newton(newton) => {
@@ -152,17 +207,19 @@ impl StepSolver {
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
         }
-        self.matrix_norm = matrix.norm()?;
-        self.matrix = Some((length, matrix));
-        Ok(())
+        self.rung = Some((length, matrix));
+        Ok(true)
+    }
+
+    /// The matrix in use.
+    fn matrix(&self) -> Result<&Matrix> {
+        let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
+        self.between.as_ref().or(self.rung.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
     }
 
     /// `y = K x`. Collective.
     pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        let Some((_, matrix)) = &self.matrix else {
-            return Err(Error::Internal("a product was asked for before the matrix was assembled".into()));
-        };
-        matrix.multiply(x, y)
+        self.matrix()?.multiply(x, y)
     }
 
     /// Applies the preconditioner. Collective.
@@ -195,7 +252,7 @@ impl StepSolver {
         // No residual below the rounding of `K v` is asked for, however small the forces that are left.
         let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
-        let Some((_, matrix)) = &self.matrix else {
+        let Some((_, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
         match &mut self.solver {
@@ -219,4 +276,14 @@ impl StepSolver {
             }
         }
     }
+}
+
+/// The matrix of a length. Collective.
+fn assembled<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    length: f64,
+) -> Result<Matrix> {
+    let rows = session.agree(body.matrix(session, length))?;
+    session.agree(Matrix::symmetric(D, &rows))
 }
