@@ -90,6 +90,13 @@ impl Session<'_> {
         self.reduce(mine, SystemOperation::sum())
     }
 
+    /// Sum over all ranks of each entry of lists of one length. Collective.
+    pub fn sum_of_lists(&self, mine: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; mine.len()];
+        self.world.all_reduce_into(mine, &mut all[..], SystemOperation::sum());
+        all
+    }
+
     /// Largest of each entry over all ranks. Collective.
     pub fn largest<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
         self.reduce(mine, SystemOperation::max())

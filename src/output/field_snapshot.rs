@@ -45,6 +45,11 @@ impl Snapshot {
         self.corners - 1
     }
 
+    /// The body without what moves and stresses it.
+    pub fn without_fields(self) -> Self {
+        Self { displacement: None, velocity: None, von_mises: None, ..self }
+    }
+
     /// Nodes of each cell.
     pub fn cells(&self) -> impl Iterator<Item = &[u32]> {
         self.cells.chunks_exact(self.corners)

@@ -29,9 +29,9 @@ pub struct Cholesky {
 const DISSECTED: usize = 2_000;
 
 impl Cholesky {
-    /// Orders and analyses the whole matrix of these block rows with these unknowns last. `None` where they can't be: the
-    /// rest does not tie them together.
-    pub fn new(block: usize, rows: &BlockRows, last: &[usize]) -> Result<Option<Self>> {
+    /// Analyses the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
+    /// can't be: the rest does not tie them together.
+    pub fn new(block: usize, rows: &BlockRows, last: &[usize], known: Option<&[u32]>) -> Result<Option<Self>> {
         let size = (rows.offsets.len() - 1) * block;
         let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
         // SAFETY: CHOLMOD fills the struct, which stays in its box.
@@ -55,13 +55,17 @@ impl Cholesky {
             last: last.len(),
             not_send: PhantomData,
         };
-        let nodes = cholesky.node_order(rows)?;
         let mut is_last = vec![false; size];
         last.iter().for_each(|&unknown| is_last[unknown] = true);
-        let unknowns = nodes.iter().flat_map(|&node| (0..block).map(move |i| node as usize * block + i));
-        let mut order: Vec<c_int> =
-            unknowns.filter(|&unknown| !is_last[unknown]).map(|unknown| unknown as c_int).collect();
-        order.extend(last.iter().map(|&unknown| unknown as c_int));
+        let mut order: Vec<c_int> = match known {
+            Some(order) => order.iter().map(|&unknown| unknown as c_int).collect(),
+            None => {
+                let nodes = cholesky.node_order(rows)?.into_iter().map(|node| node as usize);
+                let unknowns = nodes.flat_map(|node| (0..block).map(move |i| node * block + i));
+                let first = unknowns.filter(|&unknown| !is_last[unknown]);
+                first.chain(last.iter().copied()).map(|unknown| unknown as c_int).collect()
+            }
+        };
         let mut lower = Lower::of(block, rows)?;
         let mut matrix = lower.view();
         // SAFETY: the view lives for the call, the order has as many entries as the matrix rows; the handle owns the factor.
@@ -144,6 +148,11 @@ impl Cholesky {
         }
         // SAFETY: the handle owns as many numbers as unknowns there, once a solve went half through.
         unsafe { std::slice::from_raw_parts_mut((*self.halfway).x.cast::<f64>().add(first), last) }
+    }
+
+    /// The order of elimination.
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// The last unknowns in the order in which they are eliminated.
@@ -344,7 +353,7 @@ mod tests {
     #[test]
     fn both_halves_together_solve() {
         let rows = chain(5);
-        let mut cholesky = Cholesky::new(1, &rows, &[2]).unwrap().unwrap();
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
         cholesky.factor(&rows).unwrap();
         // A parabola has the second difference 2.
         let x = solve(&mut cholesky, &[2.0; 5]);
@@ -356,7 +365,7 @@ mod tests {
     #[test]
     fn the_last_block_is_the_factor_of_the_schur_complement() {
         let rows = chain(3);
-        let mut cholesky = Cholesky::new(1, &rows, &[0, 2]).unwrap().unwrap();
+        let mut cholesky = Cholesky::new(1, &rows, &[0, 2], None).unwrap().unwrap();
         cholesky.factor(&rows).unwrap();
         // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
         let l = cholesky.last_factor();
@@ -369,7 +378,7 @@ mod tests {
     #[test]
     fn a_value_set_halfway_is_that_of_the_last_unknown() {
         let rows = chain(3);
-        let mut cholesky = Cholesky::new(1, &rows, &[2]).unwrap().unwrap();
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
         cholesky.factor(&rows).unwrap();
         cholesky.forward(&[0.0; 3]).unwrap();
         let along = cholesky.last_factor()[0];
@@ -388,7 +397,7 @@ mod tests {
             columns: vec![0, 1, 0, 1, 2, 3, 2, 3],
             values: vec![2.0, -1.0, -1.0, 2.0, 2.0, -1.0, -1.0, 2.0],
         };
-        let both = Cholesky::new(1, &rows, &[1, 3]).unwrap();
+        let both = Cholesky::new(1, &rows, &[1, 3], None).unwrap();
         assert!(both.is_none_or(|cholesky| cholesky.last_unknowns().iter().all(|u| [1, 3].contains(u))));
     }
 
@@ -396,7 +405,7 @@ mod tests {
     fn an_indefinite_matrix_is_an_error_in_words() {
         let mut rows = chain(3);
         rows.values[0] = -2.0;
-        let mut cholesky = Cholesky::new(1, &rows, &[1]).unwrap().unwrap();
+        let mut cholesky = Cholesky::new(1, &rows, &[1], None).unwrap().unwrap();
         assert!(cholesky.factor(&rows).unwrap_err().to_string().contains("not positive definite"));
     }
 }

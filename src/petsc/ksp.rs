@@ -85,8 +85,13 @@ impl Ksp {
 
     /// Solves with this matrix, which also makes the preconditioner.
     pub fn set_matrix(&mut self, matrix: &Matrix) -> Result<()> {
+        self.set_matrices(matrix, matrix)
+    }
+
+    /// Solves with the first matrix; the second makes the preconditioner, anew if it is another one than before.
+    pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.
-        check(unsafe { sys::KSPSetOperators(self.raw, matrix.raw, matrix.raw) })
+        check(unsafe { sys::KSPSetOperators(self.raw, matrix.raw, preconditioned.raw) })
     }
 
     /// Krylov method by PETSc's name, such as `cg`; its norm is that of the residual itself.

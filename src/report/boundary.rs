@@ -197,7 +197,8 @@ impl<'a> Boundary<'a> {
                 let plural = if mine.len() == 1 { "node" } else { "nodes" };
                 let label = format!("{}: {} {plural}", branch.name, mine.len());
                 counts.push(label.clone());
-                series.push(Series { colour: branch_colour(at), ..Series::new(0, label, Look::Dots, mine) });
+                let dots = Series::new(series.len(), label, Look::Dots, mine);
+                series.push(Series { colour: branch_colour(at), ..dots });
             }
         }
         let (quantity, unit) = law.quantity();

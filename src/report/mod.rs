@@ -1,29 +1,17 @@
-//! `solver report`: pictures and one self-contained page from the files that a run left.
-//!
-//! Charts are drawn by plotters, bodies by this module, both as SVG: letters stay letters, set in the reader's own sans
-//! serif. PNG files are made of the same SVG by resvg with a font that the program carries, so that both agree and no font
-//! of the machine is needed.
+//! `solver report`: pictures and one self-contained page from the files that a run or a study left.
 
 mod arc;
-mod body;
 mod boundary;
-mod chart;
-mod colour;
 mod facts;
 mod found;
-mod frame;
 mod history;
 mod law;
-mod markup;
 mod page;
-mod paint;
-mod picture;
-mod scale;
 mod study;
 mod table;
-mod view;
 
 use crate::{
+    drawing::{body, chart, colour, markup, picture, scale, view},
     error::{Error, Result},
     run::VERSION,
 };

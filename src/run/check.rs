@@ -9,6 +9,7 @@ use super::{
     time_loop::steps_between,
 };
 use crate::{
+    stepping::Service,
     body::Body,
     certificate::Certificates,
     error::{Error, Result},

@@ -15,7 +15,7 @@ use crate::{
     effect::{Contact, ContactNode, contact_nodes},
     error::{Error, Result},
     exchange::gather,
-    petsc::{BlockRows, Cholesky, DistributedVector},
+    petsc::{BlockRows, Cholesky, DistributedVector, ProjectedKsp},
     session::Session,
 };
 use mpi::topology::SimpleCommunicator;
@@ -23,8 +23,7 @@ use mpi::topology::SimpleCommunicator;
 /// A solver for steps whose matrix is factored whole on each rank.
 pub(super) struct Condensed {
     newton: Newton,
-    cholesky: Option<Cholesky>,
-    matrix: Option<CondensedMatrix>,
+    factored: Option<Factored>,
     /// Contact nodes of this rank, and their numbers on this rank.
     motions: Vec<Motion>,
     nodes: Vec<usize>,
@@ -35,10 +34,20 @@ pub(super) struct Condensed {
     groups: Vec<std::ops::Range<usize>>,
     own: std::ops::Range<usize>,
     first: usize,
+    /// The order of elimination, once it was found.
+    order: Option<Vec<u32>>,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
     velocity: DistributedVector,
     traction: Option<DistributedVector>,
+}
+
+/// A factored matrix.
+pub(super) struct Factored {
+    cholesky: Cholesky,
+    condensed: CondensedMatrix,
+    /// The parameters of each contact's graphs.
+    scales: Vec<[f64; 2]>,
 }
 
 /// Directions at nodes in place of the axes.
@@ -105,9 +114,10 @@ impl Condensed {
     ) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;
-        let mut newton = Newton::new(&like, &body.contacts)?;
-        newton.linear_solver.linear_solver().set_method("cg")?;
-        newton.linear_solver.precondition_by_operator()?;
+        let mut linear_solver = ProjectedKsp::new("", &like, D)?;
+        linear_solver.linear_solver().set_method("cg")?;
+        linear_solver.precondition_by_operator()?;
+        let newton = Newton::new(&like, &body.contacts, linear_solver)?;
         let world = session.world();
         let mine: Vec<u64> = contact.iter().map(|c| (body.mesh.first_node + c.node) as u64).collect();
         let all = gather(world, &mine)?;
@@ -126,8 +136,7 @@ impl Condensed {
         let start = session.share_start(motions.len());
         Ok(Self {
             newton,
-            cholesky: None,
-            matrix: None,
+            factored: None,
             own: start..start + motions.len(),
             motions,
             nodes: contact.iter().map(|c| c.node).collect(),
@@ -135,6 +144,7 @@ impl Condensed {
             unknowns,
             groups,
             first: body.mesh.first_node * D,
+            order: None,
             right_hand_side: like.like()?,
             trial: like.like()?,
             velocity: like.like()?,
@@ -147,37 +157,45 @@ impl Condensed {
         session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
     }
 
-    /// Factors the matrix that has these rows on this rank; says whether it could. Collective.
+    /// Factors the matrix that has these rows on this rank, in the order of the one in use; says whether it could. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         rows: BlockRows,
     ) -> Result<bool> {
-        self.matrix = None;
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
-        if self.cholesky.is_none() {
-            self.cholesky = session.agree(Cholesky::new(D, &rows, &self.unknowns))?;
-        }
-        let Some(cholesky) = &mut self.cholesky else { return Ok(false) };
+        self.factored = None;
+        let analysed = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref());
+        let Some(mut cholesky) = session.agree(analysed)? else { return Ok(false) };
+        self.order.get_or_insert_with(|| cholesky.order().to_vec());
         session.agree(cholesky.factor(&rows))?;
         drop(rows);
         let mut place = vec![0; body.mesh.total_nodes * D];
         cholesky.last_unknowns().iter().enumerate().for_each(|(at, &unknown)| place[unknown as usize] = at);
-        let matrix = self.matrix.insert(CondensedMatrix {
+        let condensed = CondensedMatrix {
             lower: cholesky.last_factor(),
             places: self.unknowns.iter().map(|&unknown| place[unknown]).collect(),
             nodes: self.groups.clone(),
             own: self.own.clone(),
             motions: self.motions.clone(),
             subspace: Subspace::whole(&self.trial)?,
-        });
-        let newton = &mut self.newton;
-        on_contact(&mut body.contacts, &self.nodes, |contacts| {
-            newton.choose_scales(session, contacts, &self.trial, matrix)
-        })?;
+        };
+        number_nodes(&mut body.contacts, &self.nodes);
+        let chosen = self.newton.choose_scales(session, &body.contacts, &self.trial, &condensed);
+        number_back(&mut body.contacts, &self.nodes);
+        chosen?;
+        self.factored = Some(Factored { cholesky, condensed, scales: self.newton.scales.clone() });
         Ok(true)
+    }
+
+    /// Changes the factored matrix for another.
+    pub fn exchange(&mut self, other: &mut Option<Factored>) {
+        std::mem::swap(&mut self.factored, other);
+        if let Some(factored) = &self.factored {
+            self.newton.scales.clone_from(&factored.scales);
+        }
     }
 
     /// `x = K^-1 b`. Collective.
@@ -193,21 +211,17 @@ impl Condensed {
     fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
         let mut whole = gather(&SimpleCommunicator::world(), &right_hand_side.owned()?)?;
         self.frames.turn(&mut whole, false);
-        self.factored()?.forward(&whole)
+        factored(&mut self.factored)?.cholesky.forward(&whole)
     }
 
     fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
         let mut whole = vec![0.0; self.frames.at.len() * self.frames.dimension];
-        self.factored()?.backward(&mut whole)?;
+        factored(&mut self.factored)?.cholesky.backward(&mut whole)?;
         self.frames.turn(&mut whole, true);
         let mut solution = solution.owned_mut()?;
         let count = solution.len();
         solution.copy_from_slice(&whole[self.first..][..count]);
         Ok(())
-    }
-
-    fn factored(&mut self) -> Result<&mut Cholesky> {
-        self.cholesky.as_mut().ok_or_else(|| Error::Internal("a step was taken before its matrix was factored".into()))
     }
 
     /// Solves a step from the velocity in `trial`, and leaves the new one there. Collective.
@@ -225,20 +239,16 @@ impl Condensed {
         if let (Some(traction), Some(known)) = (&mut self.traction, from.traction) {
             restrict::<D>(&self.nodes, known, traction)?;
         }
-        let (Some(cholesky), Some(matrix)) = (&mut self.cholesky, &self.matrix) else {
-            return Err(Error::Internal("a step was taken before its matrix was factored".into()));
-        };
-        matrix.write(&matrix.times_lower(cholesky.last_mut()), &mut self.right_hand_side)?;
+        let Factored { cholesky, condensed, .. } = factored(&mut self.factored)?;
+        condensed.write(&condensed.times_lower(cholesky.last_mut()), &mut self.right_hand_side)?;
         let from = From { velocity: &self.velocity, traction: self.traction.as_ref() };
-        let task = Task { matrix, right_hand_side: &self.right_hand_side, ..task };
-        let (newton, found) = (&mut self.newton, &mut self.trial);
+        let task = Task { matrix: condensed, right_hand_side: &self.right_hand_side, ..task };
         number_nodes(&mut body.contacts, &self.nodes);
-        let solved = newton.solve(session, body, from, task, found);
-        let nodes = &self.nodes;
-        body.contacts.iter_mut().for_each(|contact| contact.number_nodes(|node| nodes[node]));
+        let solved = self.newton.solve(session, body, from, task, &mut self.trial);
+        number_back(&mut body.contacts, &self.nodes);
         let outcome = solved?;
-        let amounts = matrix.amounts(&self.trial)?;
-        cholesky.last_mut().copy_from_slice(&matrix.times_upper(&amounts));
+        let amounts = condensed.amounts(&self.trial)?;
+        cholesky.last_mut().copy_from_slice(&condensed.times_upper(&amounts));
         self.backward(trial)?;
         {
             // What the laws see is what they found, to the last bit.
@@ -278,16 +288,13 @@ fn number_nodes<const D: usize>(contacts: &mut [Contact<D>], nodes: &[usize]) {
     contacts.iter_mut().for_each(|contact| contact.number_nodes(number));
 }
 
-/// Calls with contacts whose points find their nodes in vectors of contact nodes.
-fn on_contact<const D: usize, T>(
-    contacts: &mut [Contact<D>],
-    nodes: &[usize],
-    call: impl FnOnce(&[Contact<D>]) -> T,
-) -> T {
-    number_nodes(contacts, nodes);
-    let result = call(contacts);
+/// The same in vectors of all nodes.
+fn number_back<const D: usize>(contacts: &mut [Contact<D>], nodes: &[usize]) {
     contacts.iter_mut().for_each(|contact| contact.number_nodes(|node| nodes[node]));
-    result
+}
+
+fn factored(factored: &mut Option<Factored>) -> Result<&mut Factored> {
+    factored.as_mut().ok_or_else(|| Error::Internal("a step was taken before its matrix was factored".into()))
 }
 
 /// The rows of all ranks. Collective.

@@ -72,14 +72,18 @@ impl Task<'_> {
 }
 
 impl Newton {
-    /// Newton's method for unknowns laid out like `like`, whose linear solver is still to be chosen.
-    pub fn new<const D: usize>(like: &DistributedVector, contacts: &[Contact<D>]) -> Result<Self> {
+    /// Newton's method for unknowns laid out like `like`.
+    pub fn new<const D: usize>(
+        like: &DistributedVector,
+        contacts: &[Contact<D>],
+        linear_solver: ProjectedKsp,
+    ) -> Result<Self> {
         let mut snes = Snes::new("", like, D)?;
         snes.apply_options()?;
         Ok(Self {
             snes,
             bounded: None,
-            linear_solver: ProjectedKsp::new("", like, D)?,
+            linear_solver,
             scratch: Scratch::new(like, contacts)?,
             before: Vec::new(),
             after: Vec::new(),

@@ -66,6 +66,11 @@ impl Method {
         }
     }
 
+    /// The same for a step after others of its length.
+    pub fn steady_length(&self, length: f64) -> f64 {
+        self.matrix_length(Step { time: 0.0, length, previous_length: length })
+    }
+
     /// Takes in what the step starts from, and adds what is known of its forces to `forces` (with ghosts).
     pub fn start<const D: usize, const S: usize>(
         &mut self,

@@ -1,24 +1,22 @@
 //! The matrix of a step with its solver.
 
 use super::{
-    bounded::{self, Bounded},
+    choice,
     condensed::Condensed,
-    flow::{Flow, FlowStart},
-    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, Service, SolverSettings},
+    flow::FlowStart,
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
     newton::{From, Newton, REMEDY, Task, failed},
+    rungs::{self, Krylov, Rung, Rungs},
     stepper::StepOutcome,
 };
 use crate::{
     body::Body,
-    effect::{Contact, Step},
+    effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, has_option},
+    petsc::{DistributedVector, Ksp, Matrix},
     session::Session,
     state::State,
 };
-
-/// Motions of contact nodes whose dense matrix costs no more than the factorisation.
-const MOST_MOTIONS: usize = 4_000;
 
 /// What a step brings to its solution.
 pub(super) struct Known<'a> {
@@ -31,19 +29,31 @@ pub(super) struct Known<'a> {
 }
 
 /// The solver of a linear or of a nonlinear step: only the one that is needed exists.
-enum Solver {
+pub(super) enum Solver {
     Linear(Ksp),
     Newton(Box<Newton>),
     Condensed(Box<Condensed>),
 }
 
+/// A step's length with the length of the rung whose preconditioner serves it, both as matrices have them, in s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lengths {
+    pub matrix: f64,
+    pub rung: f64,
+}
+
 /// The matrix for steps of one length, and what solves with it.
 pub(super) struct StepSolver {
     settings: SolverSettings,
-    matrix: Option<(f64, Matrix)>,
-    /// Norm of the matrix in N s/m.
+    /// The matrix that the preconditioner in use is of.
+    rung: Option<(f64, Matrix)>,
+    /// The matrix of steps that are of no rung's length.
+    between: Option<(f64, Matrix)>,
+    /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
+    /// What else is kept.
+    rungs: Option<Rungs>,
 }
 
 impl StepSolver {
@@ -63,75 +73,18 @@ impl StepSolver {
         });
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
-            let mut ksp = Ksp::new("")?;
-            preconditioner.configure(&mut ksp, session.ranks(), unknowns)?;
-            ksp.start_from_solution()?;
-            ksp.apply_options()?;
-            Solver::Linear(ksp)
+            Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
         } else {
-            Self::choose_newton(session, body, state, settings, preconditioner)?
+            choice::newton(session, body, state, settings, preconditioner)?
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
-            matrix: None,
+            rung: None,
+            between: None,
             matrix_norm: 0.0,
             solver,
+            rungs: None,
         })
-    }
-
-    /// Newton's method on the contact alone, where all else can be eliminated, or on the whole body.
-    fn choose_newton<const D: usize, const S: usize>(
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-        settings: SolverSettings,
-        preconditioner: Preconditioner,
-    ) -> Result<Solver> {
-        let unknowns = body.mesh.total_nodes * D;
-        let whole = session.ranks() == 1 || preconditioner.is_redundant(session.ranks(), unknowns);
-        let chosen = has_option("pc_type")? || has_option("ksp_type")?;
-        if preconditioner == Preconditioner::Cholesky
-            && settings.method == Method::Newton
-            && whole
-            && !chosen
-            && !body.flows()
-            && !body.contacts.iter().any(Contact::needs_ghosts)
-            && Condensed::motions_of(session, body) <= MOST_MOTIONS
-        {
-            let condensed = Condensed::new(session, body, state.contact_traction.is_some())?;
-            return Ok(Solver::Condensed(Box::new(condensed)));
-        }
-        Self::whole_newton(session, body, &state.velocity, settings, preconditioner)
-    }
-
-    /// Newton's method on the whole body, for velocities laid out like `like`.
-    fn whole_newton<const D: usize, const S: usize>(
-        session: &Session,
-        body: &Body<D, S>,
-        like: &DistributedVector,
-        settings: SolverSettings,
-        preconditioner: Preconditioner,
-    ) -> Result<Solver> {
-        let unknowns = body.mesh.total_nodes * D;
-        let mut newton = Newton::new(like, &body.contacts)?;
-        preconditioner.configure(newton.linear_solver.linear_solver(), session.ranks(), unknowns)?;
-        newton.linear_solver.linear_solver().apply_options()?;
-        newton.linear_solver.set_patience(preconditioner.patience(D));
-        if body.flows() {
-            newton.flow = Some(Flow::new(like)?);
-        }
-        if settings.method == Method::VariationalInequality {
-            session.agree(bounded::refuse(body))?;
-            if body.flows() {
-                return Err(Error::Refused(
-                    "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
-                     [time] scheme = \"lagged_euler\""
-                        .into(),
-                ));
-            }
-            newton.bounded = Some(Bounded::new(like)?);
-        }
-        Ok(Solver::Newton(Box::new(newton)))
     }
 
     /// Whether steps are solved by Newton's method.
@@ -144,40 +97,96 @@ impl StepSolver {
         self.settings.preconditioner
     }
 
-    /// Whether the matrix is that of this length.
-    pub fn is_prepared_for(&self, length: f64) -> bool {
-        self.matrix.as_ref().is_some_and(|(known, _)| *known == length)
+    /// Whether the matrices are those of these lengths.
+    pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
+        let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
+        let rung = length(&self.rung);
+        rung == Some(self.rung_of(lengths)) && length(&self.between).or(rung) == Some(lengths.matrix)
     }
 
-    /// Assembles the matrix of this length and sets its preconditioner up; `like` is laid out as velocities are. Collective.
+    /// Assembles the matrix of this length and sets the preconditioner of its rung up, unless they are there; says whether a
+    /// preconditioner was made. `like` is laid out as velocities are. Collective.
     pub fn prepare<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        lengths: Lengths,
+        like: &DistributedVector,
+    ) -> Result<bool> {
+        self.between = None;
+        let rung = self.rung_of(lengths);
+        let mut made = false;
+        if self.rung.as_ref().is_none_or(|(known, _)| *known != rung) {
+            made = self.change_rung(session, body, rung, like)?;
+        }
+        if lengths.matrix != rung {
+            let rows = session.agree(body.matrix(session, lengths.matrix))?;
+            self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
+        }
+        self.matrix_norm = self.matrix()?.norm()?;
+        if let (Solver::Linear(ksp), Some((_, rung))) = (&mut self.solver, &self.rung) {
+            ksp.set_matrices(self.between.as_ref().map_or(rung, |(_, matrix)| matrix), rung)?;
+        }
+        Ok(made)
+    }
+
+    /// The length whose matrix is set up: what is condensed serves no other.
+    fn rung_of(&self, lengths: Lengths) -> f64 {
+        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.rung }
+    }
+
+    /// Brings the rung of this length into use; says whether it had to be made. Collective.
+    fn change_rung<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
         like: &DistributedVector,
-    ) -> Result<()> {
-        self.matrix = None;
+    ) -> Result<bool> {
+        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
+        let found = self.rungs.as_mut().and_then(|rungs| rungs.take(length));
+        let (is_there, mut next) = match found {
+            Some(Rung { matrix, krylov, .. }) => (Some(matrix), Some(krylov)),
+            None => (None, None),
+        };
+        if let Some((length, matrix)) = self.rung.take() {
+            let rungs = match &mut self.rungs {
+                Some(rungs) => rungs,
+                none => {
+                    let bytes = 12.0 * matrix.stored_entries()?;
+                    let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
+                    none.insert(Rungs::new(kept - 1))
+                }
+            };
+            let mut krylov = match next.take() {
+                Some(krylov) => krylov,
+                None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+            };
+            krylov.exchange(&mut self.solver);
+            rungs.put(Rung { length, matrix, krylov });
+        }
+        if let Some(matrix) = is_there {
+            self.rung = Some((length, matrix));
+            return Ok(false);
+        }
         let rows = session.agree(body.matrix(session, length))?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
         if let Solver::Condensed(condensed) = &mut self.solver {
             if condensed.prepare(session, body, rows)? {
-                self.matrix_norm = matrix.norm()?;
-                self.matrix = Some((length, matrix));
-                return Ok(());
+                self.rung = Some((length, matrix));
+                return Ok(true);
             }
-            let (settings, chosen) = (self.settings, self.settings.preconditioner);
-            self.solver = Self::whole_newton(session, body, like, settings, chosen)?;
+            self.solver = choice::whole_newton(session, body, like, self.settings, chosen)?;
         } else {
             drop(rows);
         }
-        if self.settings.preconditioner == Preconditioner::Gamg {
+        if chosen == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
         }
         match &mut self.solver {
             Solver::Linear(ksp) => {
-                ksp.set_matrix(&matrix)?;
+                ksp.set_matrices(&matrix, &matrix)?;
                 session.agree(ksp.set_up())?;
             }
             Solver::Newton(newton) => {
@@ -187,17 +196,19 @@ impl StepSolver {
             }
             Solver::Condensed(_) => {}
         }
-        self.matrix_norm = matrix.norm()?;
-        self.matrix = Some((length, matrix));
-        Ok(())
+        self.rung = Some((length, matrix));
+        Ok(true)
+    }
+
+    /// The matrix in use.
+    fn matrix(&self) -> Result<&Matrix> {
+        let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
+        self.between.as_ref().or(self.rung.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
     }
 
     /// `y = K x`. Collective.
     pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        let Some((_, matrix)) = &self.matrix else {
-            return Err(Error::Internal("a product was asked for before the matrix was assembled".into()));
-        };
-        matrix.multiply(x, y)
+        self.matrix()?.multiply(x, y)
     }
 
     /// Applies the preconditioner. Collective.
@@ -256,7 +267,7 @@ impl StepSolver {
         (forces, tolerance): (&DistributedVector, f64),
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let Some((_, matrix)) = &self.matrix else {
+        let Some((_, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
         let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };

@@ -3,8 +3,9 @@
 use super::{
     adaptive::Norms,
     linear_solver::{Preconditioner, SolverSettings},
+    rungs::nearest,
     scheme::{Method, Scheme},
-    step_solver::{Known, StepSolver},
+    step_solver::{Known, Lengths, StepSolver},
 };
 use crate::{
     body::Body,
@@ -79,7 +80,9 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
-    /// Matrices that were assembled, each with its preconditioner.
+    /// Length in s through which the ladder of preconditioners goes.
+    ladder: f64,
+    /// Preconditioners that were made.
     pub set_ups: u64,
     /// Seconds by phase.
     pub clock: StepClock,
@@ -103,6 +106,7 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
+            ladder: 1.0,
             set_ups: 0,
             clock: StepClock::default(),
         })
@@ -128,30 +132,34 @@ impl Stepper {
         self.solver.preconditioner()
     }
 
-    /// Assembles the matrix for a first step of this length. Collective.
+    /// Assembles the matrix for a first step of this length. Preconditioners will stand at this length and at powers of two
+    /// times it. Collective.
     pub fn prepare_length<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
     ) -> Result<()> {
-        self.prepare_matrix(session, body, length)
+        self.ladder = length;
+        self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })
     }
 
-    /// Assembles the matrix of this length, if the last one was of another. Collective.
+    /// Assembles the matrix of a step, if the last one was of another length. Collective.
     fn prepare_matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
-        length: f64,
+        step: Step,
     ) -> Result<()> {
-        if self.solver.is_prepared_for(length) {
+        let rung = self.method.steady_length(nearest(self.ladder, step.length));
+        let lengths = Lengths { matrix: self.method.matrix_length(step), rung };
+        if self.solver.is_prepared_for(lengths) {
             return Ok(());
         }
         let start = Instant::now();
         let _stage = self.stages.assembly.enter()?;
-        self.solver.prepare(session, body, length, &self.right_hand_side)?;
-        self.set_ups += 1;
+        let made = self.solver.prepare(session, body, lengths, &self.right_hand_side)?;
+        self.set_ups += u64::from(made);
         self.clock.assembly += start.elapsed();
         if self.clock.first_assembly.is_zero() {
             self.clock.first_assembly = self.clock.assembly;
@@ -190,7 +198,7 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<StepOutcome> {
-        self.prepare_matrix(session, body, self.method.matrix_length(step))?;
+        self.prepare_matrix(session, body, step)?;
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
         self.write_right_hand_side(session, body, state, step)?;

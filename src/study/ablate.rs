@@ -5,7 +5,7 @@
 use super::{
     document::{Norm, Over, Quantity, Space, Timing},
     execute::{Outcome, execute},
-    in_dimension,
+    compare::in_dimension,
     measure::Target,
     plan::{Plan, Planned, trim, word},
     record::Record,
@@ -124,6 +124,7 @@ pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Opti
         over: Over::End,
         expected_order: None,
         published: Vec::new(),
+        targets: Vec::new(),
     });
     for path in effects(&plan.base.job)? {
         let mut effect = EffectResult {
@@ -167,9 +168,9 @@ fn change(
     norms: &[Norm; 3],
 ) -> Result<[f64; 3]> {
     let whole = folder.join("whole");
-    let (measured, _) = in_dimension(session, dimension, run, Target::Run(&whole, true), norms)?;
+    let errors = in_dimension(session, dimension, run, Target::Run(&whole, true), norms)?;
     let relative = |at: usize| {
-        measured.get(at).map_or(f64::NAN, |m| if m.error == 0.0 { 0.0 } else { m.error / m.size })
+        errors.measured.get(at).map_or(f64::NAN, |m| if m.error == 0.0 { 0.0 } else { m.error / m.size })
     };
     Ok(std::array::from_fn(relative))
 }
@@ -192,7 +193,7 @@ fn run(
         scheme: word(job.time.scheme),
         tolerance: job.solver.tolerance,
         set: Vec::new(),
-        adaptive: job.time.adaptive.is_some(),
+        adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
         loaded,
     };
     Ok(match execute(session, &planned, timing.repetitions as usize)? {

@@ -16,6 +16,11 @@ pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document
         document.fault("product", format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
     }
     check_cells(study, base, document);
+    if study.compare.split && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
+    {
+        let help = "it needs [reference.run] and a mesh that the base job generates";
+        document.fault("compare.split", "errors can't be split here", help);
+    }
     for (index, run) in study.run.iter().enumerate() {
         let same = |other: &Run| run.name.is_some() && other.name == run.name;
         if run.name.as_deref() == Some("reference") || study.run[..index].iter().any(same) {

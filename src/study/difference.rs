@@ -26,6 +26,14 @@ pub struct Squares {
     pub size: f64,
 }
 
+impl Squares {
+    /// Adds others.
+    pub fn add(&mut self, others: Self) {
+        self.error += others.error;
+        self.size += others.size;
+    }
+}
+
 /// What a run is held against.
 pub enum Against<'a, const D: usize> {
     /// The fields of another run.
@@ -64,33 +72,53 @@ impl<'a, const D: usize> Pair<'a, D> {
 
     /// The squares of a norm at a time, of which the run has the step `step`. Collective.
     pub fn squares(&self, session: &Session, of: Quantity, space: Space, step: usize) -> Result<Squares> {
-        let time = self.run.times[step];
-        let mine = self.run.values(of, step).and_then(|values| match &self.against {
-            Against::Run(other) => {
-                let theirs = other.values_at(of, time)?;
-                over_pieces(space, (&self.run.mesh, &values), (&other.mesh, &theirs), &self.pieces)
-            }
-            Against::Exact(exact) => {
-                exact.squares(space, of, time, (&self.run.mesh, &values), self.range.clone())
-            }
-        });
-        let mine = session.agree(mine)?;
+        let mut mine = Squares::default();
+        let visited = self.visit(of, space, step, |_, squares| mine.add(squares));
+        session.agree(visited)?;
         let [error, size] = session.sum([mine.error, mine.size]);
         Ok(Squares { error, size })
     }
+
+    /// The squares of the errors in each cell of the run's mesh at its step `step`. Collective.
+    pub fn squares_of_cells(
+        &self,
+        session: &Session,
+        of: Quantity,
+        space: Space,
+        step: usize,
+    ) -> Result<Vec<f64>> {
+        let mut mine = vec![0.0; self.run.mesh.count()];
+        let visited = self.visit(of, space, step, |cell, squares| mine[cell] += squares.error);
+        session.agree(visited)?;
+        Ok(session.sum_of_lists(&mine))
+    }
+
+    /// The squares over this rank's pieces, each with the cell of the run that it lies in.
+    fn visit(&self, of: Quantity, space: Space, step: usize, add: impl FnMut(usize, Squares)) -> Result<()> {
+        let (time, values) = (self.run.times[step], self.run.values(of, step)?);
+        match &self.against {
+            Against::Run(other) => {
+                let theirs = other.values_at(of, time)?;
+                over_pieces(space, (&self.run.mesh, &values), (&other.mesh, &theirs), &self.pieces, add)
+            }
+            Against::Exact(exact) => {
+                exact.visit(space, of, time, (&self.run.mesh, &values), self.range.clone(), add)
+            }
+        }
+    }
 }
 
-/// The squares over pieces of two meshes, exact for fields that are linear (vectors) or constant (tensors) in each cell.
+/// The squares over pieces of two meshes, exact for fields that are linear (vectors) or constant (tensors) in each cell; each
+/// is added with its cell of the first mesh.
 pub fn over_pieces<const D: usize>(
     space: Space,
     (one_mesh, one): (&StoredMesh<D>, &Values<D>),
     (other_mesh, other): (&StoredMesh<D>, &Values<D>),
     pieces: &[Piece<D>],
-) -> Result<Squares> {
-    let mut sum = Squares::default();
-    let mut add = |volume: f64, error: f64, size: f64| {
-        sum.error += volume * error;
-        sum.size += volume * size;
+    mut visit: impl FnMut(usize, Squares),
+) -> Result<()> {
+    let mut add = |piece: &Piece<D>, error: f64, size: f64| {
+        visit(piece.one as usize, Squares { error: piece.volume * error, size: piece.volume * size });
     };
     match (space, one, other) {
         (Space::H, Values::Nodal(one), Values::Nodal(other)) => {
@@ -104,25 +132,25 @@ pub fn over_pieces<const D: usize>(
                     let here = mix(&mine, &one_mesh.shares(a, point));
                     difference[corner] = std::array::from_fn(|i| here[i] - reference[corner][i]);
                 }
-                add(piece.volume, mean_square(&difference[..=D]), mean_square(&reference[..=D]));
+                add(piece, mean_square(&difference[..=D]), mean_square(&reference[..=D]));
             }
         }
         (Space::V, Values::Nodal(one), Values::Nodal(other)) => {
             let (mine, theirs) = (strains(one_mesh, one), strains(other_mesh, other));
             for piece in pieces {
                 let (a, b) = (&mine[piece.one as usize], &theirs[piece.other as usize]);
-                add(piece.volume, tensor_square(&minus(a, b)), tensor_square(b));
+                add(piece, tensor_square(&minus(a, b)), tensor_square(b));
             }
         }
         (Space::Q, Values::Cells(one), Values::Cells(other)) => {
             for piece in pieces {
                 let (a, b) = (&one[piece.one as usize], &other[piece.other as usize]);
-                add(piece.volume, tensor_square(&minus(a, b)), tensor_square(b));
+                add(piece, tensor_square(&minus(a, b)), tensor_square(b));
             }
         }
         _ => return Err(Error::Internal(format!("a norm in {space:?} does not fit the field"))),
     }
-    Ok(sum)
+    Ok(())
 }
 
 /// The mean of the square of a linear field over a simplex, from its values at the corners.
@@ -184,7 +212,10 @@ mod tests {
         theirs: &Values<2>,
     ) -> Squares {
         let pieces = overlap(one, other, 0..other.count());
-        over_pieces(space, (one, mine), (other, theirs), &pieces).expect("squares")
+        let mut sum = Squares::default();
+        over_pieces(space, (one, mine), (other, theirs), &pieces, |_, squares| sum.add(squares))
+            .expect("squares");
+        sum
     }
 
     #[test]

@@ -33,6 +33,9 @@ pub struct Study {
     /// How wall time is measured.
     #[serde(default)]
     pub timing: Timing,
+    /// Pictures beside those of work and precision.
+    #[serde(default)]
+    pub pictures: Pictures,
     /// Where the study leaves its files.
     #[serde(default)]
     pub output: Output,
@@ -79,6 +82,9 @@ pub struct Run {
     /// Length of a time step.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub step: Option<f64>,
+    /// Tolerance of adaptive steps; their bounds are those of the base job's [time.adaptive], or 1/4096 and 64 of its steps.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1), example = 0.02)]
+    pub adaptive: Option<f64>,
     /// Time scheme.
     pub scheme: Option<Scheme>,
     /// The solver's tolerance.
@@ -100,6 +106,9 @@ pub struct Product {
     /// Lengths of a time step, from long to short.
     #[schemars(transform = positive_items, extend("unit" = "s"), example = [0.0625, 0.03125])]
     pub steps: Vec<f64>,
+    /// Tolerances of adaptive steps, from loose to tight: more runs beside those of `steps`.
+    #[schemars(transform = positive_items, example = [0.1, 0.01])]
+    pub adaptive: Vec<f64>,
     /// Time schemes.
     #[schemars(example = ["lagged_euler", "bdf2"])]
     pub schemes: Vec<Scheme>,
@@ -146,6 +155,9 @@ pub struct Compare {
     /// At multiples of this time, itself a multiple of every run's step; absent: after every step of a run.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub interval: Option<f64>,
+    /// Takes the reference's steps on the mesh of each run, too: the distance of a run to these is the error of its steps,
+    /// their distance to the reference that of its mesh. For a reference that is a run, on generated meshes.
+    pub split: bool,
 }
 
 /// A norm of the difference between run and reference.
@@ -167,6 +179,10 @@ pub struct Norm {
     #[serde(default)]
     #[schemars(transform = positive_items, example = [0.0573, 0.0204])]
     pub published: Vec<f64>,
+    /// Errors to reach: a table tells of each scheme the fastest run that does.
+    #[serde(default)]
+    #[schemars(transform = positive_items, example = [1e-2, 1e-3])]
+    pub targets: Vec<f64>,
 }
 
 /// What is compared.
@@ -243,6 +259,18 @@ pub enum Take {
     Best,
     /// The median.
     Median,
+}
+
+/// Pictures beside those of work and precision.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Pictures {
+    /// Runs whose errors are drawn over time, seven at most; absent: the most accurate of each scheme.
+    #[schemars(length(max = 7), example = ["coarse", "fine"])]
+    pub over_time: Vec<String>,
+    /// Runs whose errors are drawn on the body, at the time when they are largest.
+    #[schemars(example = ["fine"])]
+    pub in_space: Vec<String>,
 }
 
 /// Where the study leaves its files.

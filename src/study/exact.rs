@@ -56,21 +56,22 @@ impl ExactFields {
         components.get(axis).map(|component| component.evaluate(time, point))
     }
 
-    /// The squares of a norm over some cells of a mesh.
-    pub fn squares<const D: usize>(
+    /// The squares of a norm over some cells of a mesh, each added with its cell.
+    pub fn visit<const D: usize>(
         &self,
         space: Space,
         of: Quantity,
         time: f64,
         (mesh, values): (&StoredMesh<D>, &Values<D>),
         cells: Range<usize>,
-    ) -> Result<Squares> {
+        mut add: impl FnMut(usize, Squares),
+    ) -> Result<()> {
         let components = if of == Quantity::Velocity { &self.velocity } else { &self.displacement };
         let vector = |point: &Vector<D>| -> Vector<D> {
             std::array::from_fn(|i| components.get(i).map_or(0.0, |c| c.evaluate(time, point)))
         };
-        let mut sum = Squares::default();
         for cell in cells {
+            let mut sum = Squares::default();
             let corners = mesh.corners(cell);
             let volume = mesh.geometry[cell].volume;
             let size = volume.powf(1.0 / D as f64);
@@ -93,16 +94,16 @@ impl ExactFields {
                     }
                     _ => return Err(Error::Internal(format!("a norm in {space:?} does not fit the field"))),
                 };
-                sum.error += weight * volume * error;
-                sum.size += weight * volume * norm;
+                sum.add(Squares { error: weight * volume * error, size: weight * volume * norm });
             }
+            if !sum.error.is_finite() {
+                return Err(Error::Refused(format!(
+                    "[reference.exact]: the {of:?} is not a finite number everywhere at t = {time} s; correct its expressions"
+                )));
+            }
+            add(cell, sum);
         }
-        if !sum.error.is_finite() {
-            return Err(Error::Refused(format!(
-                "[reference.exact]: the {of:?} is not a finite number everywhere at t = {time} s; correct its expressions"
-            )));
-        }
-        Ok(sum)
+        Ok(())
     }
 
     /// The stress as stored in files: xx, xy, xz, yy, yz, zz.
@@ -163,6 +164,18 @@ mod tests {
     use crate::job::Expression;
     use crate::mesh::generate::{Diagonal, box_mesh, rectangle};
 
+    fn squares<const D: usize>(
+        exact: &ExactFields,
+        space: Space,
+        of: Quantity,
+        time: f64,
+        on: (&StoredMesh<D>, &Values<D>),
+    ) -> Result<Squares> {
+        let mut sum = Squares::default();
+        exact.visit(space, of, time, on, 0..on.0.count(), |_, squares| sum.add(squares))?;
+        Ok(sum)
+    }
+
     fn expressions(texts: &[&str]) -> Vec<Scalar> {
         texts.iter().map(|text| Scalar::Expression(Expression::parse(text).expect("expression"))).collect()
     }
@@ -195,15 +208,11 @@ mod tests {
         let mesh = rectangle([1.0, 1.0], [2, 3], Diagonal::Left, [1.0; 2]).expect("mesh");
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nothing = Values::Nodal(vec![[0.0; 2]; mesh.nodes.len()]);
-        let all = 0..mesh.count();
-        let of = |space| {
-            exact.squares(space, Quantity::Velocity, 2.0, (&mesh, &nothing), all.clone()).expect("sum")
-        };
+        let of = |space| squares(&exact, space, Quantity::Velocity, 2.0, (&mesh, &nothing)).expect("sum");
         assert!((of(Space::H).error - (4.0 / 9.0 + 0.2)).abs() < 1e-13);
         assert!((of(Space::V).error - 4.0).abs() < 1e-9, "{:?}", of(Space::V));
         let zero = Values::Cells(vec![[0.0; 6]; mesh.count()]);
-        let stress =
-            exact.squares(Space::Q, Quantity::Stress, 0.0, (&mesh, &zero), all.clone()).expect("sum");
+        let stress = squares(&exact, Space::Q, Quantity::Stress, 0.0, (&mesh, &zero)).expect("sum");
         assert!((stress.error - (1.0 + 4.0 + 2.0 / 3.0)).abs() < 1e-13);
         assert_eq!(exact.column("velocity_y", 0.0, &[3.0, 0.0]), Some(9.0));
         assert_eq!(exact.column("pressure_y", 0.0, &[3.0, 0.0]), None);
@@ -220,8 +229,7 @@ mod tests {
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nodal = Values::Nodal(mesh.nodes.iter().map(|p| [p[0] + 2.0 * p[1], 3.0 * p[2], 0.5]).collect());
         for space in [Space::H, Space::V] {
-            let all = 0..mesh.count();
-            let sum = exact.squares(space, Quantity::Displacement, 0.5, (&mesh, &nodal), all).expect("sum");
+            let sum = squares(&exact, space, Quantity::Displacement, 0.5, (&mesh, &nodal)).expect("sum");
             assert!(sum.error < 1e-15 && sum.size > 0.1, "{sum:?}");
         }
         assert_eq!(exact.stress_at::<3>(0.0, &[0.0; 3]), [1.0, 6.0, 5.0, 2.0, 4.0, 3.0]);
@@ -237,7 +245,7 @@ mod tests {
         let mesh = rectangle([1.0, 1.0], [1, 1], Diagonal::Left, [1.0; 2]).expect("mesh");
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nothing = Values::Nodal(vec![[0.0; 2]; 4]);
-        let error = exact.squares(Space::H, Quantity::Displacement, 1.0, (&mesh, &nothing), 0..2);
+        let error = squares(&exact, Space::H, Quantity::Displacement, 1.0, (&mesh, &nothing));
         assert!(error.expect_err("refused").to_string().contains("t = 1 s"));
     }
 }

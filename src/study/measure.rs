@@ -36,13 +36,35 @@ pub enum Target<'a> {
     Exact(&'a ExactFields),
 }
 
-/// Errors of the run in `folder` in some norms, and what the reader should know about them. Collective.
+/// Errors of a run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Errors {
+    /// One for each norm.
+    pub measured: Vec<Measured>,
+    /// Where each sits in time and space.
+    pub places: Vec<Place>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+}
+
+/// Where an error sits.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Place {
+    /// Times in s with the norm in space; of a norm at the end that one alone.
+    pub over_time: Vec<[f64; 2]>,
+    /// The time in s of the largest of these.
+    pub worst: f64,
+    /// The root of the mean square of the error in each cell at that time.
+    pub cells: Vec<f64>,
+}
+
+/// Errors of the run in `folder` in some norms. Collective.
 pub fn errors<const D: usize>(
     session: &Session,
     folder: &Path,
     target: Target,
     norms: &[Norm],
-) -> Result<(Vec<Measured>, Vec<String>)> {
+) -> Result<Errors> {
     let run = session.agree(StoredFields::<D>::open(folder))?;
     let reference = match target {
         Target::Run(path, _) => Some(session.agree(StoredFields::<D>::open(path))?),
@@ -59,67 +81,77 @@ pub fn errors<const D: usize>(
         (None, Target::Run(..)) => return Err(Error::Internal("no reference to compare with".into())),
     };
     let pair = Pair::new(session, &run, against);
-    let mut notes = Vec::new();
-    if pair.uncovered.abs() > UNCOVERED {
-        return Err(Error::Failed(format!(
-            "its mesh covers only {:.2} % of the reference's body: they are not meshes of the same body",
-            100.0 * (1.0 - pair.uncovered)
-        )));
-    }
-    if pair.uncovered.abs() > 1e-9 {
-        notes.push(format!(
-            "its mesh covers {:.6} % of the reference's body; errors are of what both cover",
-            100.0 * (1.0 - pair.uncovered)
-        ));
-    }
-    let mut kinds: Vec<(Quantity, Space)> = Vec::new();
+    let mut found = Errors { notes: covered(pair.uncovered)?, ..Errors::default() };
+    let mut known: Vec<((Quantity, Space, bool), (Vec<Squares>, Place))> = Vec::new();
     for norm in norms {
-        if !kinds.contains(&(norm.of, norm.space)) {
-            kinds.push((norm.of, norm.space));
+        let kind = (norm.of, norm.space, norm.over == Over::End);
+        if !known.iter().any(|(other, _)| *other == kind) {
+            known.push((kind, over_time(session, &pair, &run, kind)?));
         }
+        let Some((_, (squares, place))) = known.iter().find(|(other, _)| *other == kind) else { continue };
+        found.measured.push(measured(norm.over, squares, &place.over_time));
+        found.places.push(place.clone());
     }
-    let last = run.times.len().saturating_sub(1);
-    let mut measured = vec![Measured { error: 0.0, size: 0.0 }; norms.len()];
-    for step in 0..run.times.len() {
-        if run.times[step] <= 0.0 {
-            continue;
-        }
-        let length = run.times[step] - if step > 0 { run.times[step - 1] } else { 0.0 };
-        for &(of, space) in &kinds {
-            let of_kind = |norm: &Norm| (norm.of, norm.space) == (of, space);
-            if step == last || norms.iter().any(|norm| of_kind(norm) && norm.over != Over::End) {
-                let squares = pair.squares(session, of, space, step)?;
-                let sums = norms.iter().zip(&mut measured).filter(|(norm, _)| of_kind(norm));
-                add(sums, squares, length, step == last);
-            }
-        }
-    }
-    for value in &mut measured {
-        *value = Measured { error: value.error.sqrt(), size: value.size.sqrt() };
-    }
-    Ok((measured, notes))
+    Ok(found)
 }
 
-fn add<'a>(
-    norms: impl Iterator<Item = (&'a Norm, &'a mut Measured)>,
-    squares: Squares,
-    length: f64,
-    is_last: bool,
-) {
-    for (norm, sum) in norms {
-        match norm.over {
-            Over::Max => {
-                sum.error = sum.error.max(squares.error);
-                sum.size = sum.size.max(squares.size);
-            }
-            Over::Sum => {
-                sum.error += length * squares.error;
-                sum.size += length * squares.size;
-            }
-            Over::End if is_last => *sum = Measured { error: squares.error, size: squares.size },
-            Over::End => {}
-        }
+/// What there is to say of a mesh that does not cover this share of the reference's body.
+fn covered(uncovered: f64) -> Result<Vec<String>> {
+    let covers = 100.0 * (1.0 - uncovered);
+    if uncovered.abs() > UNCOVERED {
+        return Err(Error::Failed(format!(
+            "its mesh covers only {covers:.2} % of the reference's body: they are not meshes of the same body"
+        )));
     }
+    let words = || format!("its mesh covers {covers:.6} % of the reference's body; errors are of what both cover");
+    Ok((uncovered.abs() > 1e-9).then(words).into_iter().collect())
+}
+
+/// The squares at the steps after time 0, or at the last alone, and where they are largest. Collective.
+fn over_time<const D: usize>(
+    session: &Session,
+    pair: &Pair<D>,
+    run: &StoredFields<D>,
+    (of, space, at_end): (Quantity, Space, bool),
+) -> Result<(Vec<Squares>, Place)> {
+    let last = run.times.len().saturating_sub(1);
+    let steps = if at_end { last..last + 1 } else { 0..last + 1 };
+    let (mut all, mut place, mut worst) = (Vec::new(), Place::default(), None);
+    for step in steps.filter(|step| run.times.get(*step).is_some_and(|time| *time > 0.0)) {
+        let squares = pair.squares(session, of, space, step)?;
+        if worst.is_none_or(|(_, largest)| squares.error > largest) {
+            worst = Some((step, squares.error));
+        }
+        place.over_time.push([run.times[step], squares.error.sqrt()]);
+        all.push(squares);
+    }
+    if let Some((step, _)) = worst {
+        place.worst = run.times[step];
+        let squares = pair.squares_of_cells(session, of, space, step)?;
+        let cells = squares.iter().zip(&run.mesh.geometry);
+        place.cells = cells.map(|(square, cell)| (square / cell.volume).sqrt()).collect();
+    }
+    Ok((all, place))
+}
+
+/// What is made of the squares over time.
+fn measured(over: Over, all: &[Squares], times: &[[f64; 2]]) -> Measured {
+    let mut sum = Squares::default();
+    let mut before = 0.0;
+    for (squares, [time, _]) in all.iter().zip(times) {
+        match over {
+            Over::Max => {
+                sum = Squares { error: sum.error.max(squares.error), size: sum.size.max(squares.size) }
+            }
+            Over::Sum => sum.add(Squares {
+                error: (time - before) * squares.error,
+                size: (time - before) * squares.size,
+            }),
+            Over::End => sum = *squares,
+        }
+        before = *time;
+    }
+    Measured { error: sum.error.sqrt(), size: sum.size.sqrt() }
 }
 
 fn contained<const D: usize>(times: &[f64], reference: &StoredFields<D>) -> Result<()> {

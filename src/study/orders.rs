@@ -154,6 +154,7 @@ mod tests {
             over: Over::Max,
             expected_order,
             published: Vec::new(),
+            targets: Vec::new(),
         };
         assert_eq!(expected(&norm(Space::H, None), Refined::Mesh, "bdf2"), 2.0);
         assert_eq!(expected(&norm(Space::H, None), Refined::Both, "lagged_euler"), 1.0);

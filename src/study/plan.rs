@@ -29,8 +29,8 @@ pub struct Planned {
     pub tolerance: f64,
     /// What else it overrides.
     pub set: Vec<String>,
-    /// Whether steps are chosen on the way.
-    pub adaptive: bool,
+    /// Tolerance of steps that are chosen on the way.
+    pub adaptive: Option<f64>,
     /// Its job.
     pub loaded: Loaded,
 }
@@ -59,6 +59,8 @@ pub struct Plan {
     pub runs: Vec<Planned>,
     /// What they are held against.
     pub reference: Option<PlannedReference>,
+    /// The reference's steps on the meshes of the runs, if errors are split.
+    pub split: Vec<Planned>,
 }
 
 impl Plan {
@@ -87,11 +89,17 @@ impl Plan {
                 Err(error) => refusals.push(error.to_string()),
             }
         }
+        let mut split = Vec::new();
         let reference = match &study.reference {
             None => None,
             Some(Reference::Exact(exact)) => Some(PlannedReference::Exact(ExactFields::new(exact))),
             Some(Reference::Run(run)) => match job.planned(run, Some("reference"), &output, &mut taken) {
-                Ok(planned) => Some(PlannedReference::Run(Box::new(planned))),
+                Ok(planned) => {
+                    if study.compare.split {
+                        split = job.on_meshes(run, &planned.cells, &runs, &output)?;
+                    }
+                    Some(PlannedReference::Run(Box::new(planned)))
+                }
                 Err(error) => {
                     refusals.push(error.to_string());
                     None
@@ -101,7 +109,7 @@ impl Plan {
         if !refusals.is_empty() {
             return Err(Error::Refused(refusals.join("\n\n")));
         }
-        let mut plan = Self { study, name, folder: output, base, runs, reference };
+        let mut plan = Self { study, name, folder: output, base, runs, reference, split };
         plan.choose_times()?;
         Ok(plan)
     }
@@ -112,7 +120,7 @@ impl Plan {
         let interval = self.study.compare.interval;
         let mut spacings = Vec::new();
         for run in &mut self.runs {
-            let every = match interval.filter(|_| !run.adaptive) {
+            let every = match interval.filter(|_| run.adaptive.is_none()) {
                 None => Some(1),
                 Some(interval) => whole(interval / run.step),
             };
@@ -126,13 +134,13 @@ impl Plan {
                 continue;
             };
             run.loaded.job.output.fields = Some(Every::Every(every));
-            spacings.push((run.name.clone(), run.adaptive, every as f64 * run.step));
+            spacings.push((run.name.clone(), run.adaptive.is_some(), every as f64 * run.step));
         }
         if let Some(PlannedReference::Run(reference)) = &mut self.reference {
             let mut every = 0;
             for (name, adaptive, spacing) in &spacings {
                 let count =
-                    if *adaptive || reference.adaptive { Some(1) } else { whole(spacing / reference.step) };
+                    if *adaptive || reference.adaptive.is_some() { Some(1) } else { whole(spacing / reference.step) };
                 match count {
                     Some(count) => every = greatest_common_divisor(every, count),
                     None => faults.push(format!(
@@ -142,7 +150,9 @@ impl Plan {
                     )),
                 }
             }
-            reference.loaded.job.output.fields = Some(Every::Every(every.max(1)));
+            let every = Some(Every::Every(every.max(1)));
+            self.split.iter_mut().for_each(|run| run.loaded.job.output.fields = every);
+            reference.loaded.job.output.fields = every;
         }
         if faults.is_empty() { Ok(()) } else { Err(Error::Refused(faults.join("\n"))) }
     }
@@ -179,6 +189,7 @@ impl Source<'_> {
             overrides.push(format!("mesh.{kind}.cells={cells:?}"));
         }
         overrides.extend(run.step.map(|step| format!("time.step={step:?}")));
+        overrides.extend(run.adaptive.map(|tolerance| self.adaptive(run, tolerance)));
         overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", word(scheme))));
         overrides.extend(run.tolerance.map(|tolerance| format!("solver.tolerance={tolerance:?}")));
         overrides.extend(run.set.iter().cloned());
@@ -194,7 +205,7 @@ impl Source<'_> {
         let mut name = match (fixed_name, &run.name) {
             (Some(fixed), _) => fixed.to_owned(),
             (None, Some(given)) => given.clone(),
-            (None, None) => made_name(job, &cells, run.tolerance),
+            (None, None) => made_name(job, &cells, run),
         };
         if fixed_name.is_none() {
             let plain = name.clone();
@@ -212,11 +223,50 @@ impl Source<'_> {
             scheme: word(job.time.scheme),
             tolerance: job.solver.tolerance,
             set: run.set.clone(),
-            adaptive: job.time.adaptive.is_some(),
+            adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
             name,
             loaded,
         })
     }
+}
+
+impl Source<'_> {
+    /// The override that makes steps adaptive.
+    fn adaptive(&self, run: &Run, tolerance: f64) -> String {
+        let step = run.step.unwrap_or(self.base.time.step);
+        let [smallest, largest] = match &self.base.time.adaptive {
+            Some(given) => [given.smallest_step, given.largest_step],
+            None => [step / 4096.0, (64.0 * step).min(self.base.time.end)],
+        };
+        format!(
+            "time.adaptive={{tolerance={tolerance:?}, smallest_step={smallest:?}, largest_step={largest:?}}}"
+        )
+    }
+
+    /// The reference on each mesh of the runs but its own.
+    fn on_meshes(
+        &self,
+        reference: &Run,
+        own: &[u32],
+        runs: &[Planned],
+        output: &Path,
+    ) -> Result<Vec<Planned>> {
+        let mut found: Vec<Planned> = Vec::new();
+        for cells in runs.iter().map(|run| &run.cells) {
+            if cells == own || found.iter().any(|other| other.cells == *cells) {
+                continue;
+            }
+            let name = format!("reference-{}", by(cells));
+            let run = Run { cells: Some(cells.clone()), ..reference.clone() };
+            found.push(self.planned(&run, Some(&name), output, &mut Vec::new())?);
+        }
+        Ok(found)
+    }
+}
+
+/// Numbers of cells as names have them.
+fn by(cells: &[u32]) -> String {
+    cells.iter().map(u32::to_string).collect::<Vec<_>>().join("x")
 }
 
 /// Leaves out what a study has no use for, and sends the files of the run to its own folder.
@@ -234,12 +284,11 @@ fn called(run: &Run, fixed_name: Option<&str>) -> String {
     format!("{name}{size}{step}")
 }
 
-fn made_name(job: &Job, cells: &[u32], tolerance: Option<f64>) -> String {
-    let counts: Vec<String> = cells.iter().map(u32::to_string).collect();
+fn made_name(job: &Job, cells: &[u32], run: &Run) -> String {
     let mut parts = vec![word(job.time.scheme)];
-    parts.extend((!counts.is_empty()).then(|| counts.join("x")));
-    parts.push(format!("{}", job.time.step));
-    parts.extend(tolerance.map(|tolerance| format!("{tolerance:e}")));
+    parts.extend((!cells.is_empty()).then(|| by(cells)));
+    parts.push(run.adaptive.map_or(job.time.step.to_string(), |tolerance| format!("adaptive-{tolerance}")));
+    parts.extend(run.tolerance.map(|tolerance| format!("{tolerance:e}")));
     parts.join("-")
 }
 
@@ -258,10 +307,14 @@ fn products(product: Option<&Product>) -> Vec<Run> {
     for scheme in choices(&product.schemes) {
         for tolerance in choices(&product.tolerances) {
             for cells in choices(&product.cells) {
-                for step in choices(&product.steps) {
-                    let cells = cells.clone().map(|cells| cells.0);
-                    runs.push(Run { cells, step, scheme, tolerance, ..Run::default() });
+                let cells = cells.clone().map(|cells| cells.0);
+                let run = Run { cells, scheme, tolerance, ..Run::default() };
+                if product.adaptive.is_empty() || !product.steps.is_empty() {
+                    let steps = choices(&product.steps);
+                    runs.extend(steps.into_iter().map(|step| Run { step, ..run.clone() }));
                 }
+                let adaptive = product.adaptive.iter();
+                runs.extend(adaptive.map(|tolerance| Run { adaptive: Some(*tolerance), ..run.clone() }));
             }
         }
     }

@@ -31,6 +31,10 @@ pub struct Record {
     pub unknowns: u64,
     /// Steps taken.
     pub steps: u64,
+    /// Steps taken back.
+    pub rejected_steps: u64,
+    /// Preconditioners made.
+    pub set_ups: u64,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Linear iterations.
@@ -65,6 +69,8 @@ impl Record {
             cells: 0,
             unknowns: 0,
             steps: 0,
+            rejected_steps: 0,
+            set_ups: 0,
             newton_iterations: 0,
             linear_iterations: 0,
             effects: Vec::new(),
@@ -90,6 +96,8 @@ impl Record {
         self.cells = count("cells");
         self.unknowns = count("unknowns");
         self.steps = count("steps");
+        self.rejected_steps = count("rejected_steps");
+        self.set_ups = count("set_ups");
         self.newton_iterations = count("newton_iterations");
         self.linear_iterations = count("linear_iterations");
         let names = summary["effects"].as_array().into_iter().flatten();

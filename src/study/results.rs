@@ -1,6 +1,10 @@
 //! What a study found: the object in `study.json`, from which all tables are made.
 
-use super::{measure::Measured, orders::Refined, record::Seconds};
+use super::{
+    measure::{Measured, Place},
+    orders::Refined,
+    record::Seconds,
+};
 use serde::Serialize;
 
 /// The object; names are part of the contract.
@@ -24,6 +28,8 @@ pub struct Results {
     pub runs: Vec<RunResult>,
     /// What looser tolerances of the solver change.
     pub tolerances: Vec<ToleranceResult>,
+    /// What it takes to reach the errors that the study asks for.
+    pub targets: Vec<TargetResult>,
     /// What each effect costs and changes; with --ablate only.
     pub ablation: Option<Ablation>,
 }
@@ -48,8 +54,10 @@ pub struct RunResult {
     pub scheme: String,
     /// Cells along each axis.
     pub cells: Vec<u32>,
-    /// Length of a step in s.
+    /// Length of a step in s; of adaptive steps the first one tried.
     pub step: f64,
+    /// Tolerance of adaptive steps; null for fixed ones.
+    pub adaptive: Option<f64>,
     /// The solver's tolerance.
     pub tolerance: f64,
     /// What else it overrides.
@@ -66,6 +74,10 @@ pub struct RunResult {
     pub unknowns: u64,
     /// Steps taken.
     pub steps: u64,
+    /// Steps taken back.
+    pub rejected_steps: u64,
+    /// Preconditioners made.
+    pub set_ups: u64,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Linear iterations.
@@ -76,6 +88,16 @@ pub struct RunResult {
     pub repetitions: Vec<Seconds>,
     /// One for each norm; null where there is none.
     pub errors: Vec<Option<ErrorResult>>,
+    /// Where the errors in norms sit; in errors.csv and pictures.
+    #[serde(skip)]
+    pub places: Vec<Place>,
+}
+
+impl RunResult {
+    /// What it is one of: runs of a line differ in mesh, steps and tolerance.
+    pub fn line(&self) -> String {
+        if self.adaptive.is_some() { format!("{}, adaptive", self.scheme) } else { self.scheme.clone() }
+    }
 }
 
 /// An error of a run.
@@ -85,6 +107,12 @@ pub struct ErrorResult {
     pub error: f64,
     /// The error over the norm of the reference.
     pub relative: Option<f64>,
+    /// When it is largest, in s.
+    pub worst_time: Option<f64>,
+    /// The part that the steps make: the distance to the reference's steps on the mesh of the run.
+    pub of_steps: Option<f64>,
+    /// The part that the mesh makes: the distance of these to the reference.
+    pub of_mesh: Option<f64>,
     /// Against coarser runs.
     pub orders: Vec<Order>,
     /// Decimal digits gained against the first of these runs, a second of computing more.
@@ -134,6 +162,36 @@ pub struct Change {
     pub share_of_error: Option<f64>,
 }
 
+/// What it takes to reach an error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TargetResult {
+    /// The norm.
+    pub norm: String,
+    /// The error that is asked for.
+    pub error: f64,
+    /// Of each scheme, with fixed and with adaptive steps, the fastest run that reaches it.
+    pub reached: Vec<Reached>,
+}
+
+/// The fastest run of a scheme that reaches an error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reached {
+    /// The scheme, and whether its steps are adaptive.
+    pub scheme: String,
+    /// The run; null where none reaches the error.
+    pub run: Option<String>,
+    /// Its error.
+    pub error: Option<f64>,
+    /// Its steps.
+    pub steps: Option<u64>,
+    /// Its computing seconds.
+    pub seconds: Option<f64>,
+    /// These over those of the fastest of all schemes.
+    pub ratio: Option<f64>,
+    /// Whether `steps` or `mesh` makes the larger part of its error, if that is known.
+    pub ruled_by: Option<&'static str>,
+}
+
 /// What effects cost and change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ablation {
@@ -169,6 +227,9 @@ impl ErrorResult {
         Self {
             error: measured.error,
             relative: relative.is_finite().then_some(relative),
+            worst_time: None,
+            of_steps: None,
+            of_mesh: None,
             orders: Vec::new(),
             digits_per_second: None,
             published: None,

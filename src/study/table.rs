@@ -122,6 +122,7 @@ fn meaning(norm: &Norm) -> String {
 /// All tables of the results, in the order in which they are read.
 pub fn all(results: &Results) -> Vec<Table> {
     let mut tables: Vec<Table> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
+    tables.extend(targets(results));
     tables.push(costs(results));
     if !results.tolerances.is_empty() {
         tables.push(tolerances(results));
@@ -136,6 +137,10 @@ fn errors(results: &Results, norm: usize) -> Table {
     let symbols = refined(results, norm);
     let names: Vec<String> = symbols.iter().map(|symbol| format!("order ({symbol})")).collect();
     let mut header = vec!["run", "error", "relative"];
+    let split = results.runs.iter().any(|run| part(run, norm).is_some());
+    if split {
+        header.extend(["of steps", "of mesh"]);
+    }
     header.extend(names.iter().map(String::as_str));
     header.push("theory");
     if shown.is_published {
@@ -147,7 +152,7 @@ fn errors(results: &Results, norm: usize) -> Table {
         let mut row = vec![run.name.clone()];
         match run.errors.get(norm).and_then(Option::as_ref) {
             None => row.push(if run.error.is_some() { "failed".into() } else { "-".into() }),
-            Some(error) => row.extend(error_cells(error, &symbols, shown.is_published)),
+            Some(error) => row.extend(error_cells(error, split, &symbols, shown.is_published)),
         }
         row.resize(header.len(), String::new());
         table.rows.push(row);
@@ -155,8 +160,15 @@ fn errors(results: &Results, norm: usize) -> Table {
     table
 }
 
-fn error_cells(error: &ErrorResult, symbols: &[&str], published: bool) -> Vec<String> {
+fn part(run: &RunResult, norm: usize) -> Option<f64> {
+    run.errors.get(norm)?.as_ref()?.of_steps
+}
+
+fn error_cells(error: &ErrorResult, split: bool, symbols: &[&str], published: bool) -> Vec<String> {
     let mut row = vec![format!("{:.4e}", error.error), optional(error.relative, |r| format!("{r:.2e}"))];
+    if split {
+        row.extend([error.of_steps, error.of_mesh].map(|part| optional(part, |p| format!("{p:.2e}"))));
+    }
     for symbol in symbols {
         let order = error.orders.iter().find(|order| order.refined.symbol() == *symbol);
         row.push(optional(order, |order| format!("{:.4}", order.observed)));
@@ -186,12 +198,40 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
     found.into_iter().map(|refined| refined.symbol()).collect()
 }
 
+/// For each norm what its errors take: a row a scheme, seconds with the run that took them.
+fn targets(results: &Results) -> Vec<Table> {
+    let header = ["error", "scheme", "run", "its error", "ruled by", "steps", "computing s", "over the fastest"];
+    let mut tables: Vec<Table> = Vec::new();
+    for target in &results.targets {
+        let title = format!("What it takes   [{}]", target.norm);
+        if tables.last().is_none_or(|table| table.title != title) {
+            tables.push(Table::new(title, &header));
+        }
+        let Some(table) = tables.last_mut() else { continue };
+        for reached in &target.reached {
+            table.rows.push(vec![
+                format!("{:.2e}", target.error),
+                reached.scheme.clone(),
+                reached.run.clone().unwrap_or_else(|| "none".into()),
+                optional(reached.error, |error| format!("{error:.2e}")),
+                reached.ruled_by.unwrap_or("-").into(),
+                optional(reached.steps, |steps| steps.to_string()),
+                optional(reached.seconds, |s| format!("{s:.3}")),
+                optional(reached.ratio, |ratio| format!("{ratio:.1}")),
+            ]);
+        }
+    }
+    tables
+}
+
 fn costs(results: &Results) -> Table {
     let header = [
         "run",
         "unknowns",
         "steps",
+        "taken back",
         "unknowns*steps",
+        "set-ups",
         "newton",
         "linear",
         "total s",
@@ -210,13 +250,15 @@ fn cost_cells(run: &RunResult) -> Vec<String> {
         optional(run.seconds.as_ref(), |s| format!("{:.3}", pick(s)))
     };
     if run.seconds.is_none() {
-        return std::iter::once(run.name.clone()).chain(vec!["-".into(); 8]).collect();
+        return std::iter::once(run.name.clone()).chain(vec!["-".into(); 10]).collect();
     }
     vec![
         run.name.clone(),
         run.unknowns.to_string(),
         run.steps.to_string(),
+        run.rejected_steps.to_string(),
         (run.unknowns * run.steps).to_string(),
+        run.set_ups.to_string(),
         run.newton_iterations.to_string(),
         run.linear_iterations.to_string(),
         seconds(|s| s.total),

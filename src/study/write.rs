@@ -1,26 +1,50 @@
-//! The files of a study: `study.json`, `study.csv`, `study.md` and the pictures.
+//! The files of a study: `study.json`, `study.csv`, `study.md`, `errors.csv` and the pictures.
 
-use super::{orders::Refined, plot, results::Results, table};
-use crate::error::{Error, Result};
+use super::{orders::Refined, plan::Plan, plot, results::Results, table};
+use crate::{
+    drawing::picture::Picture,
+    error::{Error, Result},
+};
 use std::path::Path;
 
-const HEADER: &str = "run,scheme,cells,step,tolerance,status,norm,error,relative_error,order_mesh,order_step,\
-    order_both,expected_order,published,ratio,published_order,unknowns,steps,unknowns_times_steps,seconds_total,\
-    seconds_computing,seconds_solve,digits_per_second";
+const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,norm,error,relative_error,error_of_steps,\
+    error_of_mesh,order_mesh,order_step,order_both,expected_order,published,ratio,published_order,unknowns,steps,\
+    rejected_steps,set_ups,unknowns_times_steps,seconds_total,seconds_computing,seconds_solve,digits_per_second";
+/// Columns of a norm.
+const MEASURED: usize = 12;
 
 /// Writes all files. On one rank.
-pub fn all(folder: &Path, results: &Results) -> Result<()> {
+pub fn all(plan: &Plan, results: &Results) -> Result<()> {
+    let folder = &plan.folder;
     std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
     let json = serde_json::to_string_pretty(results)
         .map_err(|error| Error::Internal(format!("the study's results can't be written: {error}")))?;
-    write(&folder.join("study.json"), &(json + "\n"))?;
-    write(&folder.join("study.csv"), &csv(results))?;
-    let pictures = plot::all(folder, results)?;
-    write(&folder.join("study.md"), &markdown(results, &pictures))
+    write(&folder.join("study.json"), (json + "\n").as_bytes())?;
+    write(&folder.join("study.csv"), csv(results).as_bytes())?;
+    write(&folder.join("errors.csv"), over_time(results).as_bytes())?;
+    let pictures = plot::all(plan, results)?;
+    for picture in &pictures {
+        write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
+        write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
+    }
+    write(&folder.join("study.md"), markdown(results, &pictures).as_bytes())
 }
 
-fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|error| Error::unwritable(path, error))
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|error| Error::unwritable(path, error))
+}
+
+/// A row for each run, norm and time.
+fn over_time(results: &Results) -> String {
+    let mut out = String::from("run,norm,time,error\n");
+    for run in &results.runs {
+        for (norm, place) in results.norms.iter().zip(&run.places) {
+            for [time, error] in &place.over_time {
+                out.push_str(&format!("{},{},{time:e},{error:e}\n", run.name, norm.name));
+            }
+        }
+    }
+    out
 }
 
 /// A row for each run and norm; a run without errors has one row.
@@ -33,6 +57,7 @@ fn csv(results: &Results) -> String {
             run.scheme.clone(),
             cells.join("x"),
             run.step.to_string(),
+            number(run.adaptive),
             format!("{:e}", run.tolerance),
             run.status.clone(),
         ];
@@ -40,6 +65,8 @@ fn csv(results: &Results) -> String {
         let cost = [
             run.unknowns.to_string(),
             run.steps.to_string(),
+            run.rejected_steps.to_string(),
+            run.set_ups.to_string(),
             (run.unknowns * run.steps).to_string(),
             seconds(|s| s.total),
             seconds(|s| s.computing),
@@ -54,6 +81,8 @@ fn csv(results: &Results) -> String {
                 norm.name.clone(),
                 number(Some(error.error)),
                 number(error.relative),
+                number(error.of_steps),
+                number(error.of_mesh),
                 shown(Refined::Mesh),
                 shown(Refined::Step),
                 shown(Refined::Both),
@@ -67,7 +96,7 @@ fn csv(results: &Results) -> String {
             rows += 1;
         }
         if rows == 0 {
-            let empty: Vec<String> = vec![String::new(); 10];
+            let empty: Vec<String> = vec![String::new(); MEASURED];
             let row = [&named[..], &empty, &cost, &[String::new()]].concat();
             out.push_str(&format!("{}\n", row.join(",")));
         }
@@ -80,7 +109,7 @@ fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map(|value| format!("{value:e}")).unwrap_or_default()
 }
 
-fn markdown(results: &Results, pictures: &[(String, String)]) -> String {
+fn markdown(results: &Results, pictures: &[Picture]) -> String {
     let mut out = format!("# {}\n\n", results.title);
     if let Some(source) = &results.source {
         out.push_str(&format!("Published numbers: {source}.\n\n"));
@@ -96,8 +125,8 @@ fn markdown(results: &Results, pictures: &[(String, String)]) -> String {
         ));
     }
     table::all(results).iter().for_each(|table| out.push_str(&table.markdown()));
-    for (file, caption) in pictures {
-        out.push_str(&format!("![{caption}]({file})\n\n"));
+    for Picture { name, caption, .. } in pictures {
+        out.push_str(&format!("![{caption}]({name}.svg)\n\n"));
     }
     out.push_str(&format!("Solver {}, {} rank(s).\n", results.version, results.ranks));
     out

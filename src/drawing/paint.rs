@@ -130,7 +130,7 @@ fn fill(triangle: &Triangle, canvas: &mut [PremultipliedColorU8], wide: usize, h
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::picture::{Picture, open_svg};
+    use crate::drawing::picture::{Picture, open_svg};
 
     /// Half of the drawing, and many triangles too small to be seen in its corner.
     fn half(colour: Colour, count: usize) -> Vec<Triangle> {

@@ -11,6 +11,8 @@ use super::{
 use crate::{error::Result, output::field_snapshot::Snapshot};
 use std::fmt::Write;
 
+/// Errors below this share of the largest are drawn as that.
+const DECADES: f64 = 1e-4;
 /// Displacements are drawn at most this large, as a share of the body.
 const VISIBLE: f64 = 0.12;
 
@@ -67,7 +69,7 @@ impl<'a> Body<'a> {
     /// Coloured by a quantity of its nodes.
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let of_face = |face: &Face| face.nodes.iter().map(|n| values[*n as usize]).sum::<f64>() / 3.0;
-        self.field(look, extent(values.iter().copied()), of_face)
+        self.field(look, linear(extent(values.iter().copied())), of_face)
     }
 
     /// Coloured by the von Mises norm of the stress in its cells, if the file has it.
@@ -75,7 +77,14 @@ impl<'a> Body<'a> {
         let Some(stress) = &self.snapshot.von_mises else { return Ok(None) };
         let range = extent(stress.iter().copied());
         let look = Coloured { name: "von_mises", quantity: "von Mises stress", unit: "Pa", shades: VIRIDIS };
-        self.field(look, range, |face| stress[face.cell as usize]).map(Some)
+        self.field(look, linear(range), |face| stress[face.cell as usize]).map(Some)
+    }
+
+    /// Coloured by errors of its cells, by their powers of ten.
+    pub fn errors(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
+        let largest = extent(values.iter().copied()).map_or(1.0, |range| range.1);
+        let shown = values.iter().map(|value| value.max(DECADES * largest));
+        self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize])
     }
 
     /// How much the displacement is magnified, in words.
@@ -90,19 +99,21 @@ impl<'a> Body<'a> {
     fn field(
         &self,
         Coloured { name, quantity, unit, shades }: Coloured,
-        range: Option<(f64, f64)>,
+        scale: Scale,
         value: impl Fn(&Face) -> f64,
     ) -> Result<Picture> {
-        let (low, high) = range.unwrap_or((0.0, 0.0));
-        let span = if high > low { high - low } else { 1.0 };
+        let (low, high) = extent(self.faces.iter().map(&value)).unwrap_or((0.0, 0.0));
+        let share = |face: &Face| {
+            let place = scale.place(value(face)).unwrap_or(scale.low);
+            (place - scale.low) / (scale.high - scale.low)
+        };
         let frame = self.frame(122.0, &[]);
-        let triangles = self.triangles(&frame, |face| shades.at((value(face) - low) / span));
+        let triangles = self.triangles(&frame, |face| shades.at(share(face)));
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
         svg += &text(6.0, 18.0, "start", &heading);
         svg += &paint(&triangles, self.edges(), frame.height)?;
         svg += &self.surroundings(&frame);
-        let scale = Scale::linear([low, high].into_iter(), false);
         svg += &colour_bar(name, shades, &scale, &scale.words(quantity, unit), &frame);
         svg += "</svg>";
         let seen = match self.view {
@@ -238,6 +249,10 @@ impl<'a> Body<'a> {
         }
         out
     }
+}
+
+fn linear(range: Option<(f64, f64)>) -> Scale {
+    Scale::linear(range.map_or([0.0; 2], |(low, high)| [low, high]).into_iter(), false)
 }
 
 fn size(snapshot: &Snapshot) -> f64 {

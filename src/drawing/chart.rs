@@ -46,12 +46,14 @@ pub struct Series {
     pub look: Look,
     /// In which colour.
     pub colour: Colour,
+    /// Its place among its likes, which gives its marks their shape.
+    pub place: usize,
 }
 
 impl Series {
     /// A series in the colour that belongs to its place among its likes.
     pub fn new(place: usize, label: impl Into<String>, look: Look, points: Vec<[f64; 2]>) -> Self {
-        Self { label: label.into(), points, look, colour: LINES[place % LINES.len()] }
+        Self { label: label.into(), points, look, colour: LINES[place % LINES.len()], place }
     }
 }
 
@@ -84,6 +86,8 @@ pub struct Chart<'a> {
     pub y: Axis<'a>,
     /// Whether y is shown by its powers of ten.
     pub logarithmic: bool,
+    /// Whether x is.
+    pub logarithmic_x: bool,
     /// Whether the vertical axis starts at zero.
     pub from_zero: bool,
     /// What is drawn.
@@ -133,7 +137,16 @@ impl ValueFormatter<f64> for Marked {
 impl<'a> Chart<'a> {
     /// A chart of these series over linear axes.
     pub fn new(x: Axis<'a>, y: Axis<'a>, series: Vec<Series>) -> Self {
-        Self { x, y, logarithmic: false, from_zero: false, series, bands: vec![], levels: vec![] }
+        Self {
+            x,
+            y,
+            logarithmic: false,
+            logarithmic_x: false,
+            from_zero: false,
+            series,
+            bands: vec![],
+            levels: vec![],
+        }
     }
 
     /// The drawing as an `svg` element.
@@ -159,7 +172,8 @@ impl<'a> Chart<'a> {
         let steady = high - low < STEADY * low.abs().max(high.abs());
         let y = coordinate(1).chain(levels).chain((self.from_zero || steady).then_some(0.0));
         let y = if self.logarithmic { Scale::logarithmic(y) } else { Scale::linear(y, true) };
-        (Scale::linear(coordinate(0), false), y)
+        let x = coordinate(0);
+        (if self.logarithmic_x { Scale::logarithmic(x) } else { Scale::linear(x, false) }, y)
     }
 
     fn draw(&self, area: &Area<Shift>) -> std::result::Result<(), String> {
@@ -190,8 +204,8 @@ impl<'a> Chart<'a> {
             .draw()
             .map_err(words)?;
         self.draw_levels(&plane, &x, &y)?;
-        for (place, series) in self.series.iter().enumerate() {
-            draw_series(&plane, series, place, &x, &y)?;
+        for series in &self.series {
+            draw_series(&plane, series, &x, &y)?;
         }
         area.present().map_err(words)
     }
@@ -202,10 +216,9 @@ impl<'a> Chart<'a> {
         let mut line = 4.0;
         area.draw_text(&y.words(self.y.quantity, self.y.unit), &letters(), fine(6.0, line)).map_err(words)?;
         line += row;
-        let named: Vec<(usize, &Series)> =
-            self.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty()).collect();
+        let named: Vec<&Series> = self.series.iter().filter(|series| !series.label.is_empty()).collect();
         let mut across = 8.0;
-        for (place, series) in &named {
+        for series in &named {
             let width = 44.0 + text_width(&series.label);
             if across > 8.0 && across + width > WIDTH {
                 (across, line) = (8.0, line + row);
@@ -216,7 +229,7 @@ impl<'a> Chart<'a> {
                 area.draw(&PathElement::new(stroke, rgb(series.colour).stroke_width(2 * FINE as u32)))
                     .map_err(words)?;
             }
-            mark(area, fine(across + 14.0, middle), *place, series)?;
+            mark(area, fine(across + 14.0, middle), series)?;
             area.draw_text(&series.label, &letters(), fine(across + 34.0, line)).map_err(words)?;
             across += width;
         }
@@ -258,7 +271,6 @@ impl<'a> Chart<'a> {
 fn draw_series(
     plane: &Area<Axes>,
     series: &Series,
-    place: usize,
     x: &Scale,
     y: &Scale,
 ) -> std::result::Result<(), String> {
@@ -275,12 +287,12 @@ fn draw_series(
         Look::Dotted | Look::Dots => 1,
     };
     let first =
-        if every == usize::MAX { usize::MAX } else { (place * every / LINES.len()).min(shown.len() / 2) };
+        if every == usize::MAX { usize::MAX } else { (series.place * every / LINES.len()).min(shown.len() / 2) };
     let (across, down) = plane.get_pixel_range();
     let (pixels, corner) = (plane.strip_coord_spec(), (across.start, down.start));
     for at in (first..shown.len()).step_by(every) {
         let pixel = plane.map_coordinate(&shown[at]);
-        mark(&pixels, (pixel.0 - corner.0, pixel.1 - corner.1), place, series)?;
+        mark(&pixels, (pixel.0 - corner.0, pixel.1 - corner.1), series)?;
     }
     Ok(())
 }
@@ -289,14 +301,13 @@ fn draw_series(
 fn mark(
     area: &Area<Shift>,
     at: (i32, i32),
-    place: usize,
     series: &Series,
 ) -> std::result::Result<(), String> {
     let style = rgb(series.colour).filled();
     let corners = |around: &[(i32, i32)]| {
         around.iter().map(|c| (at.0 + FINE * c.0, at.1 + FINE * c.1)).collect::<Vec<_>>()
     };
-    let drawn = match place % 4 {
+    let drawn = match series.place % 4 {
         0 => area.draw(&Circle::new(at, 4 * FINE, style)),
         1 => area.draw(&Polygon::new(corners(&[(-4, -4), (4, -4), (4, 4), (-4, 4)]), style)),
         2 => area.draw(&TriangleMarker::new(at, 6 * FINE, style)),

@@ -1,0 +1,170 @@
+//! Matrices with what solves with them, kept for when steps are of these lengths again.
+//!
+//! Steps come from a ladder of powers of two, its rungs. What solves with the matrix of a rung serves all lengths near it as a
+//! preconditioner: two matrices `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
+
+use super::{condensed::Factored, linear_solver::Preconditioner, newton::Newton, step_solver::Solver};
+use crate::{
+    error::Result,
+    petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
+    session::Session,
+};
+use std::mem::swap;
+
+/// Rungs that are kept at most, with the one in use.
+const MOST: usize = 8;
+/// Bytes of a rank that they may take.
+const ROOM: f64 = 512e6;
+
+/// A matrix with its preconditioner.
+pub(super) struct Rung {
+    /// Length in s of the steps that the matrix is of.
+    pub length: f64,
+    /// The matrix.
+    pub matrix: Matrix,
+    /// What solves with it.
+    pub krylov: Krylov,
+}
+
+/// A linear solver and its preconditioner; all rungs of a run have the same kind.
+pub(super) enum Krylov {
+    /// For linear steps.
+    Linear(Ksp),
+    /// For Newton's method, with the parameters of the contact graphs.
+    Newton(Box<ProjectedKsp>, Vec<[f64; 2]>),
+    /// For Newton's method on the contact alone.
+    Condensed(Box<Option<Factored>>),
+}
+
+/// A solver of linear steps, for this many unknowns. Collective.
+pub(super) fn linear(session: &Session, chosen: Preconditioner, unknowns: usize) -> Result<Ksp> {
+    let mut ksp = Ksp::new("")?;
+    chosen.configure(&mut ksp, session.ranks(), unknowns)?;
+    ksp.start_from_solution()?;
+    ksp.apply_options()?;
+    Ok(ksp)
+}
+
+/// A solver for Newton's method, for vectors laid out like `like` with `D` components a node. Collective.
+pub(super) fn projected<const D: usize>(
+    session: &Session,
+    chosen: Preconditioner,
+    unknowns: usize,
+    like: &DistributedVector,
+) -> Result<ProjectedKsp> {
+    let mut solver = ProjectedKsp::new("", like, D)?;
+    chosen.configure(solver.linear_solver(), session.ranks(), unknowns)?;
+    solver.linear_solver().apply_options()?;
+    solver.set_patience(chosen.patience(D));
+    Ok(solver)
+}
+
+impl Krylov {
+    /// One like that in use, not set up.
+    pub fn another<const D: usize>(
+        used: &Solver,
+        session: &Session,
+        chosen: Preconditioner,
+        unknowns: usize,
+        like: &DistributedVector,
+    ) -> Result<Self> {
+        Ok(match used {
+            Solver::Linear(_) => Self::Linear(linear(session, chosen, unknowns)?),
+            Solver::Condensed(_) => Self::Condensed(Box::default()),
+            Solver::Newton(_) => {
+                Self::Newton(Box::new(projected::<D>(session, chosen, unknowns, like)?), Vec::new())
+            }
+        })
+    }
+
+    /// Changes places with the one in use.
+    pub fn exchange(&mut self, used: &mut Solver) {
+        match (self, used) {
+            (Self::Linear(mine), Solver::Linear(used)) => swap(mine, used),
+            (Self::Newton(mine, mine_scales), Solver::Newton(newton)) => {
+                let Newton { linear_solver, scales, .. } = &mut **newton;
+                swap(&mut **mine, linear_solver);
+                swap(mine_scales, scales);
+            }
+            (Self::Condensed(mine), Solver::Condensed(used)) => used.exchange(mine),
+            _ => {}
+        }
+    }
+}
+
+/// Rungs that are not in use, the last used one last.
+pub(super) struct Rungs {
+    kept: Vec<Rung>,
+    most: usize,
+}
+
+impl Rungs {
+    /// None yet; so many are kept besides the one in use.
+    pub fn new(most: usize) -> Self {
+        Self { kept: Vec::new(), most }
+    }
+
+    /// Puts one away; gives the one that has not been used for longest where there are too many.
+    pub fn put(&mut self, rung: Rung) -> Option<Rung> {
+        self.kept.push(rung);
+        (self.kept.len() > self.most).then(|| self.kept.remove(0))
+    }
+
+    /// Takes the one of this length out.
+    pub fn take(&mut self, length: f64) -> Option<Rung> {
+        let at = self.kept.iter().position(|rung| rung.length == length)?;
+        Some(self.kept.remove(at))
+    }
+}
+
+/// The rung of the ladder through `base` that steps of this length are nearest to.
+pub(super) fn nearest(base: f64, length: f64) -> f64 {
+    base * 2f64.powi((length / base).log2().round() as i32)
+}
+
+impl Preconditioner {
+    /// Bytes over all ranks of a factor or a hierarchy, about, given those of the matrix: nested dissection's `n log n` and
+    /// `n^(4/3)` entries, or work proportional to the unknowns.
+    pub fn bytes(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> f64 {
+        let n = unknowns as f64;
+        match self {
+            Self::Auto | Self::Cholesky => {
+                let entries = if dimension == 2 { 7.0 * n * n.log2() } else { 28.0 * n.powf(4.0 / 3.0) };
+                let copies = if self.is_redundant(ranks, unknowns) { ranks } else { 1 };
+                8.0 * entries * copies as f64
+            }
+            Self::Gamg => 2.0 * matrix,
+            Self::Boomeramg => 3.5 * matrix,
+        }
+    }
+
+    /// How many matrices of different lengths are kept, each with its preconditioner, with the one in use: as many as find
+    /// room in 512 MB of each rank, at most 8.
+    pub fn kept(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
+        let each = (matrix + self.bytes(dimension, unknowns, ranks, matrix)) / ranks as f64;
+        ((ROOM / each.max(1.0)) as usize).clamp(1, MOST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stepping::Service;
+
+    #[test]
+    fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
+        for (length, rung) in [(0.01, 0.01), (0.08, 0.08), (0.012, 0.01), (0.015, 0.02), (0.0072, 0.01)] {
+            assert_eq!(nearest(0.01, length), rung);
+        }
+    }
+
+    #[test]
+    fn small_problems_keep_a_ladder_and_large_ones_what_they_use() {
+        let kept = |unknowns: usize, ranks| {
+            let service = Service { dimension: 3, unknowns, ranks, steps: 2 };
+            Preconditioner::Auto.resolve(service).kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+        };
+        assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
+        assert_eq!(kept(1_000_000, 8), 2);
+    }
+}

@@ -1,0 +1,106 @@
+//! Runs held against the reference and against each other.
+
+use super::{
+    Ran,
+    convergence::error_of,
+    document::Norm,
+    measure::{Errors, Measured, Target, errors, probe_error},
+    plan::{Plan, Planned, PlannedReference},
+    record::Record,
+    results::{Change, ErrorResult, Results, RunResult, ToleranceResult},
+};
+use crate::{
+    error::{Error, Result},
+    session::Session,
+};
+use std::path::Path;
+
+/// Adds the errors of a run in all norms and at all probes. Collective.
+pub fn add_errors(
+    session: &Session,
+    plan: &Plan,
+    planned: &Planned,
+    record: &Record,
+    reference: Option<&Ran>,
+    run: &mut RunResult,
+) -> Result<()> {
+    let target = match (&plan.reference, reference) {
+        (None, _) => return Ok(()),
+        (Some(PlannedReference::Exact(exact)), _) => Target::Exact(exact),
+        (Some(PlannedReference::Run(other)), Some(ran)) if ran.record.is_complete() => {
+            let between = planned.adaptive.or(other.adaptive).is_some();
+            Target::Run(other.loaded.job.output_folder(), between)
+        }
+        _ => return Err(Error::Failed("the reference run failed: there is nothing to compare with".into())),
+    };
+    let folder = planned.loaded.job.output_folder();
+    let found = in_dimension(session, record.dimension, folder, target, &plan.study.norm)?;
+    run.errors = found.measured.into_iter().map(|m| Some(ErrorResult::new(m))).collect();
+    for (error, place) in run.errors.iter_mut().flatten().zip(&found.places) {
+        error.worst_time = Some(place.worst);
+    }
+    (run.notes, run.places) = (found.notes, found.places);
+    if !plan.study.pictures.in_space.contains(&run.name) {
+        run.places.iter_mut().for_each(|place| place.cells = Vec::new());
+    }
+    for probe in &plan.study.probe {
+        let place = plan.base.job.output.probe.iter().find(|p| p.name == probe.name);
+        let point = place.map_or(&[][..], |p| &p.point);
+        let measured = session.agree(probe_error(folder, target, probe, point))?;
+        run.errors.push(Some(ErrorResult::new(measured)));
+    }
+    Ok(())
+}
+
+/// Errors in norms, in the dimension of the run. Collective.
+pub fn in_dimension(
+    session: &Session,
+    dimension: usize,
+    folder: &Path,
+    target: Target,
+    norms: &[Norm],
+) -> Result<Errors> {
+    if norms.is_empty() {
+        return Ok(Errors::default());
+    }
+    match dimension {
+        2 => errors::<2>(session, folder, target, norms),
+        _ => errors::<3>(session, folder, target, norms),
+    }
+}
+
+/// Holds every run against the one that differs by the tightest tolerance only. Collective.
+pub fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut Results) -> Result<()> {
+    let same = |a: &Planned, b: &Planned| {
+        (&a.cells, a.step, a.adaptive, &a.scheme, &a.set)
+            == (&b.cells, b.step, b.adaptive, &b.scheme, &b.set)
+    };
+    for (at, planned) in plan.runs.iter().enumerate() {
+        let others = plan.runs.iter().enumerate().filter(|(other, run)| {
+            same(run, planned) && run.tolerance < planned.tolerance && ran[*other].record.is_complete()
+        });
+        let Some((best, tightest)) = others.min_by(|a, b| a.1.tolerance.total_cmp(&b.1.tolerance)) else {
+            continue;
+        };
+        if !ran[at].record.is_complete() {
+            continue;
+        }
+        let folder = |planned: &Planned| planned.loaded.job.output_folder().to_owned();
+        let (mine, theirs) = (folder(planned), folder(tightest));
+        let target = Target::Run(&theirs, planned.adaptive.is_some());
+        let dimension = ran[at].record.dimension;
+        let measured = in_dimension(session, dimension, &mine, target, &plan.study.norm)?.measured;
+        let change = |(norm, m): (usize, &Measured)| {
+            let share = error_of(results, best, norm).map(|error| m.error / error).filter(|s| s.is_finite());
+            Some(Change { difference: m.error, share_of_error: share })
+        };
+        results.tolerances.push(ToleranceResult {
+            run: planned.name.clone(),
+            tolerance: planned.tolerance,
+            tightest: tightest.name.clone(),
+            seconds: results.runs[at].seconds.map(|s| s.computing),
+            changes: measured.iter().enumerate().map(change).collect(),
+        });
+    }
+    Ok(())
+}

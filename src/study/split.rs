@@ -1,0 +1,48 @@
+//! Errors of the steps apart from those of the mesh.
+
+use super::{
+    Ran,
+    compare::in_dimension,
+    measure::{Measured, Target},
+    plan::{Plan, Planned, PlannedReference},
+    results::Results,
+};
+use crate::{error::Result, session::Session};
+
+/// Adds both parts of the errors of all runs whose mesh carries the reference's steps. Collective.
+pub fn add_parts(
+    session: &Session,
+    plan: &Plan,
+    ran: &[Ran],
+    on_meshes: &[Ran],
+    results: &mut Results,
+) -> Result<()> {
+    let Some(PlannedReference::Run(reference)) = &plan.reference else { return Ok(()) };
+    let distance = |from: &Planned, to: &Planned, dimension: usize| -> Result<Vec<Measured>> {
+        let between = from.adaptive.or(to.adaptive).is_some();
+        let target = Target::Run(to.loaded.job.output_folder(), between);
+        let folder = from.loaded.job.output_folder();
+        Ok(in_dimension(session, dimension, folder, target, &plan.study.norm)?.measured)
+    };
+    for (planned, made) in plan.split.iter().zip(on_meshes).filter(|(_, made)| made.record.is_complete()) {
+        let of_mesh = distance(planned, reference, made.record.dimension)?;
+        for (at, run) in plan.runs.iter().enumerate() {
+            if run.cells != planned.cells || results.runs[at].error.is_some() || !is_like_base(run) {
+                continue;
+            }
+            let of_steps = distance(run, planned, ran[at].record.dimension)?;
+            let parts = of_steps.iter().zip(&of_mesh);
+            for (error, (steps, mesh)) in results.runs[at].errors.iter_mut().zip(parts) {
+                let Some(error) = error else { continue };
+                (error.of_steps, error.of_mesh) = (Some(steps.error), Some(mesh.error));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether a run differs from the base job by mesh, steps and solver only.
+fn is_like_base(run: &Planned) -> bool {
+    let concerns = |set: &String, table: &str| set.trim_start().starts_with(table);
+    run.set.iter().all(|set| ["time.", "solver."].iter().any(|table| concerns(set, table)))
+}
