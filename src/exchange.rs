@@ -54,10 +54,8 @@ pub fn gather<T: Equivalence + Copy + Default>(
     let counts: Vec<usize> = counts.into_iter().map(|count| count as usize).collect();
     let (narrow, starts) = mpi_counts(&counts)?;
     let mut all = vec![T::default(); counts.iter().sum()];
-    communicator.all_gather_varcount_into(
-        numbers,
-        &mut PartitionMut::new(&mut all[..], &narrow[..], &starts[..]),
-    );
+    communicator
+        .all_gather_varcount_into(numbers, &mut PartitionMut::new(&mut all[..], &narrow[..], &starts[..]));
     Ok(all)
 }
 

@@ -268,12 +268,7 @@ impl<'a> Chart<'a> {
     }
 }
 
-fn draw_series(
-    plane: &Area<Axes>,
-    series: &Series,
-    x: &Scale,
-    y: &Scale,
-) -> std::result::Result<(), String> {
+fn draw_series(plane: &Area<Axes>, series: &Series, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
     let shown = series.points.iter().filter_map(|p| Some((x.place(p[0])?, y.place(p[1])?)));
     let shown = thinned(shown.collect());
     if series.look != Look::Dots && shown.len() > 1 {
@@ -286,8 +281,11 @@ fn draw_series(
         Look::Line => shown.len().div_ceil(MARKS).max(1),
         Look::Dotted | Look::Dots => 1,
     };
-    let first =
-        if every == usize::MAX { usize::MAX } else { (series.place * every / LINES.len()).min(shown.len() / 2) };
+    let first = if every == usize::MAX {
+        usize::MAX
+    } else {
+        (series.place * every / LINES.len()).min(shown.len() / 2)
+    };
     let (across, down) = plane.get_pixel_range();
     let (pixels, corner) = (plane.strip_coord_spec(), (across.start, down.start));
     for at in (first..shown.len()).step_by(every) {
@@ -298,11 +296,7 @@ fn draw_series(
 }
 
 /// A mark whose shape tells series apart without colour.
-fn mark(
-    area: &Area<Shift>,
-    at: (i32, i32),
-    series: &Series,
-) -> std::result::Result<(), String> {
+fn mark(area: &Area<Shift>, at: (i32, i32), series: &Series) -> std::result::Result<(), String> {
     let style = rgb(series.colour).filled();
     let corners = |around: &[(i32, i32)]| {
         around.iter().map(|c| (at.0 + FINE * c.0, at.1 + FINE * c.1)).collect::<Vec<_>>()

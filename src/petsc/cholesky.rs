@@ -1,4 +1,8 @@
-use super::{BlockRows, sys};
+use super::{
+    BlockRows,
+    lower_half::{Lower, view},
+    sys,
+};
 use crate::error::{Error, Result};
 use std::{
     ffi::{c_int, c_void},
@@ -31,7 +35,12 @@ const DISSECTED: usize = 2_000;
 impl Cholesky {
     /// Analyses the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
     /// can't be: the rest does not tie them together.
-    pub fn new(block: usize, rows: &BlockRows, last: &[usize], known: Option<&[u32]>) -> Result<Option<Self>> {
+    pub fn new(
+        block: usize,
+        rows: &BlockRows,
+        last: &[usize],
+        known: Option<&[u32]>,
+    ) -> Result<Option<Self>> {
         let size = (rows.offsets.len() - 1) * block;
         let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
         // SAFETY: CHOLMOD fills the struct, which stays in its box.
@@ -80,13 +89,8 @@ impl Cholesky {
             cholesky.check()?;
             let found = std::slice::from_raw_parts((*cholesky.factor).Perm.cast::<c_int>(), size);
             cholesky.order = found.iter().map(|&unknown| unknown as u32).collect();
-            cholesky.given = sys::cholmod_allocate_dense(
-                size,
-                1,
-                size,
-                sys::CHOLMOD_REAL as c_int,
-                &mut *cholesky.common,
-            );
+            cholesky.given =
+                sys::cholmod_allocate_dense(size, 1, size, sys::CHOLMOD_REAL as c_int, &mut *cholesky.common);
         }
         cholesky.check()?;
         let tail = &cholesky.order[size - last.len()..];
@@ -125,7 +129,8 @@ impl Cholesky {
         unsafe { sys::cholmod_factorize(&mut matrix, self.factor, &mut *self.common) };
         if self.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
             return Err(Error::Failed(
-                "the matrix of the step is not positive definite: check densities, viscosities and moduli".into(),
+                "the matrix of the step is not positive definite: check densities, viscosities and moduli"
+                    .into(),
             ));
         }
         self.check()
@@ -164,8 +169,7 @@ impl Cholesky {
     pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
         self.half(sys::CHOLMOD_Lt as c_int, false)?;
         // SAFETY: as in `forward`.
-        let found =
-            unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), self.order.len()) };
+        let found = unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), self.order.len()) };
         self.order.iter().zip(found).for_each(|(&at, value)| solution[at as usize] = *value);
         Ok(())
     }
@@ -232,10 +236,12 @@ impl Cholesky {
         match self.common.status {
             status if status >= 0 => Ok(()),
             status if status == sys::CHOLMOD_OUT_OF_MEMORY => Err(Error::Failed(
-                "not enough memory for the factors: use [solver] preconditioner = \"gamg\", or more memory".into(),
+                "not enough memory for the factors: use [solver] preconditioner = \"gamg\", or more memory"
+                    .into(),
             )),
             status if status == sys::CHOLMOD_TOO_LARGE => Err(Error::Failed(
-                "the factors are too large for CHOLMOD's indices: use [solver] preconditioner = \"gamg\"".into(),
+                "the factors are too large for CHOLMOD's indices: use [solver] preconditioner = \"gamg\""
+                    .into(),
             )),
             status => Err(Error::Internal(format!("CHOLMOD error {status}"))),
         }
@@ -253,76 +259,6 @@ impl Drop for Cholesky {
             sys::cholmod_free_factor(&mut self.factor, common);
             sys::cholmod_finish(common);
         }
-    }
-}
-
-/// The lower half of a matrix by columns.
-struct Lower {
-    starts: Vec<c_int>,
-    indices: Vec<c_int>,
-    values: Vec<f64>,
-}
-
-impl Lower {
-    /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on.
-    fn of(block: usize, rows: &BlockRows) -> Result<Self> {
-        let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
-        let too_many = |_| {
-            Error::Refused(format!(
-                "{entries} matrix entries are more than CHOLMOD can count: use [solver] preconditioner = \"gamg\""
-            ))
-        };
-        c_int::try_from(entries).map_err(too_many)?;
-        let mut lower = Self {
-            starts: Vec::with_capacity((rows.offsets.len() - 1) * block + 1),
-            indices: Vec::with_capacity(entries),
-            values: Vec::with_capacity(entries),
-        };
-        lower.starts.push(0);
-        for (node, range) in rows.offsets.windows(2).enumerate() {
-            for i in 0..block {
-                let row = node * block + i;
-                for at in range[0]..range[1] {
-                    let first = rows.columns[at] as usize * block;
-                    for j in (0..block).filter(|j| first + j >= row) {
-                        lower.indices.push((first + j) as c_int);
-                        lower.values.push(rows.values[(at * block + i) * block + j]);
-                    }
-                }
-                lower.starts.push(lower.indices.len() as c_int);
-            }
-        }
-        Ok(lower)
-    }
-
-    fn view(&mut self) -> sys::cholmod_sparse {
-        view(self.starts.len() - 1, &mut self.starts, &mut self.indices, Some(&mut self.values))
-    }
-}
-
-/// CHOLMOD's view of the lower half of a symmetric matrix; it must not outlive the arrays.
-fn view(
-    size: usize,
-    starts: &mut [c_int],
-    indices: &mut [c_int],
-    values: Option<&mut [f64]>,
-) -> sys::cholmod_sparse {
-    let kind = if values.is_some() { sys::CHOLMOD_REAL } else { sys::CHOLMOD_PATTERN };
-    sys::cholmod_sparse {
-        nrow: size,
-        ncol: size,
-        nzmax: indices.len(),
-        p: starts.as_mut_ptr().cast(),
-        i: indices.as_mut_ptr().cast(),
-        nz: ptr::null_mut(),
-        x: values.map_or(ptr::null_mut(), |values| values.as_mut_ptr().cast()),
-        z: ptr::null_mut(),
-        stype: -1,
-        itype: sys::CHOLMOD_INT as c_int,
-        xtype: kind as c_int,
-        dtype: sys::CHOLMOD_DOUBLE as c_int,
-        sorted: 1,
-        packed: 1,
     }
 }
 

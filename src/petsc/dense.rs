@@ -13,11 +13,8 @@ pub struct DenseCholesky {
 impl DenseCholesky {
     /// Factors a symmetric positive definite matrix, given column after column.
     pub fn new(size: usize, columns: &[f64]) -> Result<Self> {
-        let mut dense = Self {
-            factor: sequential(size, columns)?,
-            vectors: [ptr::null_mut(); 2],
-            not_send: PhantomData,
-        };
+        let mut dense =
+            Self { factor: sequential(size, columns)?, vectors: [ptr::null_mut(); 2], not_send: PhantomData };
         // SAFETY: live objects that the handle owns; without a row permutation none is read.
         unsafe {
             check(sys::MatSetOption(dense.factor, sys::MAT_SPD, 1))?;

@@ -351,7 +351,11 @@ pub(super) fn adaptive(job: &Job) -> Option<Adaptive> {
 
 /// Steps that one matrix is for: adaptive steps change their length every other time.
 pub(super) fn steps_a_matrix(job: &Job) -> u64 {
-    if job.time.adaptive.is_some() { 2 } else { super::time_loop::steps_between(0.0, job.time.end, job.time.step) }
+    if job.time.adaptive.is_some() {
+        2
+    } else {
+        super::time_loop::steps_between(0.0, job.time.end, job.time.step)
+    }
 }
 
 /// The job's wishes for the solver.

@@ -9,7 +9,6 @@ use super::{
     time_loop::steps_between,
 };
 use crate::{
-    stepping::Service,
     body::Body,
     certificate::Certificates,
     error::{Error, Result},
@@ -17,6 +16,7 @@ use crate::{
     mesh::check::Quality,
     session::Session,
     state::State,
+    stepping::Service,
 };
 use serde::Serialize;
 

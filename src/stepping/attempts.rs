@@ -44,15 +44,19 @@ const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> 
 /// Full steps first: a new set of branches raises the residual of the whole body, so that a search would creep where full
 /// steps arrive. In equilibrium it is that of the contact points alone, which tells how far off these are. A fixed point,
 /// at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
-pub(super) const ATTEMPTS: [Attempt; 8] = [
+pub(super) const ATTEMPTS: [Attempt; 12] = [
     attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
     attempt(Search::Equilibrated, 1.0, FrictionIteration::Newton),
     attempt(Search::Equilibrated, 10.0, FrictionIteration::Newton),
-    attempt(Search::Backtracking, 1.0, FrictionIteration::Newton),
     attempt(Search::FullSteps, 10.0, FrictionIteration::Newton),
+    attempt(Search::Backtracking, 1.0, FrictionIteration::Newton),
+    attempt(Search::FullSteps, 100.0, FrictionIteration::Newton),
+    attempt(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
     attempt(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
     attempt(Search::Equilibrated, 1.0, FrictionIteration::FixedPoint),
-    attempt(Search::Backtracking, 1.0, FrictionIteration::FixedPoint),
+    attempt(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
+    attempt(Search::Equilibrated, 30.0, FrictionIteration::FixedPoint),
+    attempt(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
 ];
 
 /// Newton iterations; with why they led nowhere, if so.

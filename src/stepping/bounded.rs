@@ -44,14 +44,8 @@ impl Bounded {
         let Some(matrix) = task.matrix.assembled() else {
             return Err(Error::Internal("bounds need the entries of the matrix".into()));
         };
-        let outcome = self.snes.solve(
-            matrix,
-            task.right_hand_side,
-            bounds,
-            trial,
-            task.tolerances(),
-            iterations,
-        )?;
+        let outcome =
+            self.snes.solve(matrix, task.right_hand_side, bounds, trial, task.tolerances(), iterations)?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {

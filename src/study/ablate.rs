@@ -3,9 +3,9 @@
 //! The effects are found, not listed: every table of the job's physics that its schema lets be absent, and the density.
 
 use super::{
+    compare::in_dimension,
     document::{Norm, Over, Quantity, Space, Timing},
     execute::{Outcome, execute},
-    compare::in_dimension,
     measure::Target,
     plan::{Plan, Planned, trim, word},
     record::Record,

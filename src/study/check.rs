@@ -16,7 +16,8 @@ pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document
         document.fault("product", format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
     }
     check_cells(study, base, document);
-    if study.compare.split && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
+    if study.compare.split
+        && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
     {
         let help = "it needs [reference.run] and a mesh that the base job generates";
         document.fault("compare.split", "errors can't be split here", help);

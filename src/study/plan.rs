@@ -139,8 +139,11 @@ impl Plan {
         if let Some(PlannedReference::Run(reference)) = &mut self.reference {
             let mut every = 0;
             for (name, adaptive, spacing) in &spacings {
-                let count =
-                    if *adaptive || reference.adaptive.is_some() { Some(1) } else { whole(spacing / reference.step) };
+                let count = if *adaptive || reference.adaptive.is_some() {
+                    Some(1)
+                } else {
+                    whole(spacing / reference.step)
+                };
                 match count {
                     Some(count) => every = greatest_common_divisor(every, count),
                     None => faults.push(format!(

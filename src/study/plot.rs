@@ -221,8 +221,7 @@ mod tests {
             Curve { name: "lagged_euler".into(), points: vec![[0.02, 0.3], [0.7, 0.04]] },
             Curve { name: "bdf2".into(), points: vec![[0.03, 0.1]] },
         ];
-        let norm =
-            NormResult { name: "v_max".into(), meaning: "max ||v||_H".into(), is_published: false };
+        let norm = NormResult { name: "v_max".into(), meaning: "max ||v||_H".into(), is_published: false };
         let picture =
             cost(&norm, &curves, Axis { quantity: "computing time", unit: "s" }, "time").expect("picture");
         for words in ["<svg", "lagged_euler", "bdf2", "computing time / s", "10⁻²"] {

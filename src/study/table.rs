@@ -200,7 +200,8 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
 
 /// For each norm what its errors take: a row a scheme, seconds with the run that took them.
 fn targets(results: &Results) -> Vec<Table> {
-    let header = ["error", "scheme", "run", "its error", "ruled by", "steps", "computing s", "over the fastest"];
+    let header =
+        ["error", "scheme", "run", "its error", "ruled by", "steps", "computing s", "over the fastest"];
     let mut tables: Vec<Table> = Vec::new();
     for target in &results.targets {
         let title = format!("What it takes   [{}]", target.norm);

@@ -1,0 +1,91 @@
+use super::{BlockRows, sys};
+use crate::error::{Error, Result};
+use std::{ffi::c_int, ptr};
+
+/// The lower half of a matrix by columns.
+pub(super) struct Lower {
+    starts: Vec<c_int>,
+    indices: Vec<c_int>,
+    values: Vec<f64>,
+}
+
+impl Lower {
+    /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on.
+    pub fn of(block: usize, rows: &BlockRows) -> Result<Self> {
+        let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
+        let too_many = |_| {
+            Error::Refused(format!(
+                "{entries} matrix entries are more than CHOLMOD can count: use [solver] preconditioner = \"gamg\""
+            ))
+        };
+        c_int::try_from(entries).map_err(too_many)?;
+        let mut lower = Self {
+            starts: Vec::with_capacity((rows.offsets.len() - 1) * block + 1),
+            indices: Vec::with_capacity(entries),
+            values: Vec::with_capacity(entries),
+        };
+        lower.starts.push(0);
+        for (node, range) in rows.offsets.windows(2).enumerate() {
+            for i in 0..block {
+                let row = node * block + i;
+                for at in range[0]..range[1] {
+                    let first = rows.columns[at] as usize * block;
+                    for j in (0..block).filter(|j| first + j >= row) {
+                        lower.indices.push((first + j) as c_int);
+                        lower.values.push(rows.values[(at * block + i) * block + j]);
+                    }
+                }
+                lower.starts.push(lower.indices.len() as c_int);
+            }
+        }
+        Ok(lower)
+    }
+
+    pub fn view(&mut self) -> sys::cholmod_sparse {
+        view(self.starts.len() - 1, &mut self.starts, &mut self.indices, Some(&mut self.values))
+    }
+}
+
+/// CHOLMOD's view of the lower half of a symmetric matrix; it must not outlive the arrays.
+pub(super) fn view(
+    size: usize,
+    starts: &mut [c_int],
+    indices: &mut [c_int],
+    values: Option<&mut [f64]>,
+) -> sys::cholmod_sparse {
+    let kind = if values.is_some() { sys::CHOLMOD_REAL } else { sys::CHOLMOD_PATTERN };
+    sys::cholmod_sparse {
+        nrow: size,
+        ncol: size,
+        nzmax: indices.len(),
+        p: starts.as_mut_ptr().cast(),
+        i: indices.as_mut_ptr().cast(),
+        nz: ptr::null_mut(),
+        x: values.map_or(ptr::null_mut(), |values| values.as_mut_ptr().cast()),
+        z: ptr::null_mut(),
+        stype: -1,
+        itype: sys::CHOLMOD_INT as c_int,
+        xtype: kind as c_int,
+        dtype: sys::CHOLMOD_DOUBLE as c_int,
+        sorted: 1,
+        packed: 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_go_from_the_diagonal_down() {
+        let rows = BlockRows {
+            offsets: vec![0, 2, 4],
+            columns: vec![0, 1, 0, 1],
+            values: vec![1.0, 2.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 4.0, 6.0, 5.0, 7.0, 8.0, 9.0, 9.0, 10.0],
+        };
+        let lower = Lower::of(2, &rows).unwrap();
+        assert_eq!(lower.starts, [0, 4, 7, 9, 10]);
+        assert_eq!(lower.indices, [0, 1, 2, 3, 1, 2, 3, 2, 3, 3]);
+        assert_eq!(lower.values, [1.0, 2.0, 4.0, 5.0, 3.0, 6.0, 7.0, 8.0, 9.0, 10.0]);
+    }
+}
