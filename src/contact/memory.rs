@@ -37,6 +37,7 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     const CLAY: Memory = Memory { stiffness_rate: 50.0, decay_time: 2.0 };
 
@@ -58,5 +59,37 @@ mod tests {
         assert!((CLAY.advance(0.0, 0.1, short) / (5.0 * short) - 1.0).abs() < 1e-9);
         let halves = CLAY.advance(CLAY.advance(3.0, 0.1, 0.35), 0.1, 0.35);
         assert!((halves - CLAY.advance(3.0, 0.1, 0.7)).abs() < 1e-14);
+    }
+
+    proptest! {
+        /// A mode `mass u'' + damping u' + stiffness u + m = 0` by `lagged_euler`, with steps below the bound that counts memory
+        /// as a spring: stable wherever the differential equation is (Routh), by the criterion of Jury for cubic polynomials.
+        #[test]
+        fn below_the_explicit_bound_no_mode_grows_that_would_not_grow_by_itself(
+            powers in proptest::array::uniform5(-2.0f64..2.0), share in 0.01f64..0.999,
+        ) {
+            let [mass, damping, stiffness, stiffness_rate, decay_time] = powers.map(|power| 10f64.powf(power));
+            let law = Memory { stiffness_rate, decay_time };
+            let [second, first, constant] =
+                [mass / decay_time + damping, damping / decay_time + stiffness, stiffness / decay_time + stiffness_rate];
+            prop_assume!(second * first > 1.001 * mass * constant);
+            let spring = stiffness + law.stiffness();
+            let step = share * (damping + (damping * damping + 4.0 * spring * mass).sqrt()) / spring;
+            // m_n = fresh u + kept m, v_n = (inert v - stiffness u - m_n) / resistance, u_n = u + step v_n.
+            let (fresh, kept) = (law.advance(0.0, 1.0, step), law.advance(1.0, 0.0, step));
+            let (inert, resistance) = (mass / step, mass / step + damping);
+            let rows = [
+                [1.0 - step * (stiffness + fresh) / resistance, step * inert / resistance, -step * kept / resistance],
+                [-(stiffness + fresh) / resistance, inert / resistance, -kept / resistance],
+                [fresh, 0.0, kept],
+            ];
+            let minor = |i: usize, j: usize| rows[i][i] * rows[j][j] - rows[i][j] * rows[j][i];
+            let a = -(rows[0][0] + rows[1][1] + rows[2][2]);
+            let b = minor(0, 1) + minor(0, 2) + minor(1, 2);
+            let c = -kept * inert / resistance;
+            let rounding = 1e-12;
+            prop_assert!(c.abs() < 1.0 + rounding && (a + c).abs() < 1.0 + b + rounding, "{} {} {}", a, b, c);
+            prop_assert!((b - a * c).abs() < 1.0 - c * c + rounding, "{} {} {}", a, b, c);
+        }
     }
 }
