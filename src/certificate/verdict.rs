@@ -101,7 +101,8 @@ impl Verdict {
     fn stability(&mut self, bound: f64, step: f64, accepted: bool) {
         if step < bound {
             self.words.push(format!(
-                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress and adhesion"
+                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress, adhesion, \
+                 contact memory"
             ));
             return;
         }

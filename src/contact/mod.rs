@@ -5,6 +5,7 @@ mod compliance;
 mod damped_response;
 mod friction;
 mod graph;
+mod memory;
 mod normal_law;
 mod obstacle;
 
@@ -13,5 +14,6 @@ pub use compliance::Compliance;
 pub use damped_response::{DampedResponse, Symmetry};
 pub use friction::{FrictionLaw, Slip};
 pub use graph::Graph;
+pub use memory::Memory;
 pub use normal_law::{NodeContext, NormalLaw, Resolved};
 pub use obstacle::Gap;

@@ -5,6 +5,7 @@
 mod adhesion;
 mod cell_history;
 mod contact;
+mod contact_memory;
 mod damage;
 mod elastic_stress;
 mod energy;
@@ -21,6 +22,7 @@ mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
 pub use contact::{COUNTS, Contact, ContactNode, PointCount, Quadrature, choose_unknowns, contact_nodes};
+pub use contact_memory::ContactMemory;
 pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;

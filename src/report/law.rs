@@ -182,7 +182,8 @@ mod tests {
     fn law(normal: NormalLaw) -> Law {
         let on = vec!["bottom".into()];
         let quadrature = Quadrature::Nodal;
-        let contact = Contact { on, quadrature, normal, obstacle: None, friction: None, adhesion: None };
+        let contact =
+            Contact { on, quadrature, normal, obstacle: None, friction: None, adhesion: None, memory: None };
         Law::of(&contact).expect("law").expect("graph")
     }
 

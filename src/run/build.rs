@@ -4,7 +4,7 @@ use crate::{
     body::Body,
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
     effect::{
-        Adhesion, BodyForce, Bonded, Contact, Damage, Effect, ElasticLaw, ElasticStress, Held,
+        Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, ElasticStress, Held,
         ImplicitElasticity, Inertia, Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow,
         ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
     },
@@ -132,8 +132,13 @@ fn surface_effects<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
-    let mut bonded = Vec::new();
+    let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for contact in &job.contact {
+        if let Some(memory) = &contact.memory {
+            let law =
+                contact::Memory { stiffness_rate: memory.stiffness_rate, decay_time: memory.decay_time };
+            foundations.push((law, surface_points(session, mesh, &facets(mesh, &contact.on))?));
+        }
         let Some(adhesion) = &contact.adhesion else { continue };
         let law = contact::Adhesion {
             stiffness: adhesion.stiffness,
@@ -146,6 +151,9 @@ fn surface_effects<const D: usize>(
     }
     if !bonded.is_empty() {
         effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
+    }
+    if !foundations.is_empty() {
+        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh))?));
     }
     Ok(effects)
 }

@@ -2,7 +2,8 @@
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 
-const ALL: [&str; 6] = ["inertia", "elasticity", "viscosity", "viscoplasticity", "traction", "contact"];
+const ALL: [&str; 7] =
+    ["inertia", "elasticity", "viscosity", "viscoplasticity", "traction", "body_force", "contact"];
 const HISTORY: &str = "viscoplastic_history";
 
 /// The key whose absence takes an effect out of a job.
@@ -27,10 +28,12 @@ fn moving(case: Case, displacement: &str, velocity: &str) -> Case {
 
 fn square() -> Case {
     moving(Case::square(6), "['0.03*x', '-0.04*x']", "['0.1*x', '-0.2*x']")
+        .set("body_force", "[{ value = [0, -1] }]")
 }
 
 fn cube() -> Case {
     moving(Case::cube(3), "['0.03*x', 0, '-0.04*x']", "['0.1*x', 0, '-0.2*x']")
+        .set("body_force", "[{ value = [0, 0, -1] }]")
 }
 
 /// Runs a job without some effects and looks for traces of them.
@@ -49,7 +52,7 @@ fn run_without(case: Case, lacking: &[&str], ranks: usize) {
     assert_eq!(histories, if lacks("viscoplasticity") { vec![] } else { vec![HISTORY] });
     assert_eq!(inventory["newton"], !lacks("contact"));
     assert_eq!(inventory["contact_points"] == 0, lacks("contact"));
-    assert_eq!(inventory["load_vector"], !lacks("traction"));
+    assert_eq!(inventory["load_vector"], !(lacks("traction") && lacks("body_force")));
     look_into_history(&results, lacks);
     look_into_files(&results, lacks);
 }
@@ -62,13 +65,14 @@ fn look_into_history(results: &Results, lacks: impl Fn(&str) -> bool) {
         ("elasticity", "elastic_energy"),
         ("viscosity", "viscous_dissipation"),
         ("viscoplasticity", "viscoplastic_dissipation"),
-        ("traction", "external_work"),
         ("contact", "contact_dissipation"),
         ("contact", "newton_iterations"),
     ] {
         let nothing = history.numbers(column).iter().all(|value| *value == 0.0);
         assert_eq!(nothing, lacks(effect), "{column}");
     }
+    let work = history.numbers("external_work");
+    assert_eq!(work.iter().all(|work| *work == 0.0), lacks("traction") && lacks("body_force"));
 }
 
 #[track_caller]
@@ -103,9 +107,10 @@ fn with_all_effects_all_are_there() {
 
 #[test]
 fn an_effect_that_is_not_called_for_leaves_no_trace() {
-    for lacking in ["inertia", "viscosity", "viscoplasticity", "traction", "contact"] {
+    for lacking in ["inertia", "viscosity", "viscoplasticity", "traction", "body_force", "contact"] {
         run_without(square(), &[lacking], 2);
     }
+    run_without(square(), &["traction", "body_force"], 2);
 }
 
 #[test]
@@ -172,9 +177,32 @@ fn effects_that_do_nothing_leave_every_number_as_it_is() {
     let plain = square();
     let inert = square()
         .set("material.damage", "{ threshold = 1e30, viscosity = 1 }")
-        .set("contact.0.adhesion", "{ stiffness = 0, energy = 1 }");
+        .set("contact.0.adhesion", "{ stiffness = 0, energy = 1 }")
+        .set("contact.0.memory", "{ stiffness_rate = 0, decay_time = 1 }");
     let (plain_results, inert_results) = (plain.run(2), inert.run(2));
     for name in ["probes.csv", "history.csv", "profiles.csv"] {
         assert_eq!(plain_results.text(name), inert_results.text(name), "{name}");
+    }
+}
+
+#[test]
+fn contact_memory_is_kept_written_and_counted_where_it_is_called_for() {
+    let with = square().set("contact.0.memory", "{ stiffness_rate = 2e4, decay_time = 0.01 }");
+    for (case, there) in [(with, true), (square(), false)] {
+        let results = case.run(2);
+        let summary = results.summary();
+        let effects = summary["effects"].as_array().expect("a list");
+        assert_eq!(effects.iter().any(|name| name == "contact_memory"), there, "{summary}");
+        let bytes = if there { serde_json::json!(7 * 16) } else { serde_json::Value::Null };
+        assert_eq!(summary["inventory"]["history_bytes"]["memory_pressure"], bytes);
+        let fields = NumberFile::open(&results.path("fields.vtkhdf")).names("Fields");
+        assert_eq!(fields.iter().any(|name| name == "memory_pressure"), there);
+        let tables = NumberFile::open(&results.path("checkpoint-4.h5")).checkpoint_tables();
+        let saved = tables.into_iter().find(|(name, _)| name == "memory_pressure");
+        assert_eq!(
+            saved.as_ref().is_some_and(|(_, values)| values.iter().any(|pressure| *pressure > 0.0)),
+            there
+        );
+        assert!(results.number("max_energy_imbalance") < 1e-10, "{summary}");
     }
 }

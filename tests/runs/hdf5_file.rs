@@ -29,7 +29,8 @@ impl NumberFile {
 
     /// A field of a field file at a step of the file.
     pub fn field(&self, name: &str, step: usize) -> Vec<f64> {
-        let at_nodes = ["displacement", "velocity", "contact_traction", "bonding"].contains(&name);
+        let at_nodes =
+            ["displacement", "velocity", "contact_traction", "bonding", "memory_pressure"].contains(&name);
         let ids = if at_nodes { "VTKHDF/PointData/node" } else { "VTKHDF/CellData/cell" };
         self.by_id(&format!("Fields/{name}/{step}"), ids)
     }

@@ -139,6 +139,19 @@ fn a_run_with_damage_and_adhesion_goes_on_on_any_number_of_ranks() {
     }
 }
 
+/// A square that sinks into a foundation that remembers.
+fn remembering() -> Case {
+    saving().set("contact.0.memory", "{ stiffness_rate = 200, decay_time = 0.3 }")
+}
+
+#[test]
+fn a_run_with_contact_memory_goes_on_to_the_last_bit_and_on_any_number_of_ranks() {
+    for ranks in [1, 2] {
+        compare_with_straight(remembering, ranks, "contact memory");
+    }
+    go_on_on_other_ranks(remembering(), 2, &["memory_pressure"]);
+}
+
 #[test]
 fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
     for law in [

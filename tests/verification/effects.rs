@@ -3,9 +3,12 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
-    effect::{Damage, Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscousStress},
+    effect::{
+        Damage, Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscoplasticHistory,
+        ViscousStress,
+    },
     job::Job,
-    material::{self, ByMaterial, Isotropic},
+    material::{self, ByMaterial, Isotropic, Metric, Perzyna, Viscoplasticity},
     run::{Inventory, Simulation},
     session::Session,
     space::{Batch, CellMatrix, Geometry, Simplex},
@@ -153,10 +156,31 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     assert_eq!(seen.gathered["explicit"], ["strain"], "viscosity has no part in the explicit pass");
     assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"]);
 
+    let law = Perzyna {
+        relaxation: 1.0,
+        yield_stress: 1.0,
+        exponent: 1.0,
+        elasticity: tensor,
+        metric: Metric::Elasticity,
+    };
+    let laws = || ByMaterial::uniform(Viscoplasticity::Perzyna(law));
+    let runs = Geometry::new(&part(session, whole)).runs;
+    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+        vec![
+            Box::new(Watched { inner: ViscoplasticHistory::<S>::new(laws(), &runs), seen: seen.clone() }),
+            Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
+        ]
+    });
+    assert_eq!(
+        seen.calls,
+        BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]),
+        "viscoplasticity"
+    );
+    assert_eq!(seen.gathered["explicit"], ["strain", "strain_rate"]);
+
     let elastic = || ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) };
     let law =
         material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9, elasticity: tensor };
-    let runs = Geometry::new(&part(session, whole)).runs;
     let damage = || Damage::new(ByMaterial::uniform(law), &runs);
     let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
@@ -184,6 +208,14 @@ fn allocations(session: &Session) {
     let bare = simulation::<2, 3>(session, &head, &mesh);
     assert_eq!(inventory(session, &bare), Inventory::default(), "a body with inertia alone");
     assert_eq!(bare.body.effect_names(), ["inertia"]);
+    // Fields of the state that only contact at nodes and steps over two states need.
+    let extra = |job: &str| {
+        let state = simulation::<2, 3>(session, job, &mesh).state;
+        [state.contact_traction.is_some(), state.previous_displacement.is_some()]
+    };
+    assert_eq!(extra(&head), [false, false]);
+    assert_eq!(extra(&head.replace("step =", "scheme = \"implicit_euler\"\nstep =")), [false, false]);
+    assert_eq!(extra(&head.replace("step =", "scheme = \"bdf2\"\nstep =")), [false, true]);
 
     let elastic = format!("{head}elasticity = {{ youngs_modulus = 1, poisson_ratio = 0.3 }}\n");
     assert_eq!(inventory(session, &simulation::<2, 3>(session, &elastic, &mesh)), Inventory::default());
@@ -200,6 +232,15 @@ fn allocations(session: &Session) {
     );
     let found = inventory(session, &simulation::<2, 3>(session, &touching, &mesh));
     assert_eq!(found, Inventory { contact_points: 4, newton: true, ..Inventory::default() });
+    let gauss = touching.replace("[[contact]]\n", "[[contact]]\nquadrature = \"gauss\"\n");
+    assert_eq!([extra(&touching), extra(&gauss)], [[true, false], [false, false]]);
+
+    let rubbing = format!("{touching}friction.tresca.bound = 1\n");
+    let found = inventory(session, &simulation::<2, 3>(session, &rubbing, &mesh));
+    assert_eq!(
+        found,
+        Inventory { contact_points: 4, friction_points: 4, newton: true, ..Inventory::default() }
+    );
 
     let damaged = format!("{elastic}damage = {{ threshold = 1, viscosity = 1 }}\n");
     let found = inventory(session, &simulation::<2, 3>(session, &damaged, &mesh));
@@ -213,6 +254,14 @@ fn allocations(session: &Session) {
         Inventory { history_bytes: histories, contact_points: 4, newton: true, ..Inventory::default() };
     assert_eq!(inventory(session, &bonded), expected);
     assert_eq!(bonded.body.effect_names(), ["inertia", "contact", "adhesion"]);
+
+    let remembering = format!("{touching}memory = {{ stiffness_rate = 1, decay_time = 1 }}\n");
+    let remembering = simulation::<2, 3>(session, &remembering, &mesh);
+    let histories = BTreeMap::from([("memory_pressure".to_owned(), (4 * 8 * 2) as u64)]);
+    let expected =
+        Inventory { history_bytes: histories, contact_points: 4, newton: true, ..Inventory::default() };
+    assert_eq!(inventory(session, &remembering), expected);
+    assert_eq!(remembering.body.effect_names(), ["inertia", "contact", "contact_memory"]);
 
     let nothing = elastic.replace("density = 1\n", "");
     let mut loaded = Job::from_text(&nothing, "job.toml", Path::new("."), &[]).expect("a job");

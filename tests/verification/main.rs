@@ -14,6 +14,7 @@ mod energy;
 mod indefinite;
 mod jacobian;
 mod manufactured;
+mod memory;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
 mod obstacles;
@@ -53,6 +54,7 @@ fn scenario() {
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),
+        "memory" => memory::all(&session),
         "adhesion" => adhesion::all(&session),
         "one_cell" => one_cell::all(&session),
         "indefinite" => indefinite::solve(&session),

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Adhesion;
+use super::{Adhesion, Memory};
 use crate::job::Scalar;
 
 /// Boundaries that touch an obstacle, and the laws there.
@@ -31,6 +31,12 @@ pub struct Contact {
     /// Absent: no bonds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adhesion: Option<Adhesion>,
+    /// Memory of the foundation: a pressure beside that of the normal law,
+    /// `integral from 0 to t of stiffness_rate exp(-(t - s) / decay_time) max(normal displacement(s), 0) ds`, the field
+    /// `memory_pressure`. `contact_pressure` is that of the normal law alone; the work of both is `contact_dissipation`, negative
+    /// where the foundation gives back more than it took. Absent: no memory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
 }
 
 /// Where on a facet the contact laws hold.

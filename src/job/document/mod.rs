@@ -8,6 +8,7 @@ mod boundary;
 mod contact;
 mod damage;
 mod material;
+mod memory;
 mod mesh;
 mod output;
 mod time;
@@ -23,6 +24,7 @@ pub use material::{
     DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
     Viscosity,
 };
+pub use memory::Memory;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time};

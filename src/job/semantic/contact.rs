@@ -13,6 +13,7 @@ pub fn check(findings: &mut Findings<'_>) {
         check_graph(findings, &format!("{contact}.normal.graph.points"));
         check_quadrature(findings, &contact);
         check_adhesion(findings, &contact);
+        check_memory(findings, &contact);
         check_bound(findings, &format!("{contact}.normal.unilateral"));
         check_obstacle(findings, &contact);
         let path = format!("{contact}.friction.slip_weakening");
@@ -90,6 +91,40 @@ fn check_adhesion(findings: &mut Findings<'_>, contact: &str) {
             findings.warnings.push(format!(
                 "{path}: at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
             ));
+        }
+    }
+}
+
+/// What is remembered is how far a foundation that touches at first was pressed in; friction sees the normal law alone.
+fn check_memory(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let path = format!("{contact}.memory");
+    if root.find(&path).is_none() {
+        return;
+    }
+    if root.read::<Quadrature>(&format!("{contact}.quadrature")) == Some(Quadrature::Gauss) {
+        let help = "use \"nodal\", or leave the key out";
+        findings.fault(&format!("{contact}.quadrature"), "memory does not act at Gauss points", help);
+    }
+    let memory_or = |other: &str| format!("delete it, or [{path}]{other}");
+    for (key, message, other) in [
+        ("normal.unilateral", "a rigid obstacle is never pressed in: there is nothing to remember", ""),
+        ("normal.compliance.gap", "memory is of what touches at first: there is no gap", ""),
+        ("obstacle", "memory is of what touches at first: there is no obstacle that moves", ""),
+        (
+            "friction.coulomb",
+            "this friction follows the pressure of the normal law, which memory is not part of",
+            ", or use tresca",
+        ),
+        (
+            "friction.slip_weakening",
+            "this friction follows the pressure of the normal law, which memory is not part of",
+            ", or use tresca",
+        ),
+    ] {
+        let place = format!("{contact}.{key}");
+        if root.find(&place).is_some() {
+            findings.fault_at_key(&place, message, memory_or(other));
         }
     }
 }

@@ -71,11 +71,13 @@ fn check_scheme(findings: &mut Findings<'_>) {
     let mut places = vec!["material.damage".to_owned()];
     places.extend(list("region", "material.damage"));
     places.extend(list("contact", "adhesion"));
+    places.extend(list("contact", "memory"));
     for place in places {
         if findings.root.find(&place).is_none() {
             continue;
         }
-        let message = format!("damage and adhesion are not available with the scheme \"{scheme}\" yet");
+        let message =
+            format!("damage, adhesion and contact memory are not available with the scheme \"{scheme}\" yet");
         findings.fault(&place, message, "take scheme = \"lagged_euler\"");
     }
 }

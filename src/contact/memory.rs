@@ -1,0 +1,95 @@
+//! Memory of a foundation: what was pressed in pushes back, the more the longer it has been.
+//!
+//! Beside the normal law's pressure, `-sigma_nu` has the part
+//!
+//! ```text
+//! m(t) = integral from 0 to t of b(t - s) max(u_nu(s), 0) ds,    b(t) = stiffness_rate exp(-t / decay_time)
+//! ```
+//!
+//! so that `m' = stiffness_rate max(u_nu, 0) - m / decay_time`: one number a point stands for the whole past. A displacement
+//! that is held is opposed, in the end, like by a spring of the stiffness `stiffness_rate decay_time`; what came off the
+//! foundation is still pushed while that forgets. The force follows the displacement late, and so may put energy into a body
+//! that swings: damping in the normal law or in the body has to take it up. (M. Sofonea, F. Pătrulescu, Analysis of a
+//! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
+
+/// The memory of a foundation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Memory {
+    /// How fast the pressure grows at first for each metre pressed in, `b(0)`, in Pa/(m s).
+    pub stiffness_rate: f64,
+    /// Time in s in which the foundation forgets all but a part of 1/e.
+    pub decay_time: f64,
+}
+
+impl Memory {
+    /// The pressure in Pa after a step of this length in s, during which the point is held at this normal displacement in m.
+    pub fn advance(&self, pressure: f64, displacement: f64, length: f64) -> f64 {
+        let past = -length / self.decay_time;
+        past.exp() * pressure - past.exp_m1() * self.stiffness() * displacement.max(0.0)
+    }
+
+    /// The stiffness in Pa/m against a displacement held for long.
+    pub fn stiffness(&self) -> f64 {
+        self.stiffness_rate * self.decay_time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const CLAY: Memory = Memory { stiffness_rate: 50.0, decay_time: 2.0 };
+
+    #[test]
+    fn pressure_grows_to_that_of_a_spring_and_is_forgotten_by_hand() {
+        assert_eq!(CLAY.stiffness(), 100.0);
+        // 100 Pa/m * 0.1 m, of which 1 - 1/e after the decay time.
+        let once = CLAY.advance(0.0, 0.1, 2.0);
+        assert!((once - 10.0 * (1.0 - (-1.0f64).exp())).abs() < 1e-14);
+        assert!((CLAY.advance(once, 0.1, 1e3) - 10.0).abs() < 1e-13);
+        assert!((CLAY.advance(10.0, 0.0, 2.0) - 10.0 * (-1.0f64).exp()).abs() < 1e-14);
+        assert_eq!(CLAY.advance(0.0, -3.0, 2.0), 0.0, "lifted off");
+        assert_eq!(Memory { stiffness_rate: 0.0, ..CLAY }.advance(0.0, 0.1, 2.0), 0.0);
+    }
+
+    #[test]
+    fn short_steps_grow_with_the_stiffness_rate_and_steps_add_up() {
+        let short = 1e-9;
+        assert!((CLAY.advance(0.0, 0.1, short) / (5.0 * short) - 1.0).abs() < 1e-9);
+        let halves = CLAY.advance(CLAY.advance(3.0, 0.1, 0.35), 0.1, 0.35);
+        assert!((halves - CLAY.advance(3.0, 0.1, 0.7)).abs() < 1e-14);
+    }
+
+    proptest! {
+        /// A mode `mass u'' + damping u' + stiffness u + m = 0` by `lagged_euler`, with steps below the bound that counts memory
+        /// as a spring: stable wherever the differential equation is (Routh), by the criterion of Jury for cubic polynomials.
+        #[test]
+        fn below_the_explicit_bound_no_mode_grows_that_would_not_grow_by_itself(
+            powers in proptest::array::uniform5(-2.0f64..2.0), share in 0.01f64..0.999,
+        ) {
+            let [mass, damping, stiffness, stiffness_rate, decay_time] = powers.map(|power| 10f64.powf(power));
+            let law = Memory { stiffness_rate, decay_time };
+            let [second, first, constant] =
+                [mass / decay_time + damping, damping / decay_time + stiffness, stiffness / decay_time + stiffness_rate];
+            prop_assume!(second * first > 1.001 * mass * constant);
+            let spring = stiffness + law.stiffness();
+            let step = share * (damping + (damping * damping + 4.0 * spring * mass).sqrt()) / spring;
+            // m_n = fresh u + kept m, v_n = (inert v - stiffness u - m_n) / resistance, u_n = u + step v_n.
+            let (fresh, kept) = (law.advance(0.0, 1.0, step), law.advance(1.0, 0.0, step));
+            let (inert, resistance) = (mass / step, mass / step + damping);
+            let rows = [
+                [1.0 - step * (stiffness + fresh) / resistance, step * inert / resistance, -step * kept / resistance],
+                [-(stiffness + fresh) / resistance, inert / resistance, -kept / resistance],
+                [fresh, 0.0, kept],
+            ];
+            let minor = |i: usize, j: usize| rows[i][i] * rows[j][j] - rows[i][j] * rows[j][i];
+            let a = -(rows[0][0] + rows[1][1] + rows[2][2]);
+            let b = minor(0, 1) + minor(0, 2) + minor(1, 2);
+            let c = -kept * inert / resistance;
+            let rounding = 1e-12;
+            prop_assert!(c.abs() < 1.0 + rounding && (a + c).abs() < 1.0 + b + rounding, "{} {} {}", a, b, c);
+            prop_assert!((b - a * c).abs() < 1.0 - c * c + rounding, "{} {} {}", a, b, c);
+        }
+    }
+}
