@@ -78,6 +78,25 @@ impl<'a> Body<'a> {
         self.field(look, range, |face| stress[face.cell as usize]).map(Some)
     }
 
+    /// Coloured by the error indicator of its cells, if the file has it: by powers of ten, down to a hundredth of
+    /// the largest, with the total.
+    pub fn error_indicator(&self) -> Result<Option<Picture>> {
+        let Some(errors) = &self.snapshot.error_indicator else { return Ok(None) };
+        let range = extent(errors.iter().copied());
+        let largest = range.map_or(0.0, |range| range.1);
+        let unit = if self.snapshot.dimension() == 2 { "√(J/m)" } else { "√J" };
+        let look = Coloured { name: "error_indicator", quantity: "error indicator", unit, shades: VIRIDIS };
+        let scale = if largest > 0.0 {
+            Scale::logarithmic(errors.iter().copied().filter(|error| *error >= 1e-2 * largest))
+        } else {
+            Scale::linear(errors.iter().copied(), false)
+        };
+        let mut picture = self.shaded(look, &scale, range, |face| errors[face.cell as usize])?;
+        let total = errors.iter().map(|error| error * error).sum::<f64>().sqrt();
+        picture.caption += &format!(" Of all cells together: {} {unit}.", number(total));
+        Ok(Some(picture))
+    }
+
     /// How much the displacement is magnified, in words.
     pub fn magnified(&self) -> String {
         match &self.snapshot.displacement {
@@ -89,21 +108,32 @@ impl<'a> Body<'a> {
 
     fn field(
         &self,
-        Coloured { name, quantity, unit, shades }: Coloured,
+        look: Coloured,
         range: Option<(f64, f64)>,
         value: impl Fn(&Face) -> f64,
     ) -> Result<Picture> {
         let (low, high) = range.unwrap_or((0.0, 0.0));
-        let span = if high > low { high - low } else { 1.0 };
+        self.shaded(look, &Scale::linear([low, high].into_iter(), false), range, value)
+    }
+
+    /// Coloured by values from `range`, as they stand on a scale.
+    fn shaded(
+        &self,
+        Coloured { name, quantity, unit, shades }: Coloured,
+        scale: &Scale,
+        range: Option<(f64, f64)>,
+        value: impl Fn(&Face) -> f64,
+    ) -> Result<Picture> {
+        let (low, high) = range.unwrap_or((0.0, 0.0));
         let frame = self.frame(122.0, &[]);
-        let triangles = self.triangles(&frame, |face| shades.at((value(face) - low) / span));
+        let share = |value: f64| scale.place(value).map(|at| (at - scale.low) / (scale.high - scale.low));
+        let triangles = self.triangles(&frame, |face| shades.at(share(value(face)).unwrap_or(0.0)));
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
         svg += &text(6.0, 18.0, "start", &heading);
         svg += &paint(&triangles, self.edges(), frame.height)?;
         svg += &self.surroundings(&frame);
-        let scale = Scale::linear([low, high].into_iter(), false);
-        svg += &colour_bar(name, shades, &scale, &scale.words(quantity, unit), &frame);
+        svg += &colour_bar(name, shades, scale, &scale.words(quantity, unit), &frame);
         svg += "</svg>";
         let seen = match self.view {
             View::Plane => String::new(),

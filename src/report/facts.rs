@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their words, in the order of the page.
-const MEMBERS: [(&str, &str, &str); 20] = [
+const MEMBERS: [(&str, &str, &str); 21] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
@@ -21,6 +21,7 @@ const MEMBERS: [(&str, &str, &str); 20] = [
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),
     ("max_von_mises", "largest von Mises stress at the end", "Pa"),
+    ("relative_error_indicator", "error indicator over the norm of the stress at the end", ""),
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("effects", "effects simulated", ""),

@@ -11,6 +11,7 @@ mod creep;
 mod damage;
 mod effects;
 mod energy;
+mod indicator;
 mod jacobian;
 mod manufactured;
 #[path = "../mpirun/mod.rs"]
@@ -45,6 +46,8 @@ fn scenario() {
         "callback_panic" => callbacks::panic_on_the_last_rank(&session, &folder),
         "assembly" => assembly::compare(&session),
         "jacobian" => jacobian::compare(&session),
+        "indicator" => indicator::sums(&session),
+        "effectivity" => indicator::effectivity_tends_to_one(&session),
         "effects" => effects::count(&session),
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),
