@@ -87,6 +87,24 @@ impl<'a> Body<'a> {
         self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize])
     }
 
+    /// Coloured by the error indicator of its cells, if the file has it: by powers of ten, down to a hundredth of
+    /// the largest, with the total.
+    pub fn error_indicator(&self) -> Result<Option<Picture>> {
+        let Some(errors) = &self.snapshot.error_indicator else { return Ok(None) };
+        let largest = extent(errors.iter().copied()).map_or(0.0, |range| range.1);
+        let unit = if self.snapshot.dimension() == 2 { "√(J/m)" } else { "√J" };
+        let look = Coloured { name: "error_indicator", quantity: "error indicator", unit, shades: VIRIDIS };
+        let scale = if largest > 0.0 {
+            Scale::logarithmic(errors.iter().copied().filter(|error| *error >= 1e-2 * largest))
+        } else {
+            Scale::linear(errors.iter().copied(), false)
+        };
+        let mut picture = self.field(look, scale, |face| errors[face.cell as usize])?;
+        let total = errors.iter().map(|error| error * error).sum::<f64>().sqrt();
+        picture.caption += &format!(" Of all cells together: {} {unit}.", number(total));
+        Ok(Some(picture))
+    }
+
     /// How much the displacement is magnified, in words.
     pub fn magnified(&self) -> String {
         match &self.snapshot.displacement {

@@ -61,7 +61,9 @@ impl Scale {
     pub fn words(&self, quantity: &str, unit: &str) -> String {
         match (&self.power, unit) {
             (None, "") => quantity.to_owned(),
-            (None, unit) if unit.contains('/') => format!("{quantity} / ({unit})"),
+            (None, unit) if unit.contains('/') && !unit.starts_with('√') => {
+                format!("{quantity} / ({unit})")
+            }
             (None, unit) => format!("{quantity} / {unit}"),
             (Some(power), "") => format!("{quantity} / {power}"),
             (Some(power), unit) => format!("{quantity} / ({power} {unit})"),

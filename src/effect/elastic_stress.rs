@@ -68,6 +68,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
         Some(Form::Elasticity)
     }
 
+    fn elasticity(&self, material: usize) -> Option<Isotropic> {
+        self.law.get(material).map(|law| law.tensor)
+    }
+
     fn add_form(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
         for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {

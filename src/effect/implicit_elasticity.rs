@@ -1,6 +1,6 @@
 use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step};
 use crate::{
-    material::ByMaterial,
+    material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Needs, Simplex},
     tensor::{add_scaled, dot},
 };
@@ -77,6 +77,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
 
     fn form(&self) -> Option<Form> {
         Some(Form::Elasticity)
+    }
+
+    fn elasticity(&self, material: usize) -> Option<Isotropic> {
+        self.law.get(material).map(|law| law.tensor)
     }
 
     fn add_form(&self, batch: &mut Batch<D, S>) {

@@ -36,6 +36,7 @@ pub use viscoplastic_flow::ViscoplasticFlow;
 pub use viscoplastic_history::ViscoplasticHistory;
 pub use viscous_stress::ViscousStress;
 
+use crate::material::Isotropic;
 use crate::space::{Batch, CellMatrix, Needs, Simplex};
 use std::borrow::Cow;
 
@@ -172,6 +173,11 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// Adds the force of its form to the batch: nodal force, or minus the stress; given velocity and strain rate.
     fn add_form(&self, _batch: &mut Batch<D, S>) {}
+
+    /// The elastic tensor in Pa of a material, if it is elasticity and the material has some.
+    fn elasticity(&self, _material: usize) -> Option<Isotropic> {
+        None
+    }
 
     /// The smallest eigenvalue of its viscosity in Pa s over the whole body, if it is a viscosity.
     fn viscosity_modulus(&self) -> Option<f64> {

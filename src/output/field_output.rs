@@ -1,6 +1,7 @@
 //! Which fields go into `fields.vtkhdf`.
 
 use super::{
+    field_snapshot::has_field,
     fields::{Field, FieldFile, FieldMesh, Place, Shape},
     log::Log,
 };
@@ -14,17 +15,22 @@ use crate::{
 };
 use std::path::Path;
 
+/// Name of the field that the job asks for.
+pub const ERROR_INDICATOR: &str = "error_indicator";
+
 /// The field file of a run.
 pub struct FieldOutput<const D: usize>(FieldFile<D>);
 
 impl<const D: usize> FieldOutput<D> {
     /// Creates the files with the mesh, or goes on with them behind this time; files that
-    /// can't be read are put aside. Collective.
+    /// can't be read are put aside. Refused where they hold the error indicator and it is not wanted, or the other way
+    /// round. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         folder: &Path,
         body: &Body<D, S>,
         goes_on_after: Option<f64>,
+        wants_indicator: bool,
         log: &mut Log,
     ) -> Result<Self> {
         let mesh = &body.mesh;
@@ -42,6 +48,9 @@ impl<const D: usize> FieldOutput<D> {
         let (Some(time), true) = (goes_on_after, exists) else {
             return Ok(Self(FieldFile::create(folder, session.world(), parts)?));
         };
+        let holds = if session.is_first() { has_field(&file, ERROR_INDICATOR) } else { None };
+        let fits = holds.is_none_or(|holds| holds == wants_indicator);
+        session.agree(fits.then_some(()).ok_or_else(|| other_fields(&file, wants_indicator)))?;
         match FieldFile::resume(folder, session.world(), parts, time) {
             Ok(resumed) => Ok(Self(resumed)),
             Err(error) => {
@@ -64,12 +73,13 @@ impl<const D: usize> FieldOutput<D> {
         self.0.times().last().copied()
     }
 
-    /// Appends the state, whose total stress is given one a cell. Collective.
+    /// Appends the state, whose total stress is given one a cell, as is the error indicator if it is wanted. Collective.
     pub fn write<const S: usize>(
         &mut self,
         body: &Body<D, S>,
         state: &State,
         stress: &[Mandel<S>],
+        indicator: Option<&[f64]>,
     ) -> Result<()> {
         let (displacement, velocity) = (state.displacement.owned()?, state.velocity.owned()?);
         let norms: Vec<f64> = stress.iter().map(von_mises).collect();
@@ -79,6 +89,9 @@ impl<const D: usize> FieldOutput<D> {
             Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
             Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
         ];
+        if let Some(values) = indicator {
+            fields.push(Field { name: ERROR_INDICATOR, place: Place::Cell, shape: Shape::Scalar, values });
+        }
         let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
         if let Some(values) = traction.as_deref() {
             fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
@@ -100,4 +113,13 @@ impl<const D: usize> FieldOutput<D> {
     pub fn close(self) -> Result<()> {
         self.0.close()
     }
+}
+
+fn other_fields(file: &Path, wants_indicator: bool) -> Error {
+    let (word, there) = if wants_indicator { ("does not hold", "false") } else { ("holds", "true") };
+    Error::Refused(format!(
+        "{} {word} {ERROR_INDICATOR}, and all its times have the same fields: go on with output.{ERROR_INDICATOR} = {there}, or \
+         in another output.folder from a named checkpoint (--restart FILE.h5)",
+        file.display()
+    ))
 }

@@ -1,5 +1,6 @@
 //! The mesh and the newest fields of a `fields.vtkhdf`, read in one process, without MPI.
 
+use super::field_output::ERROR_INDICATOR;
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -22,6 +23,8 @@ pub struct Snapshot {
     pub velocity: Option<Vec<[f64; 3]>>,
     /// Von Mises norm of the stress of the cells in Pa.
     pub von_mises: Option<Vec<f64>>,
+    /// Error indicator of the cells in J^(1/2), in two dimensions (J/m)^(1/2).
+    pub error_indicator: Option<Vec<f64>>,
 }
 
 impl Snapshot {
@@ -58,14 +61,24 @@ impl Snapshot {
     fn is_sound(&self) -> bool {
         let nodes = self.nodes.len();
         let fits = |field: &Option<Vec<[f64; 3]>>| field.as_ref().is_none_or(|f| f.len() == nodes);
+        let fits_cells = |field: &Option<Vec<f64>>| {
+            field.as_ref().is_none_or(|f| f.len() * self.corners == self.cells.len())
+        };
         matches!(self.corners, 3 | 4)
             && !self.cells.is_empty()
             && self.cells.len().is_multiple_of(self.corners)
             && self.cells.iter().all(|node| (*node as usize) < nodes)
             && fits(&self.displacement)
             && fits(&self.velocity)
-            && self.von_mises.as_ref().is_none_or(|f| f.len() * self.corners == self.cells.len())
+            && fits_cells(&self.von_mises)
+            && fits_cells(&self.error_indicator)
     }
+}
+
+/// Whether the steps of a field file hold the field; nothing for a file without steps or one that can't be read.
+pub fn has_field(path: &Path, name: &str) -> Option<bool> {
+    let file = hdf5::File::open(path).ok()?;
+    file.link_exists("VTKHDF/Steps").then(|| file.link_exists(&format!("Fields/{name}")))
 }
 
 fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
@@ -93,6 +106,7 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     snapshot.displacement = newest("displacement")?.as_deref().map(triples);
     snapshot.velocity = newest("velocity")?.as_deref().map(triples);
     snapshot.von_mises = newest("von_mises")?;
+    snapshot.error_indicator = newest(ERROR_INDICATOR)?;
     Ok(snapshot)
 }
 

@@ -5,6 +5,7 @@ pub mod checkpoint_file;
 pub mod checkpoint_folder;
 pub mod checksum;
 pub mod csv;
+pub mod error_indicator;
 mod field;
 pub mod field_output;
 mod field_slab;

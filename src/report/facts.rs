@@ -21,6 +21,7 @@ const MEMBERS: [(&str, &str, &str); 21] = [
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),
     ("max_von_mises", "largest von Mises stress at the end", "Pa"),
+    ("relative_error_indicator", "error indicator over the norm of the stress at the end", ""),
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("max_slip_pressure", "largest contact pressure under slip weakening", "Pa"),

@@ -121,7 +121,8 @@ fn head(found: &Found) -> String {
 fn body_section(page: &mut Page, found: &Found) -> Result<()> {
     let Some(snapshot) = &found.snapshot else { return Ok(()) };
     let body = Body::new(snapshot);
-    let pictures: Vec<_> = [body.speed()?, body.von_mises()?].into_iter().flatten().collect();
+    let pictures: Vec<_> =
+        [body.speed()?, body.von_mises()?, body.error_indicator()?].into_iter().flatten().collect();
     let words = if pictures.is_empty() {
         paragraph("fields.vtkhdf holds a mesh, but no fields yet.")
     } else {

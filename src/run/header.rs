@@ -71,6 +71,9 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}",
         summary.max_inclusion_residual, summary.max_energy_imbalance, summary.max_von_mises
     ));
+    if let (Some(total), Some(share)) = (summary.error_indicator, summary.relative_error_indicator) {
+        log.line(format!("indicator  error of the stress {total:.4e}, {:.1} % of its norm", 100.0 * share));
+    }
     let seconds: Vec<String> = summary
         .wall_seconds
         .iter()

@@ -7,6 +7,7 @@ use crate::{
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, prune},
+        error_indicator::{ErrorIndicator, Indicated},
         field_output::FieldOutput,
         history::{History, Totals},
         log::Log,
@@ -17,6 +18,7 @@ use crate::{
     session::Session,
     state::State,
     stepping::StepOutcome,
+    tensor::Mandel,
 };
 use std::{
     path::{Path, PathBuf},
@@ -24,13 +26,14 @@ use std::{
 };
 
 /// What a run writes while it steps.
-pub(super) struct Outputs<const D: usize> {
+pub(super) struct Outputs<const D: usize, const S: usize> {
     folder: PathBuf,
     identity: Identity,
     history: Option<History>,
     probes: Probes<D>,
     profiles: Profiles<D>,
     fields: FieldOutput<D>,
+    indicator: Option<ErrorIndicator<S>>,
     every: Option<Every>,
     keep: usize,
     /// Time spent writing.
@@ -47,9 +50,9 @@ pub(super) struct Wanted<const D: usize> {
     pub goes_on: bool,
 }
 
-impl<const D: usize> Outputs<D> {
+impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Finds profiles and opens the files; behind the state's step if the run goes on. Collective.
-    pub fn open<const S: usize>(
+    pub fn open(
         session: &Session,
         job: &Job,
         wanted: Wanted<D>,
@@ -62,7 +65,9 @@ impl<const D: usize> Outputs<D> {
         let folder = job.output_folder().to_owned();
         let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
-        let fields = FieldOutput::open(session, &folder, body, time, log)?;
+        let wants_indicator = job.output.error_indicator;
+        let fields = FieldOutput::open(session, &folder, body, time, wants_indicator, log)?;
+        let indicator = wants_indicator.then(|| ErrorIndicator::new(session, body)).transpose()?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
         let every = job.output.fields;
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
@@ -77,11 +82,12 @@ impl<const D: usize> Outputs<D> {
         };
         session.agree(opened)?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
-        Ok(Self { folder, identity, history, probes, profiles, fields, every, keep, spent: start.elapsed() })
+        let spent = start.elapsed();
+        Ok(Self { folder, identity, history, probes, profiles, fields, indicator, every, keep, spent })
     }
 
     /// Writes what is due after a step. Collective.
-    pub fn after_step<const S: usize>(
+    pub fn after_step(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -106,23 +112,13 @@ impl<const D: usize> Outputs<D> {
     }
 
     /// Writes the state that the run starts from, where its fields are due and not there yet. Collective.
-    pub fn at_start<const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-    ) -> Result<()> {
+    pub fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let missing = self.fields.last_time().is_none_or(|time| time < state.time);
         if missing && due(self.every, state) { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
     /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
-    pub fn at_end<const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-    ) -> Result<()> {
+    pub fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
         if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
@@ -132,18 +128,24 @@ impl<const D: usize> Outputs<D> {
         Ok(())
     }
 
-    fn write_fields<const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-    ) -> Result<()> {
+    fn write_fields(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let stress = session.agree(body.stress(state))?;
-        self.fields.write(body, state, &stress)?;
+        let indicated = self.indicated(session, body, &stress)?;
+        self.fields.write(body, state, &stress, indicated.as_ref().map(|indicated| &indicated.cells[..]))?;
         if !self.profiles.is_empty() {
             session.agree(self.profiles.write(session, body, state, &stress))?;
         }
         Ok(())
+    }
+
+    /// The error indicator of a stress, if the job asks for it. Collective.
+    pub fn indicated(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        stress: &[Mandel<S>],
+    ) -> Result<Option<Indicated>> {
+        self.indicator.as_mut().map(|indicator| indicator.of(session, body, stress)).transpose()
     }
 
     /// Brings all rows to the files.
@@ -154,7 +156,7 @@ impl<const D: usize> Outputs<D> {
     }
 
     /// Writes a checkpoint and removes the oldest. Collective.
-    pub fn checkpoint<const S: usize>(
+    pub fn checkpoint(
         &mut self,
         session: &Session,
         body: &Body<D, S>,

@@ -5,7 +5,7 @@ use crate::{
     job::{self, Fix, Job, Loaded, Material, MeshNames, Named},
     mesh::{
         GlobalMesh, Tags,
-        generate::{Diagonal, box_mesh, rectangle},
+        generate::{Diagonal, Grading, Toward, box_mesh, rectangle},
         gmsh::{self, AnyMesh},
         partition::{Partition, partition},
         rigid::free_motions,
@@ -60,14 +60,32 @@ pub fn whole_mesh(job: &Job) -> Result<AnyMesh> {
                 job::Diagonal::Crossed => Diagonal::Crossed,
             };
             let cells = r.cells.map(|n| n as usize);
-            rectangle(r.size, cells, diagonal, [r.grading.x, r.grading.y]).map(AnyMesh::Two)
+            let grading = |power, low, high| grading(power, &r.grading.toward, low, high);
+            let gradings = [grading(r.grading.x, "left", "right"), grading(r.grading.y, "bottom", "top")];
+            rectangle(r.size, cells, diagonal, gradings).map(AnyMesh::Two)
         }
         job::Mesh::Box(b) => {
-            box_mesh(b.size, b.cells.map(|n| n as usize), [b.grading.x, b.grading.y, b.grading.z])
-                .map(AnyMesh::Three)
+            let grading = |power, low, high| grading(power, &b.grading.toward, low, high);
+            let gradings = [
+                grading(b.grading.x, "left", "right"),
+                grading(b.grading.y, "front", "back"),
+                grading(b.grading.z, "bottom", "top"),
+            ];
+            box_mesh(b.size, b.cells.map(|n| n as usize), gradings).map(AnyMesh::Three)
         }
         job::Mesh::File(path) => gmsh::read(path),
     }
+}
+
+/// The grading along the axis between the sides `low` and `high`, if cells crowd toward these sides.
+fn grading(power: f64, sides: &[String], low: &str, high: &str) -> Grading {
+    let named = |side: &str| sides.iter().any(|name| name == side);
+    let toward = match (named(low), named(high)) {
+        (true, true) => Toward::Both,
+        (false, true) => Toward::High,
+        _ => Toward::Low,
+    };
+    Grading { power, toward }
 }
 
 /// Holds the mesh against the job and splits it.

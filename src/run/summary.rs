@@ -52,6 +52,12 @@ pub struct Summary {
     pub restarted_from: Option<String>,
     /// Largest von Mises norm of sigma at the end, in Pa.
     pub max_von_mises: f64,
+    /// Error indicator of the stress at the end, in J^(1/2), in two dimensions (J/m)^(1/2); absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_indicator: Option<f64>,
+    /// Its share in the norm of the stress.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error_indicator: Option<f64>,
     /// Largest scaled distance to a contact graph in any step.
     pub max_inclusion_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.

@@ -157,7 +157,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     certificates: Certificates,
     adaptive: Option<Adaptive>,
     totals: Totals,
-    outputs: Outputs<D>,
+    outputs: Outputs<D, S>,
     log: Log,
     clock: Clock,
     deadline: Deadline,
@@ -309,13 +309,14 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 
     fn summary(
-        &self,
+        &mut self,
         status: &'static str,
         error: Option<String>,
         restarted_from: Option<String>,
     ) -> Result<Summary> {
         let stress = self.body.stress(&self.state)?;
         let von_mises = stress.iter().map(crate::tensor::von_mises).fold(0.0, f64::max);
+        let indicated = self.outputs.indicated(self.session, &self.body, &stress)?;
         let mesh = &self.body.mesh;
         Ok(Summary {
             status,
@@ -338,6 +339,8 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             linear_iterations: self.totals.linear_iterations,
             restarted_from,
             max_von_mises: self.session.largest([von_mises])[0],
+            error_indicator: indicated.as_ref().map(|indicated| indicated.total),
+            relative_error_indicator: indicated.as_ref().map(|indicated| indicated.relative),
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
             max_slip_pressure: self.totals.max_slip_pressure,

@@ -10,6 +10,7 @@ mod effects;
 mod failures;
 mod friction;
 mod hdf5_file;
+mod indicator;
 mod launch;
 mod materials;
 mod outputs;

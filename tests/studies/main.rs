@@ -1,5 +1,6 @@
 //! Studies: refusals of the study file, and whole studies under `mpirun`.
 
+mod corners;
 #[path = "../runs/launch.rs"]
 #[allow(dead_code)]
 mod launch;

@@ -164,7 +164,8 @@ fn studies_of_the_repository_load() {
         }
     }
     names.sort();
-    assert_eq!(names, [("wang_cheng_honest_reference".to_owned(), 12), ("wang_cheng_table_1".to_owned(), 4)]);
+    let known = [("graded_corners", 8), ("wang_cheng_honest_reference", 12), ("wang_cheng_table_1", 4)];
+    assert_eq!(names, known.map(|(name, runs)| (name.to_owned(), runs)));
 }
 
 #[test]

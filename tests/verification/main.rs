@@ -12,6 +12,7 @@ mod damage;
 mod effects;
 mod energy;
 mod indefinite;
+mod indicator;
 mod jacobian;
 mod manufactured;
 mod memory;
@@ -48,6 +49,8 @@ fn scenario() {
         "callback_panic" => callbacks::panic_on_the_last_rank(&session, &folder),
         "assembly" => assembly::compare(&session),
         "jacobian" => jacobian::compare(&session),
+        "indicator" => indicator::sums(&session),
+        "effectivity" => indicator::effectivity_tends_to_one(&session),
         "effects" => effects::count(&session),
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),

@@ -18,11 +18,11 @@ const DENSITY: f64 = 1.5;
 const MODULUS: f64 = 6.0;
 const RATIO: f64 = 0.3;
 /// Volumetric and shear factor of the viscosity.
-const VISCOSITY: (f64, f64) = (1.0, 4.0);
+pub const VISCOSITY: (f64, f64) = (1.0, 4.0);
 const DAMPER: f64 = 2.0;
 
 /// Volumetric and shear factor of the elasticity.
-fn elasticity(hypothesis: &str) -> (f64, f64) {
+pub fn elasticity(hypothesis: &str) -> (f64, f64) {
     let volumetric = if hypothesis == "plane_stress" {
         MODULUS * RATIO / (1.0 - RATIO * RATIO)
     } else {
@@ -32,7 +32,7 @@ fn elasticity(hypothesis: &str) -> (f64, f64) {
 }
 
 /// A motion that vanishes at x = 0.
-fn motion<const D: usize>() -> Field<D> {
+pub fn motion<const D: usize>() -> Field<D> {
     let time = Wave { number: 1.3, phase: 0.4 };
     let waves = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
@@ -121,7 +121,7 @@ pub fn job<const D: usize>(hypothesis: &str, quadrature: &str, extra: &str, end:
 }
 
 /// Places in the unit simplex and weights: three Gauss points in each direction, collapsed.
-fn rule<const D: usize>() -> Vec<([f64; D], f64)> {
+pub fn rule<const D: usize>() -> Vec<([f64; D], f64)> {
     let reach = 0.5 * 0.6f64.sqrt();
     let line = [(0.5 - reach, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + reach, 5.0 / 18.0)];
     let mut points = vec![([0.0; D], 1.0, 1.0)];

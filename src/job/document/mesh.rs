@@ -32,7 +32,9 @@ pub struct Rectangle {
     /// How each rectangle is cut.
     #[serde(default)]
     pub diagonal: Diagonal,
-    /// How unevenly the cells are spread.
+    /// How unevenly the cells are spread. With a power p above 1 the i-th of n grid lines lies at the share (i/n)^p of the way
+    /// from the side that cells crowd toward, or, toward both sides, at half of (2i/n)^p from the nearer one. Neighbours differ
+    /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: RectangleGrading,
 }
@@ -52,21 +54,25 @@ pub enum Diagonal {
     Crossed,
 }
 
-/// Spread of a rectangle's cells: above 1 they crowd toward the low end, below 1 toward the high end.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Spread of a rectangle's cells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RectangleGrading {
-    /// Along x.
+    /// Power along x: 1 is uniform; below 1, cells crowd toward the high end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub x: f64,
-    /// Along y.
+    /// Power along y: 1 is uniform; below 1, cells crowd toward the high end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub y: f64,
+    /// Sides that cells crowd toward, out of left, right, bottom and top, two opposite ones alike; absent: left and bottom.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["left", "bottom", "top"])]
+    pub toward: Vec<String>,
 }
 
 impl Default for RectangleGrading {
     fn default() -> Self {
-        Self { x: 1.0, y: 1.0 }
+        Self { x: 1.0, y: 1.0, toward: Vec::new() }
     }
 }
 
@@ -80,29 +86,36 @@ pub struct Cuboid {
     /// Number of boxes along x, y and z; each is cut into 6 tetrahedra.
     #[schemars(inner(range(min = 1)), example = [8, 8, 8])]
     pub cells: [u32; 3],
-    /// How unevenly the cells are spread.
+    /// How unevenly the cells are spread. With a power p above 1 the i-th of n grid planes lies at the share (i/n)^p of the way
+    /// from the side that cells crowd toward, or, toward both sides, at half of (2i/n)^p from the nearer one. Neighbours differ
+    /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: CuboidGrading,
 }
 
-/// Spread of a box's cells: above 1 they crowd toward the low end, below 1 toward the high end.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Spread of a box's cells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CuboidGrading {
-    /// Along x.
+    /// Power along x: 1 is uniform; below 1, cells crowd toward the high end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub x: f64,
-    /// Along y.
+    /// Power along y: 1 is uniform; below 1, cells crowd toward the high end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub y: f64,
-    /// Along z.
+    /// Power along z: 1 is uniform; below 1, cells crowd toward the high end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub z: f64,
+    /// Sides that cells crowd toward, out of left, right, front, back, bottom and top, two opposite ones alike; absent: left,
+    /// front and bottom.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["left", "bottom", "top"])]
+    pub toward: Vec<String>,
 }
 
 impl Default for CuboidGrading {
     fn default() -> Self {
-        Self { x: 1.0, y: 1.0, z: 1.0 }
+        Self { x: 1.0, y: 1.0, z: 1.0, toward: Vec::new() }
     }
 }
 

@@ -17,6 +17,10 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = serde_json::json!({ "every": 8 }), example = serde_json::json!({ "interval": 0.1 }))]
     pub fields: Option<Every>,
+    /// Whether the field error_indicator is written with the fields: for each cell an estimate of the error that the mesh makes
+    /// in its stress, in the norm of the elastic energy, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu,
+    /// 1987). summary.json gets its total and the share of that in the norm of the stress. Every material needs elasticity.
+    pub error_indicator: bool,
     /// Points that are followed in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub probe: Vec<Probe>,

@@ -37,7 +37,7 @@ pub fn check(findings: &mut Findings<'_>) {
 }
 
 /// No string twice in the list under `path`.
-fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
+pub fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
     let mut seen = Vec::new();
     for key in items(findings.root, path) {
         let Some(name) = findings.root.read::<String>(&key) else { continue };

@@ -1,6 +1,7 @@
 //! Generated meshes: what they are called, and how large they may be.
 
-use super::{Findings, MeshNames};
+use super::boundary::{check_name, check_repeats};
+use super::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::job::source::Node;
 
@@ -22,8 +23,50 @@ pub fn generated(root: &Node) -> Option<MeshNames<'static>> {
     }
 }
 
-/// The unknowns of a generated mesh must be countable by PETSc's 32-bit indices.
+/// Whatever is said about a generated mesh.
 pub fn check(findings: &mut Findings<'_>) {
+    check_count(findings);
+    check_grading(findings, "mesh.rectangle.grading", RECTANGLE, &["x", "y"]);
+    check_grading(findings, "mesh.box.grading", CUBOID, &["x", "y", "z"]);
+}
+
+/// The sides that cells crowd toward must be sides, each of an axis that is graded, and each graded axis needs one.
+fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, axes: &[&str]) {
+    let root = findings.root;
+    let toward = format!("{path}.toward");
+    let sides: Vec<(String, String)> = items(root, &toward)
+        .into_iter()
+        .filter_map(|item| Some((item.clone(), root.read::<String>(&item)?)))
+        .collect();
+    if sides.is_empty() {
+        return;
+    }
+    check_repeats(findings, &toward, "side");
+    for (item, side) in &sides {
+        check_name(findings, item, side, names.boundaries, "boundary");
+    }
+    for (axis, ends) in axes.iter().zip(names.boundaries.chunks_exact(2)) {
+        let key = format!("{path}.{axis}");
+        let power: f64 = root.read(&key).unwrap_or(1.0);
+        let named = sides.iter().filter(|(_, side)| ends.contains(&side.as_str()));
+        for (item, side) in named.clone().filter(|_| (0.0..=1.0).contains(&power)) {
+            let message = format!("cells can't crowd toward \"{side}\": the power along {axis} is {power}");
+            findings.fault(item, message, format!("give {axis} a power above 1, such as 2, in `{path}`"));
+        }
+        if power != 1.0 && named.count() == 0 {
+            let message = format!("`toward` names neither end of {axis}");
+            let [low, high] = [ends[0], ends[1]];
+            findings.fault_at_key(
+                &key,
+                message,
+                format!("add \"{low}\" or \"{high}\" or both to it, or take {axis} out"),
+            );
+        }
+    }
+}
+
+/// The unknowns of a generated mesh must be countable by PETSc's 32-bit indices.
+fn check_count(findings: &mut Findings<'_>) {
     for path in ["mesh.rectangle", "mesh.box"] {
         let key = format!("{path}.cells");
         let Some(cells) = findings.root.read::<Vec<u32>>(&key) else { continue };

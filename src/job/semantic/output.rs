@@ -9,6 +9,25 @@ pub fn check(findings: &mut Findings<'_>) {
     check_unique(findings, "output.probe", "name", "probes are called");
     check_unique(findings, "output.profile", "on", "profiles are along");
     check_expected(findings);
+    check_indicator(findings);
+}
+
+/// The error indicator measures stress by the elastic energy it stands for.
+fn check_indicator(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    if root.read("output.error_indicator") != Some(true) {
+        return;
+    }
+    let of_region = |region: String| format!("{region}.material");
+    let materials =
+        std::iter::once("material".to_owned()).chain(items(root, "region").into_iter().map(of_region));
+    for material in materials {
+        if root.find(&material).is_some() && root.find(&format!("{material}.elasticity")).is_none() {
+            let message = format!("the error indicator needs [{material}.elasticity]");
+            let help = "it measures errors of stress by their elastic energy: give elasticity, or leave the indicator out";
+            findings.fault("output.error_indicator", message, help);
+        }
+    }
 }
 
 fn check_unique(findings: &mut Findings<'_>, list: &str, key: &str, words: &str) {

@@ -1,6 +1,6 @@
 //! Tetrahedra in a box with its low corner in the origin.
 
-use super::{axis, countable, room};
+use super::{Grading, countable, grading::axis, room};
 use crate::error::Result;
 use crate::mesh::{Boundary, GlobalMesh};
 
@@ -13,10 +13,15 @@ const FIRST_ODD: usize = 3;
 /// A box `[0, size[0]] x [0, size[1]] x [0, size[2]]` (m) of `cells` bricks along x, y and z, each cut into the six
 /// Kuhn tetrahedra around its diagonal from the low corner to the high corner.
 ///
-/// Grid planes lie at `size * (i/cells)^grading`: a grading above 1 concentrates cells toward the low end.
+/// Grid planes lie as `grading` says for each axis; a number is a power toward the low end.
 /// Nodes are numbered lexicographically, x fastest, then y. The boundaries are `left`, `right` (x), `front`, `back`
 /// (y), `bottom` and `top` (z); the region is `body`.
-pub fn box_mesh(size: [f64; 3], cells: [usize; 3], grading: [f64; 3]) -> Result<GlobalMesh<3>> {
+pub fn box_mesh(
+    size: [f64; 3],
+    cells: [usize; 3],
+    grading: [impl Into<Grading>; 3],
+) -> Result<GlobalMesh<3>> {
+    let grading: [Grading; 3] = grading.map(Into::into);
     let product = |numbers: [Option<usize>; 3]| {
         numbers.into_iter().try_fold(1usize, |product, number| product.checked_mul(number?))
     };

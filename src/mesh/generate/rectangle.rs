@@ -1,6 +1,6 @@
 //! Triangles on a rectangle with its low corner in the origin.
 
-use super::{axis, countable, room};
+use super::{Grading, countable, grading::axis, room};
 use crate::error::Result;
 use crate::mesh::{Boundary, GlobalMesh};
 
@@ -19,15 +19,16 @@ pub enum Diagonal {
 
 /// A rectangle `[0, size[0]] x [0, size[1]]` (m) of `cells` quadrilaterals along x and y, each cut by `diagonal`.
 ///
-/// Grid lines lie at `size * (i/cells)^grading`: a grading above 1 concentrates cells toward the low end.
+/// Grid lines lie as `grading` says for each axis; a number is a power toward the low end.
 /// Nodes are numbered row by row, x fastest; crossed middles follow the row of nodes below them.
 /// The boundaries are `left`, `right`, `bottom` and `top`; the region is `body`.
 pub fn rectangle(
     size: [f64; 2],
     cells: [usize; 2],
     diagonal: Diagonal,
-    grading: [f64; 2],
+    grading: [impl Into<Grading>; 2],
 ) -> Result<GlobalMesh<2>> {
+    let grading: [Grading; 2] = grading.map(Into::into);
     let [nx, ny] = cells;
     let crossed = diagonal == Diagonal::Crossed;
     let per_cell = if crossed { 4 } else { 2 };

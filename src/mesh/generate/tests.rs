@@ -43,6 +43,15 @@ fn is_sound<const D: usize>(mesh: &GlobalMesh<D>, size: [f64; D]) {
     assert_eq!(named, (0..mesh.facets.len() as u32).collect::<Vec<_>>(), "each facet has one name");
 }
 
+/// The longer side over the shorter one of the box around a triangle.
+fn flatness(corners: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let along = corners.iter().map(|x| x[axis]);
+        along.clone().fold(f64::MIN, f64::max) - along.fold(f64::MAX, f64::min)
+    };
+    (side(0) / side(1)).max(side(1) / side(0))
+}
+
 /// Nodes - edges + triangles - tetrahedra.
 fn euler_characteristic<const D: usize>(mesh: &GlobalMesh<D>) -> i64 {
     let mut faces: HashSet<Vec<u32>> = HashSet::new();
@@ -129,6 +138,31 @@ fn grading_above_one_concentrates_cells_at_the_low_end() {
     assert_eq!(mesh.nodes[..3], [[0.0, 0.0], [1.0, 0.0], [4.0, 0.0]]);
     let mesh = box_mesh([1.0, 1.0, 8.0], [1, 1, 2], [1.0, 1.0, 3.0]).unwrap();
     assert_eq!(mesh.nodes[4][2], 1.0);
+}
+
+#[test]
+fn cells_crowd_toward_the_corners_that_are_asked_for() {
+    let square = |cells, power| {
+        let grading = [Grading::from(power), Grading { power, toward: Toward::Both }];
+        rectangle([1.0, 1.0], [cells; 2], Diagonal::Right, grading).expect("mesh")
+    };
+    let mesh = square(4, 2.0);
+    is_sound(&mesh, [1.0; 2]);
+    assert_eq!(euler_characteristic(&mesh), 1);
+    assert_eq!((mesh.nodes.len(), mesh.cell_count()), (25, 32));
+    assert_eq!((mesh.nodes[6], mesh.nodes[16]), ([0.0625, 0.125], [0.0625, 0.875]));
+    // The longest side along an axis is below power/n, the shortest n^-power: no cell is flatter than power n^(power - 1).
+    for (cells, power) in [(8, 2.0), (32, 2.0), (128, 1.5)] {
+        let mesh = square(cells, power);
+        let flattest = (0..mesh.cell_count()).map(|cell| flatness(&mesh.corners(cell))).fold(0.0, f64::max);
+        let bound = power * (cells as f64).powf(power - 1.0);
+        assert!((0.8 * bound..=bound).contains(&flattest), "{flattest} {bound}");
+    }
+    assert_eq!(square(128, 1.5).quality_summary().poor, 0);
+    let high = Grading { power: 3.0, toward: Toward::High };
+    let mesh = box_mesh([8.0, 1.0, 1.0], [2, 2, 2], [high, 1.0.into(), 1.0.into()]).expect("mesh");
+    is_sound(&mesh, [8.0, 1.0, 1.0]);
+    assert_eq!(mesh.nodes[1], [7.0, 0.0, 0.0]);
 }
 
 #[test]

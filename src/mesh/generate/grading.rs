@@ -1,0 +1,130 @@
+//! Where the grid lines of a generated mesh lie along an axis.
+
+use super::room;
+use crate::error::{Error, Result};
+
+/// Which ends of an axis cells crowd toward.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Toward {
+    /// The low end.
+    Low,
+    /// The high end.
+    High,
+    /// Both ends, alike.
+    Both,
+}
+
+/// How unevenly cells are spread along an axis.
+///
+/// The grid lines of `n` cells lie at `length * (i/n)^power` from the end they crowd toward; toward both ends each half
+/// of the axis is half of such a spread, and the middle cell of an odd number lies across. With a power above 1 cells
+/// grow from that end on, each at most `2^power - 1` times as long as the one before; the longest is at most `power`
+/// times as long as without grading, the shortest `n^(power - 1)` times shorter (toward both ends `(n/2)^(power - 1)`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grading {
+    /// 1 is uniform; above 1 cells crowd toward the ends, below 1 they are thinned there.
+    pub power: f64,
+    /// Which ends are meant.
+    pub toward: Toward,
+}
+
+impl From<f64> for Grading {
+    /// Toward the low end.
+    fn from(power: f64) -> Self {
+        Self { power, toward: Toward::Low }
+    }
+}
+
+/// The grid lines in m along an axis, `cells + 1` of them; refused unless they increase strictly.
+pub(super) fn axis(name: &str, length: f64, cells: usize, grading: Grading) -> Result<Vec<f64>> {
+    if !(length.is_finite() && length > 0.0) {
+        return Err(Error::Refused(format!(
+            "mesh size along {name} is {length}: give a finite length above 0"
+        )));
+    }
+    if cells == 0 {
+        return Err(Error::Refused(format!("mesh cells along {name} is 0: give at least 1")));
+    }
+    let Grading { power, toward } = grading;
+    if !(power.is_finite() && power > 0.0) {
+        return Err(Error::Refused(format!(
+            "mesh grading along {name} is {power}: give a finite number above 0 (1 is uniform)"
+        )));
+    }
+    let share = |i: usize, of: f64| (i as f64 / of).powf(power);
+    let whole = cells as f64;
+    let place = |i: usize| match toward {
+        Toward::Low => length * share(i, whole),
+        Toward::High => length - length * share(cells - i, whole),
+        Toward::Both if 2 * i <= cells => 0.5 * length * share(2 * i, whole),
+        Toward::Both => length - 0.5 * length * share(2 * (cells - i), whole),
+    };
+    let mut points: Vec<f64> = room(cells + 1)?;
+    points.extend((0..=cells).map(place));
+    if let Some(i) = points.windows(2).position(|pair| pair[1] <= pair[0]) {
+        return Err(Error::Refused(format!(
+            "mesh grading {power} along {name} gives a cell of zero length at {name} = {}: take a grading \
+             closer to 1, or fewer cells",
+            points[i]
+        )));
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(length: f64, cells: usize, power: f64, toward: Toward) -> Vec<f64> {
+        axis("x", length, cells, Grading { power, toward }).expect("grid lines")
+    }
+
+    #[test]
+    fn grid_lines_lie_where_the_power_of_their_share_puts_them() {
+        assert_eq!(lines(16.0, 4, 2.0, Toward::Low), [0.0, 1.0, 4.0, 9.0, 16.0]);
+        assert_eq!(lines(16.0, 4, 2.0, Toward::High), [0.0, 7.0, 12.0, 15.0, 16.0]);
+        assert_eq!(lines(16.0, 8, 2.0, Toward::Both), [0.0, 0.5, 2.0, 4.5, 8.0, 11.5, 14.0, 15.5, 16.0]);
+        let odd = lines(27.0, 3, 3.0, Toward::Both);
+        assert!(
+            odd.iter().zip([0.0, 4.0, 23.0, 27.0]).all(|(x, place)| (x - place).abs() < 1e-13),
+            "{odd:?}"
+        );
+        assert_eq!(lines(2.0, 1, 5.0, Toward::Both), [0.0, 2.0]);
+        assert_eq!(lines(4.0, 2, 0.5, Toward::Low)[1], 8f64.sqrt());
+    }
+
+    #[test]
+    fn a_power_of_one_is_uniform_toward_any_end() {
+        for toward in [Toward::Low, Toward::High, Toward::Both] {
+            assert_eq!(lines(8.0, 8, 1.0, toward), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+        }
+    }
+
+    #[test]
+    fn cells_grow_no_faster_and_no_larger_than_the_power_says() {
+        let within = |value: f64, bound: f64| value <= bound * (1.0 + 1e-9);
+        for toward in [Toward::Low, Toward::High, Toward::Both] {
+            for power in [1.0, 1.3, 2.0, 3.5] {
+                for cells in [2, 3, 7, 16, 33] {
+                    let lines = lines(1.0, cells, power, toward);
+                    assert_eq!((lines.len(), lines[0], lines[cells]), (cells + 1, 0.0, 1.0));
+                    let lengths: Vec<f64> = lines.windows(2).map(|pair| pair[1] - pair[0]).collect();
+                    let mean = 1.0 / cells as f64;
+                    let of = if toward == Toward::Both { cells as f64 / 2.0 } else { cells as f64 };
+                    let shortest = mean / of.powf(power - 1.0);
+                    for (i, length) in lengths.iter().enumerate() {
+                        assert!(within(*length, power * mean) && within(shortest, *length));
+                        let next = lengths.get(i + 1).unwrap_or(length);
+                        let ratio = length.max(*next) / length.min(*next);
+                        assert!(within(ratio, 2f64.powf(power) - 1.0), "{ratio} {power} {cells} {toward:?}");
+                    }
+                    if toward == Toward::Both {
+                        for (i, x) in lines.iter().enumerate() {
+                            assert!((x + lines[cells - i] - 1.0).abs() < 1e-15, "not symmetric");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
