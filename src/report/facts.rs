@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their words, in the order of the page.
-const MEMBERS: [(&str, &str, &str); 21] = [
+const MEMBERS: [(&str, &str, &str); 22] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
