@@ -11,7 +11,7 @@
 # Exit codes: 0 everything is there; 1 something is missing and could not be installed; 2 wrong arguments.
 set -euf
 
-build_packages="libpetsc-real-dev libhdf5-openmpi-dev libopenmpi-dev openmpi-bin libmetis-dev libopenblas0-pthread
+build_packages="libpetsc-real-dev libhdf5-openmpi-dev libopenmpi-dev openmpi-bin libmetis-dev libsuitesparse-dev libopenblas0-pthread
 libclang-dev pkg-config gcc libc6-dev make git ca-certificates"
 # The tests read result files with VTK and meshio, which pip puts into a virtual environment.
 test_packages="python3 python3-venv"
