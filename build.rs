@@ -1,4 +1,4 @@
-//! Finds the system's PETSc through pkg-config and generates the raw bindings of what `src/petsc` calls.
+//! Finds the system's PETSc through pkg-config, with the CHOLMOD that it uses, and generates the raw bindings of what `src/petsc` calls.
 
 use std::{
     env,
@@ -23,7 +23,7 @@ const FUNCTIONS: &[&str] = &[
     "MatNullSpace(Create|CreateRigidBody|SetFunction|Destroy)",
     "KSP(Create|Destroy|SetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
-    "KSP(SetOptionsPrefix|GetType|SetPC)",
+    "KSP(SetOptionsPrefix|GetType|SetPC|ConvergedDefaultSetUIRNorm)",
     "PCShell(SetApply|SetContext|GetContext)",
     "PC(Apply|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
@@ -31,6 +31,9 @@ const FUNCTIONS: &[&str] = &[
     "SNESLineSearchSetType",
     "SNESVISetVariableBounds",
     "SNESSetDivergenceTolerance",
+    "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
+    "MatDense(Get|Restore)Array(Read)?",
+    "cholmod_(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
 ];
 
 fn main() {
@@ -43,6 +46,7 @@ fn main() {
 
     let petsc = find_petsc();
     check_configuration(&petsc.include_paths);
+    println!("cargo::rustc-link-lib=cholmod");
     let mpi = build_probe_mpi::probe()
         .unwrap_or_else(|e| panic!("no MPI found (Debian: apt-get install libopenmpi-dev): {e:?}"));
     let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
@@ -55,9 +59,9 @@ fn main() {
         .generate_cstr(true)
         .allowlist_function(format!("({})", FUNCTIONS.join("|")))
         .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*|MatDuplicateOption|MatStructure|PetscBool)")
-        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN)")
+        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN)")
         .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
-        .raw_line("pub use mpi_sys::MPI_Comm;")
+        .raw_line("pub use mpi_sys::{MPI_Comm, RSMPI_COMM_SELF};")
         .layout_tests(false)
         .generate_comments(false)
         .generate()

@@ -138,6 +138,18 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().filter_map(|e| e.flow_step_bound()).reduce(f64::min)
     }
 
+    /// The largest contact pressure in Pa on this rank in the step just solved, where friction weakens under a pressure that no
+    /// law bounds; `None` if it nowhere does.
+    pub fn slip_pressure(&self, state: &State) -> Result<Option<f64>> {
+        let mut weakening =
+            self.contacts.iter().filter(|contact| contact.unknown_fall().is_some()).peekable();
+        if weakening.peek().is_none() {
+            return Ok(None);
+        }
+        let velocity = state.velocity.local()?;
+        Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(f64::max))
+    }
+
     /// Total stress in Pa after a committed step, one a cell.
     pub fn stress(&self, state: &State) -> Result<Vec<Mandel<S>>> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];

@@ -7,7 +7,7 @@ use crate::{
 use mpi::{
     Count,
     datatype::{Equivalence, Partition, PartitionMut},
-    topology::SimpleCommunicator,
+    topology::{Communicator, SimpleCommunicator},
     traits::CommunicatorCollectives,
 };
 
@@ -42,6 +42,23 @@ pub fn exchange_lists<T: Equivalence + Copy + Default>(
 ) -> Result<Vec<T>> {
     let counts: Vec<usize> = lists.iter().map(Vec::len).collect();
     Ok(exchange(communicator, &lists.concat(), &counts)?.0)
+}
+
+/// The numbers of all ranks, in the order of the ranks. Collective, with the same outcome on all ranks.
+pub fn gather<T: Equivalence + Copy + Default>(
+    communicator: &SimpleCommunicator,
+    numbers: &[T],
+) -> Result<Vec<T>> {
+    let mut counts = vec![0_u64; communicator.size() as usize];
+    communicator.all_gather_into(&(numbers.len() as u64), &mut counts[..]);
+    let counts: Vec<usize> = counts.into_iter().map(|count| count as usize).collect();
+    let (narrow, starts) = mpi_counts(&counts)?;
+    let mut all = vec![T::default(); counts.iter().sum()];
+    communicator.all_gather_varcount_into(
+        numbers,
+        &mut PartitionMut::new(&mut all[..], &narrow[..], &starts[..]),
+    );
+    Ok(all)
 }
 
 /// Where each of the counted parts starts.

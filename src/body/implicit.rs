@@ -5,7 +5,7 @@ use crate::{
     effect::{Blend, Contact, Effect, Energy, Step, Tangents},
     mesh::Mesh,
     space::{Batch, Geometry, Needs, Nodal},
-    tensor::{Mandel, component, symmetric_part},
+    tensor::{Mandel, add_scaled, component, dot, symmetric_part},
 };
 
 /// The cells of a body, apart from its contacts.
@@ -30,7 +30,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// Adds the forces of the state that a step starts from to `forces` (with ghosts). Gives the sum of the squares of the
-    /// forces of cells, whose rounding no residual can be less than.
+    /// forces of each effect on cells, whose rounding no residual can be less than: large ones may cancel.
     pub fn add_start_forces(
         &mut self,
         blend: Blend,
@@ -45,11 +45,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut squares = 0.0;
         Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
+                let before = batch.stress.clone();
                 effect.add_explicit(start, batch, &mut Energy::default());
-            }
-            for (cell, stress) in batch.cells.iter().zip(&batch.stress) {
-                let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
-                squares += cell.volume * cell.volume * gradients * crate::tensor::dot(stress, stress);
+                for ((cell, before), after) in batch.cells.iter().zip(&before).zip(&batch.stress) {
+                    let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
+                    let added = add_scaled(after, -1.0, before);
+                    squares += cell.volume * cell.volume * gradients * dot(&added, &added);
+                }
             }
             batch.scatter(mesh, forces);
         });
@@ -120,7 +122,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
             for (a, &node) in nodes.iter().enumerate() {
                 let gradient = cell.gradient(a);
                 for i in 0..D {
-                    forces[node as usize * D + i] += crate::tensor::dot(&stress[i], &gradient);
+                    forces[node as usize * D + i] += dot(&stress[i], &gradient);
                 }
             }
         }

@@ -10,9 +10,15 @@
 //! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
 //! which nothing flows.
 //!
+//! `growth_constants` are the `c0` and `c1` of the growth condition `|dj(r)| <= c0 + c1 |r|` that existence rests on: valid for all
+//! contact laws, the least `c1` first. A rigid obstacle has none, its graph ends in a vertical ray: there existence rests on its
+//! graph being monotone. Nor has a law of the displacement.
+//!
 //! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
-//! times the largest pressure of the normal law; where that has no bound the fall is not covered, and said so), `m_A` the smallest eigenvalue of the viscosity. Suprema run over
-//! velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
+//! times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. Where the normal law has no
+//! largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1 with that fall,
+//! `1 / sup of sum fall int w_tau^2` over `(K w, w) - sum (m_j int w_nu^2 + m_t int w_tau^2)`; a run is held against it. Suprema
+//! run over velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
 //! viscosity, `m_A` is 0 and `theta` has no meaning.
 
 mod ascent;
@@ -51,8 +57,16 @@ pub struct Certificates {
     pub viscosity_modulus: Option<f64>,
     /// `m_j` in Pa s/m.
     pub monotonicity_constant: Option<f64>,
+    /// `c0` in Pa and `c1` in Pa s/m with `|-sigma_nu| <= c0 + c1 |v_nu|`, whatever the contact; null where they are infinite.
+    pub growth_constants: Option<[f64; 2]>,
+    /// Why there are no growth constants although there is contact, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unbounded_growth: Option<String>,
     /// `|gamma|^2` of the normal trace in m.
     pub trace_norm_squared: Option<f64>,
+    /// Contact pressure in Pa up to which a step has one solution, if pressures are given, where friction weakens under a
+    /// pressure that no law bounds; 0: at none.
+    pub slip_pressure_bound: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
     /// What `theta` and `theta_step` say nothing of, in words; absent if there is nothing.
@@ -69,11 +83,13 @@ impl Certificates {
         scheme: &mut Stepper,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
+        let growth = growth(&body.contacts);
         let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
             viscosity_modulus: body.smallest_viscosity(),
             monotonicity_constant: falls.reduce(f64::max),
-            not_covered: not_covered(&body.contacts),
+            growth_constants: growth.ok().flatten(),
+            unbounded_growth: growth.err().map(str::to_owned),
             ..Self::default()
         };
         let scheme_is_implicit = scheme.scheme().is_implicit();
@@ -86,6 +102,12 @@ impl Certificates {
                 known.theta = Some(if falling { find(Kind::Theta)? } else { 0.0 });
             }
         }
+        if body.contacts.iter().any(|contact| contact.unknown_fall().is_some()) {
+            let solvable = known.theta_step.is_some_and(|theta| theta < 1.0);
+            let bound = if solvable { 1.0 / find(Kind::SlipPressure)? } else { 0.0 };
+            known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
+        }
+        known.not_covered = not_covered(&body.contacts, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let waves = 1.0 / find(Kind::ExplicitStep)?;
             known.explicit_step_bound = Some(body.flow_step_bound().map_or(waves, |flow| waves.min(flow)));
@@ -107,8 +129,19 @@ impl Certificates {
     }
 }
 
+/// Growth constants that hold for all contacts, if there are any contacts.
+fn growth<const D: usize>(contacts: &[Contact<D>]) -> std::result::Result<Option<[f64; 2]>, &'static str> {
+    let mut all: Option<[f64; 2]> = None;
+    for contact in contacts {
+        let [rest, slope] = contact.law.growth_constants()?;
+        let [most, steepest] = all.unwrap_or_default();
+        all = Some([rest.max(most), slope.max(steepest)]);
+    }
+    Ok(all)
+}
+
 /// What depends on contact pressures that are part of the solution.
-fn not_covered<const D: usize>(contacts: &[Contact<D>]) -> Vec<String> {
+fn not_covered<const D: usize>(contacts: &[Contact<D>], slip_pressure_bound: Option<f64>) -> Vec<String> {
     let mut words = Vec::new();
     if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
         words.push(
@@ -118,9 +151,12 @@ fn not_covered<const D: usize>(contacts: &[Contact<D>]) -> Vec<String> {
         );
     }
     for fall in contacts.iter().filter_map(Contact::unknown_fall) {
+        let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
+            format!("; for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against")
+        });
         words.push(format!(
             "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
-             bound: theta does not cover it"
+             bound: theta does not cover it{covered}"
         ));
     }
     words
@@ -154,6 +190,8 @@ enum Kind {
     ExplicitStep,
     /// `1/k` for the step `k` at which `theta_step` reaches 1: the largest of `(W - A) / M`.
     UniqueStep,
+    /// The inverse of the pressure at which `theta_step` reaches 1 where friction weakens with the pressure.
+    SlipPressure,
 }
 
 struct Pencil<'a, const D: usize, const S: usize> {
@@ -164,7 +202,7 @@ struct Pencil<'a, const D: usize, const S: usize> {
 
 impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
     fn forms(&self) -> usize {
-        if matches!(self.kind, Kind::ExplicitStep | Kind::UniqueStep) { 3 } else { 2 }
+        if matches!(self.kind, Kind::ExplicitStep | Kind::UniqueStep | Kind::SlipPressure) { 3 } else { 2 }
     }
 
     fn apply(&mut self, form: usize, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
@@ -174,12 +212,15 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (Kind::ExplicitStep, 1) | (Kind::UniqueStep, 2) => Form::Mass,
             (Kind::ExplicitStep, _) | (Kind::Theta | Kind::UniqueStep, 1) => Form::Viscosity,
             (Kind::TraceNorm, 1) => Form::Strain,
-            (Kind::ThetaStep, 1) => return self.scheme.multiply(x, y),
+            (Kind::ThetaStep | Kind::SlipPressure, 1) => return self.scheme.multiply(x, y),
             (kind, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let factors =
-                            if kind == Kind::TraceNorm { [1.0, 0.0] } else { contact.known_falls() };
+                        let factors = match (kind, form) {
+                            (Kind::TraceNorm, _) => [1.0, 0.0],
+                            (Kind::SlipPressure, 0) => [0.0, contact.unknown_fall().unwrap_or(0.0)],
+                            _ => contact.known_falls(),
+                        };
                         forms::add_trace(&body.mesh, contact, factors, x, y);
                     }
                 });
@@ -200,6 +241,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
                 (vec![k * k, 0.0, 0.0], vec![0.0, 4.0, 2.0 * k])
             }
             Kind::UniqueStep => (vec![1.0, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
+            Kind::SlipPressure => (vec![1.0, 0.0, 0.0], vec![0.0, 1.0, -1.0]),
             Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => (vec![1.0, 0.0], vec![0.0, 1.0]),
         }
     }
@@ -208,6 +250,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
         match self.kind {
             Kind::ExplicitStep => 1.0 / bound_of(values),
             Kind::UniqueStep => (values[0] - values[1]) / values[2],
+            Kind::SlipPressure => values[0] / (values[1] - values[2]),
             Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => values[0] / values[1],
         }
     }
@@ -219,13 +262,14 @@ fn bound_of(values: &[f64]) -> f64 {
     (a + (a * a + 4.0 * e * m).sqrt()) / e
 }
 
-/// A start that pulls the whole contact boundary outward.
+/// A start that pulls the whole contact boundary outward, and along where there is friction.
 fn pull<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
     let mut out = rough(body, state)?;
     let mut values = out.owned_mut()?;
     values.iter_mut().for_each(|value| *value *= 1e-2);
     for contact in &body.contacts {
         contact.add_normals(&mut values);
+        contact.add_unit_sliding(&mut values);
     }
     values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
     drop(values);

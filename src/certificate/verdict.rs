@@ -28,6 +28,10 @@ impl Certificates {
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: Accepted) -> Verdict {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
+        if let Some(fall) = self.monotonicity_constant {
+            verdict.words.push(format!("m_j = {fall:.4} Pa s/m, {}", self.growth()));
+        }
+        let covered = if self.not_covered.is_empty() { "" } else { ", as far as covered" };
         if let Some(theta) = self.theta {
             let meaning = if theta < 1.0 {
                 "below 1: the continuous problem has one solution"
@@ -38,7 +42,7 @@ impl Certificates {
                 ));
                 "not below 1: the continuous problem may have several solutions"
             };
-            verdict.words.push(format!("theta = {theta:.4}, {meaning}"));
+            verdict.words.push(format!("theta = {theta:.4}, {meaning}{covered}"));
         }
         if let (Some(modulus), Some(fall), Some(trace)) =
             (self.viscosity_modulus, self.monotonicity_constant, self.trace_norm_squared)
@@ -51,21 +55,34 @@ impl Certificates {
             ));
         }
         if let Some(theta) = self.theta_step {
-            verdict.uniqueness(theta, step, unique_step, accepted.uniqueness);
+            if theta < 1.0 {
+                let meaning = "below 1: each step has one solution";
+                verdict.words.push(format!("theta of a step = {theta:.4}, {meaning}{covered}"));
+            } else {
+                verdict.uniqueness(theta, step, unique_step, accepted.uniqueness);
+            }
         }
         if let Some(bound) = self.explicit_step_bound {
             verdict.stability(bound, step, accepted.explicit_stability);
         }
         verdict
     }
+
+    /// What is known of the growth of contact pressures with the velocity.
+    fn growth(&self) -> String {
+        match (self.growth_constants, &self.unbounded_growth) {
+            (Some([rest, slope]), _) => format!(
+                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) asks"
+            ),
+            (None, Some(why)) => format!("{why}: hypothesis H(j) does not cover it"),
+            (None, None) => "growth constant unknown".into(),
+        }
+    }
 }
 
 impl Verdict {
+    /// For a `theta` of a step that is not below 1.
     fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
-        if theta < 1.0 {
-            self.words.push(format!("theta of a step = {theta:.4}, below 1: each step has one solution"));
-            return;
-        }
         let found = format!(
             "theta of a step = {theta:.4} is not below 1: a step of {step} s may have several solutions"
         );
@@ -116,7 +133,10 @@ mod tests {
             theta_step: Some(0.2),
             viscosity_modulus: Some(50.0),
             monotonicity_constant: Some(10.0),
+            growth_constants: Some([0.0, 10.0]),
+            unbounded_growth: None,
             trace_norm_squared: Some(2.24),
+            slip_pressure_bound: None,
             explicit_step_bound: Some(0.12),
             not_covered: Vec::new(),
         }
@@ -126,7 +146,24 @@ mod tests {
     fn a_sound_problem_is_neither_refused_nor_warned_of() {
         let verdict = paper().verdict(1.0 / 64.0, None, Accepted::default());
         assert!(verdict.refusals.is_empty() && verdict.warnings.is_empty());
-        assert!(verdict.words[1].contains("> m_j |gamma|^2 = 22.4"));
+        assert!(verdict.words[2].contains("> m_j |gamma|^2 = 22.4"));
+    }
+
+    #[test]
+    fn growth_stands_beside_the_monotonicity_constant() {
+        let first =
+            |known: Certificates| known.verdict(1.0 / 64.0, None, Accepted::default()).words[0].clone();
+        assert_eq!(
+            first(paper()),
+            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: contact pressures grow linearly at most, as \
+             hypothesis H(j) asks"
+        );
+        let why = Some("the growth constant is infinite".into());
+        let wall = first(Certificates { growth_constants: None, unbounded_growth: why, ..paper() });
+        assert!(
+            wall.ends_with("Pa s/m, the growth constant is infinite: hypothesis H(j) does not cover it"),
+            "{wall}"
+        );
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl Graph {
         if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
             return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
         }
-        let reach = reach(&points, &slopes);
+        let reach = reach(&points);
         Ok(Self { points, slopes, reach })
     }
 
@@ -136,6 +136,19 @@ impl Graph {
         self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
     }
 
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
+    /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
+    pub fn growth_constants(&self) -> [f64; 2] {
+        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
+        if slope == f64::INFINITY {
+            return [f64::INFINITY; 2];
+        }
+        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
+        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
+        let corners = self.points.iter().map(|point| excess(*point));
+        [corners.fold(self.pressure(0.0).abs(), f64::max), slope]
+    }
+
     /// The largest pressure in Pa of all points; infinite where there is none.
     pub fn greatest_pressure(&self) -> f64 {
         if self.slopes[0] < 0.0 || self.slopes[self.points.len()] > 0.0 {
@@ -144,9 +157,11 @@ impl Graph {
         self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
     }
 
-    /// Distance of a pair (velocity, pressure) to the graph, both scaled by the graph's own range.
-    pub fn distance(&self, velocity: f64, pressure: f64) -> f64 {
-        self.distance_in(velocity, pressure, self.reach)
+    /// Distance of a pair (velocity, pressure) to the graph, both scaled by the range of its corners, or by this one where
+    /// that is larger.
+    pub fn distance(&self, velocity: f64, pressure: f64, range: [f64; 2]) -> f64 {
+        let range = std::array::from_fn(|i| self.reach[i].max(range[i]));
+        self.distance_in(velocity, pressure, range)
     }
 
     /// The same, scaled by this velocity and this pressure.
@@ -165,21 +180,9 @@ impl Graph {
     }
 }
 
-/// Largest velocity and pressure among the corners, where these vanish those of the end branches at unit velocity.
-fn reach(points: &[[f64; 2]], slopes: &[f64]) -> [f64; 2] {
-    let mut reach = [0.0f64; 2];
-    for p in points {
-        reach = [reach[0].max(p[0].abs()), reach[1].max(p[1].abs())];
-    }
-    if reach[0] == 0.0 {
-        reach[0] = 1.0;
-    }
-    if reach[1] == 0.0 {
-        let finite = slopes.iter().filter(|slope| slope.is_finite());
-        let steepest = finite.fold(0.0, |m, s| f64::max(m, s.abs()));
-        reach[1] = if steepest > 0.0 { steepest * reach[0] } else { 1.0 };
-    }
-    reach
+/// Largest velocity and pressure among the corners.
+fn reach(points: &[[f64; 2]]) -> [f64; 2] {
+    points.iter().fold([0.0; 2], |[v, p], point| [f64::max(v, point[0].abs()), f64::max(p, point[1].abs())])
 }
 
 fn ray_distance(point: [f64; 2], from: [f64; 2], along: [f64; 2]) -> f64 {
@@ -231,10 +234,27 @@ mod tests {
     }
 
     #[test]
+    fn growth_constants_by_hand() {
+        assert_eq!(valley().growth_constants(), [2.0, 3.0], "2 Pa at rest, a slope of 3 at last");
+        let growth = |points, before, after| Graph::new(points, before, after).unwrap().growth_constants();
+        // The corner at 2 m/s is 7 - 2 * 0.5 = 6 Pa above the cone; the line through it has 3 Pa at rest.
+        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), [6.0, 0.5]);
+        // A jump at rest counts with both ends, one beside it with what is left beyond the cone.
+        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), [4.0, 1.0]);
+        assert_eq!(growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0), [3.0, 2.0], "a law that falls for good");
+        // The line 2 v + 1 is 1 Pa above the cone 2 |v| from rest on, its corner 1 Pa below.
+        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), [1.0, 2.0]);
+        assert_eq!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY), [f64::INFINITY; 2], "a wall");
+        assert_eq!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0), [f64::INFINITY; 2]);
+    }
+
+    #[test]
     fn points_off_the_graph_have_their_scaled_distance() {
         let g = Graph::new(vec![[0.0, 0.0], [2.0, 10.0]], 0.0, 0.0).unwrap();
-        assert!((g.distance(-2.0, 5.0) - 0.5).abs() < 1e-15);
-        assert!((g.distance(4.0, 10.0)).abs() < 1e-15);
+        assert!((g.distance(-2.0, 5.0, [0.0, 0.0]) - 0.5).abs() < 1e-15);
+        assert!((g.distance(4.0, 10.0, [0.0, 0.0])).abs() < 1e-15);
+        // Where velocities or pressures go beyond the corners, errors are small against them.
+        assert!((g.distance(-2.0, 5.0, [8.0, 40.0]) - 0.125).abs() < 1e-15);
     }
 
     #[test]
@@ -252,8 +272,8 @@ mod tests {
         assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
         assert_eq!(up.monotonicity_constant(), 0.0);
         assert_eq!([up.potential(-2.0), up.potential(0.0), up.potential(3.0)], [2.0, 0.0, 3.0]);
-        assert_eq!(up.distance(0.0, 0.3), 0.0);
-        assert_eq!(up.distance(0.0, 1.5), 0.5);
+        assert_eq!(up.distance(0.0, 0.3, [1.0, 0.0]), 0.0);
+        assert_eq!(up.distance(0.0, 1.5, [1.0, 0.0]), 0.5);
     }
 
     #[test]
@@ -263,9 +283,9 @@ mod tests {
         assert_eq!((touching.velocity, touching.pressure, touching.derivative), (0.0, 7.0, 0.0));
         let open = wall.resolve(-6.0, 2.0);
         assert_eq!((open.velocity, open.pressure, open.derivative), (-3.0, 0.0, 0.5));
-        assert_eq!(wall.distance(0.0, 5.0), 0.0);
-        assert_eq!(wall.distance(-1.0, 0.0), 0.0);
-        assert_eq!(wall.distance(3.0, 5.0), 3.0);
+        assert_eq!(wall.distance(0.0, 5.0, [1.0, 1.0]), 0.0);
+        assert_eq!(wall.distance(-1.0, 0.0, [1.0, 1.0]), 0.0);
+        assert_eq!(wall.distance(3.0, 5.0, [1.0, 1.0]), 3.0);
     }
 
     /// Random graphs: each step is a velocity (0: a jump) and a rise, with or without vertical rays at the ends.
@@ -327,7 +347,10 @@ mod tests {
             let by_potential = (g.potential(v + h) - g.potential(v - h)) / (2.0 * h);
             prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v).abs()));
             let size = v.abs() + g.pressure(v).abs() / g.reach[1];
-            prop_assert!(g.distance(v, g.pressure(v)) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            let range = [v.abs(), g.pressure(v).abs()];
+            prop_assert!(g.distance(v, g.pressure(v), range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            let [at_rest, slope] = g.growth_constants();
+            prop_assert!(g.pressure(v).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
             for w in [v - 1.0, v + 0.3] {
                 let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
                 prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);

@@ -128,6 +128,24 @@ impl NormalLaw {
         }
     }
 
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m with `|p| <= c0 + c1 |v|`, see [`Graph::growth_constants`]; why there are
+    /// none, otherwise.
+    pub fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
+        match self {
+            Self::Graph(graph) | Self::Unilateral(graph) => {
+                let constants = graph.growth_constants();
+                if constants[1].is_finite() {
+                    Ok(constants)
+                } else {
+                    Err("the growth constant is infinite because a contact law ends in a vertical ray")
+                }
+            }
+            Self::Compliance(_) => {
+                Err("there is no growth constant because compliance follows the displacement")
+            }
+        }
+    }
+
     /// The largest pressure in Pa that it ever gives; infinite where there is none.
     pub fn greatest_pressure(&self) -> f64 {
         match self {
@@ -136,11 +154,11 @@ impl NormalLaw {
         }
     }
 
-    /// Distance of a pair (velocity, pressure) to the graph, scaled by the graph's own range, or by this one if the law
-    /// depends on the displacement.
+    /// Distance of a pair (velocity, pressure) to the graph, scaled by this range, or by that of the graph's corners where
+    /// it has any and they are larger.
     pub fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
         match self {
-            Self::Graph(graph) => graph.distance(velocity, pressure),
+            Self::Graph(graph) => graph.distance(velocity, pressure, range),
             Self::Compliance(_) => (self.pressure(velocity, node) - pressure).abs() / range[1],
             Self::Unilateral(wall) => wall.distance_in(velocity - node.closing_velocity(), pressure, range),
         }
@@ -221,6 +239,14 @@ mod tests {
         assert_eq!(graph(vec![[0.0, 0.0]], 0.0, 1e9).velocity_bound(node), None);
         assert_eq!(graph(vec![[0.0, 0.0], [0.0, 1.0]], 0.0, 0.0).velocity_bound(node), None);
         assert_eq!(laws()[1].velocity_bound(node), None);
+    }
+
+    #[test]
+    fn laws_without_growth_constants_say_why() {
+        let damper = NormalLaw::Graph(Graph::new(vec![[0.0, 1.0]], 0.0, 2.0).unwrap());
+        assert_eq!(damper.growth_constants(), Ok([1.0, 2.0]));
+        let [wall, springs, _] = laws().map(|law| law.growth_constants().unwrap_err());
+        assert!(wall.contains("vertical ray") && springs.contains("displacement"), "{wall} {springs}");
     }
 
     #[test]

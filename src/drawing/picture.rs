@@ -114,6 +114,14 @@ mod tests {
     }
 
     #[test]
+    fn plain_names_keep_letters_digits_and_underscores_of_ascii_alone() {
+        assert_eq!(plain_name("wall_seconds"), "wall_seconds");
+        assert_eq!(plain_name("Top 2.b/..\\\"<&>'"), "Top-2-b---------");
+        assert_eq!(plain_name("Rückseite ²"), "R-ckseite--", "one dash a letter, whatever its bytes");
+        assert_eq!(plain_name(""), "");
+    }
+
+    #[test]
     fn names_of_files_hold_nothing_that_leads_elsewhere() {
         assert_eq!(Picture::new("../left side", "", "", String::new()).name, "---left-side");
     }

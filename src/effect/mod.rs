@@ -20,7 +20,9 @@ mod viscoplastic_history;
 mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
-pub use contact::{COUNTS, Contact, PointCount, Quadrature, choose_unknowns};
+pub use contact::{
+    COUNTS, Contact, ContactNode, PointCount, Quadrature, choose_unknowns, contact_nodes,
+};
 pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};
 pub use energy::Energy;

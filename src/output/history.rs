@@ -49,6 +49,8 @@ pub struct Totals {
     pub max_energy_imbalance: f64,
     /// Largest inclusion residual of any step.
     pub max_inclusion_residual: f64,
+    /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
+    pub max_slip_pressure: Option<f64>,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Linear iterations.

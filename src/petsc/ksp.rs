@@ -128,8 +128,10 @@ impl Ksp {
         })
     }
 
-    /// Starts from the values already in the solution.
+    /// Starts from the values already in the solution; what counts as divergence is then measured against the residual there.
     pub fn start_from_solution(&mut self) -> Result<()> {
+        // SAFETY: live object with PETSc's own test of convergence.
+        check(unsafe { sys::KSPConvergedDefaultSetUIRNorm(self.raw) })?;
         self.start(true)
     }
 

@@ -6,6 +6,8 @@
 #![allow(unsafe_code)]
 
 mod callback;
+mod cholesky;
+mod dense;
 mod ksp;
 mod library;
 mod matrix;
@@ -16,6 +18,8 @@ pub mod sys;
 mod variational_inequality;
 mod vector;
 
+pub use cholesky::Cholesky;
+pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};

@@ -6,7 +6,7 @@ use super::{
     reduced::ReducedMatrix,
     sys,
 };
-use crate::error::Result;
+use crate::error::{Error, Result};
 use std::{ffi::c_void, ptr};
 
 /// An operator on a subspace, given by its action.
@@ -21,20 +21,28 @@ pub trait ProjectedOperator {
     fn may_project(&self) -> bool {
         true
     }
+
+    /// `z = M^-1 r`, where [`ProjectedKsp::precondition_by_operator`] asks for it.
+    fn precondition(&mut self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
+        Err(Error::Internal("an operator without a preconditioner was asked for one".into()))
+    }
 }
 
 /// A Krylov solver on a subspace that changes from solve to solve, preconditioned by a constant matrix.
 ///
 /// To PETSc the operator is a shell matrix whose null space is the complement of the subspace: it projects every result
-/// of the preconditioner. The preconditioner is that of the constant matrix on the subspace of some solve before; it is
-/// made anew only when a solve has not converged in as many iterations as that is worth
-/// ([`ProjectedKsp::set_patience`]), and goes on from where the solve was.
+/// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] takes the preconditioner of the constant
+/// matrix, or one made for its own subspace if that lacks [`WORTH`] directions or more. From then on it is made anew only
+/// when a solve has not converged in as many iterations as that is worth ([`ProjectedKsp::set_patience`]), and the solve
+/// goes on from where it was.
 #[derive(Debug)]
 pub struct ProjectedKsp {
     ksp: Ksp,
     fallback: Option<Ksp>,
     shell: sys::Mat,
     complement: sys::MatNullSpace,
+    /// The operator's own preconditioner, if that is in use; inside `ksp`.
+    own: sys::PC,
     constant: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
     block: usize,
@@ -82,6 +90,7 @@ impl ProjectedKsp {
             fallback: None,
             shell: ptr::null_mut(),
             complement: ptr::null_mut(),
+            own: ptr::null_mut(),
             constant: None,
             reduced: None,
             block,
@@ -144,6 +153,17 @@ impl ProjectedKsp {
         self.precondition_with(constant.raw)
     }
 
+    /// Takes the operator's own preconditioner from now on.
+    pub fn precondition_by_operator(&mut self) -> Result<()> {
+        self.ksp.set_preconditioner("shell", None)?;
+        // SAFETY: live objects; the preconditioner is only applied inside `solve`, which sets its context.
+        unsafe {
+            check(sys::KSPSetOperators(self.ksp.raw, self.shell, self.shell))?;
+            check(sys::KSPGetPC(self.ksp.raw, &mut self.own))?;
+            check(sys::PCShellSetApply(self.own, Some(precondition)))
+        }
+    }
+
     fn precondition_with(&mut self, matrix: sys::Mat) -> Result<()> {
         self.fallback = None;
         let mut pc = ptr::null_mut();
@@ -194,10 +214,9 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        let [stale, refreshed] = self.look(operator, right_hand_side)?;
-        let outcome =
-            self.attached(operator, |solver| solver.solve_attached(right_hand_side, solution, stale))?;
-        Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
+        self.looking_at(operator, right_hand_side, |solver, stale| {
+            solver.solve_attached(right_hand_side, solution, stale)
+        })
     }
 
     /// The same with a `P B` that is not symmetric, by GMRES.
@@ -207,18 +226,43 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        let [stale, refreshed] = self.look(operator, right_hand_side)?;
-        let outcome =
-            self.attached(operator, |solver| solver.solve_by_gmres(right_hand_side, solution, stale))?;
+        self.looking_at(operator, right_hand_side, |solver, stale| {
+            solver.solve_by_gmres(right_hand_side, solution, stale)
+        })
+    }
+
+    /// The same with a symmetric and positive definite `P B`, down to the absolute tolerance, with the preconditioner in use.
+    pub fn solve_accurately(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<LinearOutcome> {
+        let (_, absolute, iterations) = self.tolerances;
+        self.attached(operator, |solver| {
+            solver.ksp.set_tolerances(0.0, absolute, iterations)?;
+            solver.ksp.solve(right_hand_side, solution)
+        })
+    }
+
+    /// Runs a solve on a subspace that is looked at first; the solve is told whether the preconditioner is that of another.
+    fn looking_at(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        like: &DistributedVector,
+        solve: impl FnOnce(&mut Self, bool) -> Result<ProjectedOutcome>,
+    ) -> Result<ProjectedOutcome> {
+        let [stale, refreshed] = self.look(operator, like)?;
+        let outcome = self.attached(operator, |solver| solve(solver, stale))?;
         Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
     /// Runs a solve with this operator behind the shell matrix.
-    fn attached(
+    fn attached<T>(
         &mut self,
         operator: &mut dyn ProjectedOperator,
-        solve: impl FnOnce(&mut Self) -> Result<ProjectedOutcome>,
-    ) -> Result<ProjectedOutcome> {
+        solve: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
         let callback = Callback::new(operator);
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
         // KSPSolve. The null space is attached for the solve alone, so that its function is never called without.
@@ -226,10 +270,16 @@ impl ProjectedKsp {
             check(sys::MatNullSpaceSetFunction(self.complement, Some(project), callback.pointer()))?;
             check(sys::MatSetNullSpace(self.shell, self.complement))?;
             check(sys::MatShellSetContext(self.shell, callback.pointer()))?;
+            if !self.own.is_null() {
+                check(sys::PCShellSetContext(self.own, callback.pointer()))?;
+            }
         }
         let outcome = solve(self);
         // SAFETY: as above.
         unsafe {
+            if !self.own.is_null() {
+                check(sys::PCShellSetContext(self.own, ptr::null_mut()))?;
+            }
             check(sys::MatShellSetContext(self.shell, ptr::null_mut()))?;
             check(sys::MatSetNullSpace(self.shell, ptr::null_mut()))?;
             check(sys::MatNullSpaceSetFunction(self.complement, None, ptr::null_mut()))?;
@@ -348,6 +398,21 @@ unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys
         (&*context.cast::<Context<'_>>(), view(x), view(y), view(y))
     };
     context.run(|operator| operator.apply(&x, &mut y), || spoil(&mut spoilt))
+}
+
+unsafe extern "C" fn precondition(pc: sys::PC, r: sys::Vec, z: sys::Vec) -> sys::PetscErrorCode {
+    let mut context: *mut c_void = ptr::null_mut();
+    // SAFETY: a live shell preconditioner; PETSc writes its context pointer.
+    let code = unsafe { sys::PCShellGetContext(pc, ptr::from_mut(&mut context).cast()) };
+    if code != 0 || context.is_null() {
+        return USER_ERROR;
+    }
+    // SAFETY: as in `multiply`.
+    let (context, r, mut z, mut spoilt) = unsafe {
+        let view = |raw| DistributedVector::view(raw);
+        (&*context.cast::<Context<'_>>(), view(r), view(z), view(z))
+    };
+    context.run(|operator| operator.precondition(&r, &mut z), || spoil(&mut spoilt))
 }
 
 unsafe extern "C" fn project(_: sys::MatNullSpace, x: sys::Vec, context: *mut c_void) -> sys::PetscErrorCode {

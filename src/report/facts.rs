@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their words, in the order of the page.
-const MEMBERS: [(&str, &str, &str); 20] = [
+const MEMBERS: [(&str, &str, &str); 21] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
@@ -23,6 +23,7 @@ const MEMBERS: [(&str, &str, &str); 20] = [
     ("max_von_mises", "largest von Mises stress at the end", "Pa"),
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
+    ("max_slip_pressure", "largest contact pressure under slip weakening", "Pa"),
     ("effects", "effects simulated", ""),
     ("scheme", "time scheme", ""),
     ("preconditioner", "preconditioner", ""),
@@ -85,6 +86,7 @@ pub fn certificates(found: &Found) -> String {
     let Ok(known) = serde_json::from_value::<Certificates>(object.clone()) else {
         return paragraph("The certificates in summary.json cannot be read.");
     };
+    let growth = |which: usize| known.growth_constants.map(|constants| constants[which]);
     let rows = [
         ("theta", known.theta, "", "uniqueness of the continuous problem, if below 1"),
         ("theta of a step", known.theta_step, "", "uniqueness of each step, if below 1"),
@@ -95,7 +97,15 @@ pub fn certificates(found: &Found) -> String {
             "Pa s/m",
             "steepest fall of the contact law",
         ),
+        ("growth at rest c₀", growth(0), "Pa", "contact pressures are at most c₀ + c₁ |velocity|"),
+        ("growth constant c₁", growth(1), "Pa s/m", "slope of that bound"),
         ("trace norm |γ|²", known.trace_norm_squared, "m", "of the normal trace on the contact boundary"),
+        (
+            "pressure bound of slip weakening",
+            known.slip_pressure_bound,
+            "Pa",
+            "uniqueness of each step, for given pressures up to this",
+        ),
         ("largest stable step", known.explicit_step_bound, "s", "bound of the explicit parts of the scheme"),
     ];
     let rows = rows.into_iter().filter_map(|(name, value, unit, meaning)| {

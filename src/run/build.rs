@@ -349,6 +349,11 @@ pub(super) fn adaptive(job: &Job) -> Option<Adaptive> {
     })
 }
 
+/// Steps that one matrix is for: adaptive steps change their length every other time.
+pub(super) fn steps_a_matrix(job: &Job) -> u64 {
+    if job.time.adaptive.is_some() { 2 } else { super::time_loop::steps_between(0.0, job.time.end, job.time.step) }
+}
+
 /// The job's wishes for the solver.
 pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
@@ -364,6 +369,7 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
             job::Preconditioner::Gamg => Preconditioner::Gamg,
             job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
         },
+        steps: steps_a_matrix(job),
         newton_iterations: job.solver.max_newton_iterations as usize,
         friction: match job.solver.friction {
             job::FrictionIteration::Newton => FrictionIteration::Newton,

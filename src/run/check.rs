@@ -9,6 +9,7 @@ use super::{
     time_loop::steps_between,
 };
 use crate::{
+    stepping::Service,
     body::Body,
     certificate::Certificates,
     error::{Error, Result},
@@ -123,7 +124,12 @@ fn report<const D: usize, const S: usize>(
         adaptive: job.time.adaptive.is_some(),
         newton: inventory.newton,
         preconditioner: preconditioner.name(),
-        preconditioner_reason: asked.reason(D, mesh.total_nodes * D),
+        preconditioner_reason: asked.reason(Service {
+            dimension: D,
+            unknowns: mesh.total_nodes * D,
+            ranks: session.ranks(),
+            steps: build::steps_a_matrix(job),
+        }),
         certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: CellQuality {

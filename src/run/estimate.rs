@@ -138,7 +138,7 @@ fn cost(preconditioner: Preconditioner, dimension: usize, unknowns: f64, matrix:
                 memory: 8.0 * entries,
                 set_up: if plane { 3.5e-6 * unknowns } else { 1.2e-9 * unknowns * unknowns },
                 iteration: entries * pick(2.4e-9, 1.2e-9),
-                with_contact: 6.0,
+                with_contact: 1.0,
                 without: 1.0,
             }
         }

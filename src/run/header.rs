@@ -60,6 +60,9 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     if let Some(error) = &summary.error {
         log.line(format!("error: {error}"));
     }
+    if let Some(warning) = summary.warning() {
+        log.line(format!("warning: {warning}"));
+    }
     log.line(format!(
         "{}     {} steps to t = {} s, {} Newton and {} linear iterations",
         summary.status, summary.steps, summary.time, summary.newton_iterations, summary.linear_iterations

@@ -37,7 +37,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     }
     let mesh = distribute(session, scene.map(|s| (s.mesh, s.partition)))?;
     let probes = session.agree(probes(session, &mesh, job))?;
-    let (body, state) = build::body::<D, S>(session, job, mesh)?;
+    let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
     let scheme = scheme.map_err(|error| match error {
         Error::Internal(words) if !job.solver.petsc.is_empty() => loaded.fault(
@@ -49,7 +49,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     });
     let mut scheme = session.agree(scheme)?;
     let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
-    let prepared = scheme.prepare_length(session, &body, longest).map_err(|error| match error {
+    let prepared = scheme.prepare_length(session, &mut body, longest).map_err(|error| match error {
         Error::Internal(words) => loaded.fault(
             "material",
             format!("the equations of a step can't be solved: {words}"),

@@ -57,8 +57,23 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             }
         };
         self.totals.add(&outcome);
+        watch_slip(session, &self.body, &self.state, &mut self.totals)?;
         Ok(Some(outcome))
     }
+}
+
+/// Takes in the contact pressure that the certificate of slip weakening is held against, if there is any. Collective.
+pub(super) fn watch_slip<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    state: &State,
+    totals: &mut Totals,
+) -> Result<()> {
+    if let Some(mine) = session.agree(body.slip_pressure(state))? {
+        let [largest] = session.largest([mine]);
+        totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(largest, |most| most.max(largest)));
+    }
+    Ok(())
 }
 
 /// The totals of a run that has taken no step. Collective.

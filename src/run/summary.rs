@@ -56,6 +56,9 @@ pub struct Summary {
     pub max_inclusion_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.
     pub max_energy_imbalance: f64,
+    /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds: what
+    /// `certificates.slip_pressure_bound` is to be held against.
+    pub max_slip_pressure: Option<f64>,
     /// What is known about solvability and stability.
     pub certificates: Certificates,
     /// Seconds by phase, of the slowest rank.
@@ -83,6 +86,17 @@ impl Summary {
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::Internal(format!("the summary can't be written: {e}")))?;
         write_whole(&folder.join("summary.json"), &(text + "\n"))
+    }
+
+    /// What a certificate did not cover and the run came to, in words, if there is any.
+    pub fn warning(&self) -> Option<String> {
+        let (bound, most) = (self.certificates.slip_pressure_bound?, self.max_slip_pressure?);
+        (most > bound).then(|| {
+            format!(
+                "the contact pressure reached {most:.4e} Pa, beyond the {bound:.4e} Pa up to which steps with slip weakening are \
+                 known to have one solution; a smaller [time] step raises that bound"
+            )
+        })
     }
 
     /// The version, for use where the struct is filled.

@@ -6,7 +6,7 @@ use super::{
     folder::{prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
     setup::{Setup, setup},
-    simulation::totals_at_start,
+    simulation::{totals_at_start, watch_slip},
     summary::{PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -177,6 +177,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         while self.state.time < end {
             let outcome = self.take_step(length, end)?;
             self.totals.add(&outcome);
+            watch_slip(self.session, &self.body, &self.state, &mut self.totals)?;
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
             let steps_left = steps_between(self.state.time, end, self.state.step_length);
             let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
@@ -339,6 +340,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             max_von_mises: self.session.largest([von_mises])[0],
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
+            max_slip_pressure: self.totals.max_slip_pressure,
             certificates: self.certificates.clone(),
             wall_seconds: self.seconds(),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,

@@ -3,15 +3,14 @@
 use super::{
     equations::{CellForces, ContactEquations, Effort, cycle},
     linear_solver::FrictionIteration,
-    newton::{Newton, STEEP, Task},
+    newton::{From, Newton, STEEP, Task},
 };
 use crate::{
     body::Body,
     effect::Contact,
     error::{Error, Result},
-    petsc::{DistributedVector, NonlinearOutcome, NonlinearProblem},
+    petsc::{DistributedVector, NonlinearOutcome},
     session::Session,
-    state::State,
 };
 
 /// Fixed-point iterations after which a step has failed.
@@ -32,8 +31,8 @@ pub(super) enum Search {
     FullSteps,
     /// Every step as far as the residual falls enough.
     Backtracking,
-    /// Full steps on the way from equations that the start solves to those of the step.
-    Continuation,
+    /// The same for the equations of the contact points alone: all other velocities are in equilibrium with theirs.
+    Equilibrated,
 }
 
 const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> Attempt {
@@ -42,26 +41,19 @@ const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> 
 
 /// What is tried in turn until a step is solved, each time from where the step started.
 ///
-/// Full steps first: a new set of branches raises the residual, so that a search would creep where full steps arrive. Where
-/// each step has one solution, it depends continuously on the forces, so that the way there can be cut into pieces. A
-/// fixed point, at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
-pub(super) const ATTEMPTS: [Attempt; 12] = [
+/// Full steps first: a new set of branches raises the residual of the whole body, so that a search would creep where full
+/// steps arrive. In equilibrium it is that of the contact points alone, which tells how far off these are. A fixed point,
+/// at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
+pub(super) const ATTEMPTS: [Attempt; 8] = [
     attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
+    attempt(Search::Equilibrated, 1.0, FrictionIteration::Newton),
+    attempt(Search::Equilibrated, 10.0, FrictionIteration::Newton),
     attempt(Search::Backtracking, 1.0, FrictionIteration::Newton),
-    attempt(Search::Continuation, 1.0, FrictionIteration::Newton),
     attempt(Search::FullSteps, 10.0, FrictionIteration::Newton),
-    attempt(Search::Continuation, 10.0, FrictionIteration::Newton),
-    attempt(Search::Backtracking, 30.0, FrictionIteration::Newton),
-    attempt(Search::FullSteps, 100.0, FrictionIteration::Newton),
-    attempt(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
     attempt(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
+    attempt(Search::Equilibrated, 1.0, FrictionIteration::FixedPoint),
     attempt(Search::Backtracking, 1.0, FrictionIteration::FixedPoint),
-    attempt(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
-    attempt(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
 ];
-/// Share of the way that the first stride of a continuation goes, and below which it gives up.
-const FIRST_STRIDE: f64 = 0.25;
-const LAST_STRIDE: f64 = 1e-6;
 
 /// Newton iterations; with why they led nowhere, if so.
 pub(super) type Attempted = std::result::Result<usize, (usize, String)>;
@@ -86,11 +78,11 @@ impl Newton {
     pub(super) fn start_again<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
-        state: &State,
+        from: From<'_>,
         trial: &mut DistributedVector,
     ) -> Result<()> {
         trial.copy_from(&self.start)?;
-        if let Some(traction) = &state.contact_traction {
+        if let Some(traction) = from.traction {
             let traction = traction.owned()?;
             body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
         }
@@ -108,9 +100,6 @@ impl Newton {
         trial: &mut DistributedVector,
         effort: &mut Effort,
     ) -> Result<Attempted> {
-        if attempt.search == Search::Continuation {
-            return self.continuation(session, body, task, trial, effort);
-        }
         if attempt.iteration == FrictionIteration::Newton {
             return self.newton(session, body, task, attempt.search, trial, effort);
         }
@@ -143,6 +132,10 @@ impl Newton {
             body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
         }
         let solved = self.iterate(session, body, task, search, trial, effort)?;
+        if search == Search::Equilibrated {
+            trial.copy_from(&self.scratch.velocity)?;
+            return Ok(solved);
+        }
         let mut trial = trial.owned_mut()?;
         body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
         Ok(solved)
@@ -159,7 +152,7 @@ impl Newton {
         effort: &mut Effort,
     ) -> Result<Attempted> {
         if !self.chosen_search {
-            self.snes.search_along_steps(search == Search::Backtracking)?;
+            self.snes.search_along_steps(search != Search::FullSteps)?;
         }
         effort.sets.clear();
         let (cells, contacts) = body.cells_and_contacts();
@@ -175,7 +168,8 @@ impl Newton {
             scratch: &mut self.scratch,
             linear_solver: &mut self.linear_solver,
             session,
-            stop_at_cycles: search != Search::Backtracking,
+            stop_at_cycles: search == Search::FullSteps,
+            equilibrated: search == Search::Equilibrated,
             effort: std::mem::take(effort),
         };
         let most = task.settings.newton_iterations;
@@ -197,68 +191,6 @@ impl Newton {
             }
             Err(other) => Err(other),
         }
-    }
-
-    /// Newton's method on equations whose right-hand side goes in strides from what the start solves to that of the step.
-    /// The solution follows along a path of finitely many linear pieces. Collective.
-    fn continuation<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        task: Task<'_>,
-        trial: &mut DistributedVector,
-        effort: &mut Effort,
-    ) -> Result<Attempted> {
-        {
-            let mut trial = trial.owned_mut()?;
-            body.contacts.iter().for_each(|contact| contact.unmap(&mut trial));
-        }
-        let (mut open, mut target, mut behind) = (trial.like()?, trial.like()?, trial.like()?);
-        let (cells, contacts) = body.cells_and_contacts();
-        let mut cells = match (&mut self.flow, task.flow) {
-            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
-            _ => None,
-        };
-        let mut equations = ContactEquations {
-            matrix: task.matrix,
-            cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
-            contacts,
-            right_hand_side: task.right_hand_side,
-            scratch: &mut self.scratch,
-            linear_solver: &mut self.linear_solver,
-            session,
-            stop_at_cycles: false,
-            effort: std::mem::take(effort),
-        };
-        equations.residual(trial, &mut open)?;
-        *effort = equations.effort;
-        behind.copy_from(trial)?;
-        let (mut reached, mut stride, mut sum) = (0.0, FIRST_STRIDE, 0);
-        while reached < 1.0 {
-            let next = f64::min(reached + stride, 1.0);
-            target.copy_from(task.right_hand_side)?;
-            target.add_scaled(1.0 - next, &open)?;
-            let part = Task { right_hand_side: &target, ..task };
-            match self.iterate(session, body, part, Search::Continuation, trial, effort)? {
-                Ok(iterations) => {
-                    sum += iterations;
-                    reached = next;
-                    stride *= 2.0;
-                    behind.copy_from(trial)?;
-                }
-                Err((iterations, words)) => {
-                    sum += iterations;
-                    stride *= 0.25;
-                    trial.copy_from(&behind)?;
-                    if stride < LAST_STRIDE {
-                        return Ok(Err((sum, words)));
-                    }
-                }
-            }
-        }
-        let mut trial = trial.owned_mut()?;
-        body.contacts.iter_mut().for_each(|contact| contact.map(&mut trial));
-        Ok(Ok(sum))
     }
 }
 

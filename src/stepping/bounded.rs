@@ -41,8 +41,11 @@ impl Bounded {
         }
         let bounds = [&self.lower, &self.upper];
         let iterations = task.settings.newton_iterations;
+        let Some(matrix) = task.matrix.assembled() else {
+            return Err(Error::Internal("bounds need the entries of the matrix".into()));
+        };
         let outcome = self.snes.solve(
-            task.matrix,
+            matrix,
             task.right_hand_side,
             bounds,
             trial,

@@ -7,6 +7,38 @@ use crate::{
     session::Session,
 };
 
+/// The constant matrix `K` of a step.
+pub trait StepMatrix {
+    /// `y = K x`. Collective.
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
+
+    /// `z` near `K^-1 r`, on the subspace last looked at; for matrices that PETSc makes no preconditioner of. Collective.
+    fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
+        Err(Error::Internal("a matrix that PETSc preconditions was asked to do it".into()))
+    }
+
+    /// Takes in the subspace of the solves that follow, given the projection on it; says whether a preconditioner was made
+    /// for it. Collective.
+    fn look(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// The matrix itself, if its entries are at hand.
+    fn assembled(&self) -> Option<&Matrix> {
+        None
+    }
+}
+
+impl StepMatrix for Matrix {
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        Self::multiply(self, x, y)
+    }
+
+    fn assembled(&self) -> Option<&Matrix> {
+        Some(self)
+    }
+}
+
 /// Forces of the cells beyond `K v`, at velocities without ghost values.
 pub trait CellForces {
     /// Adds the forces at a velocity.
@@ -25,7 +57,7 @@ pub trait CellForces {
 /// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::effect::Contact`] for the unknown `x`.
 pub struct ContactEquations<'a, const D: usize> {
     /// `K`.
-    pub matrix: &'a Matrix,
+    pub matrix: &'a dyn StepMatrix,
     /// What makes up `C`.
     pub contacts: &'a mut [Contact<D>],
     /// What cells add to `K v`, if that is not linear.
@@ -40,6 +72,8 @@ pub struct ContactEquations<'a, const D: usize> {
     pub session: &'a Session<'a>,
     /// Whether to fail when the branches of the contact graph come back.
     pub stop_at_cycles: bool,
+    /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
+    pub equilibrated: bool,
     /// What was done so far.
     pub effort: Effort,
 }
@@ -47,8 +81,11 @@ pub struct ContactEquations<'a, const D: usize> {
 /// Work vectors of a contact step.
 #[derive(Debug)]
 pub struct Scratch {
-    velocity: DistributedVector,
+    /// The velocities of the last residual.
+    pub velocity: DistributedVector,
     open: DistributedVector,
+    /// Room for the way to equilibrium.
+    correction: Option<DistributedVector>,
     /// Ghosted values and forces, where some contact reads ghost nodes.
     ghosted: Option<[DistributedVector; 2]>,
 }
@@ -60,6 +97,7 @@ impl Scratch {
         Ok(Self {
             velocity: like.like()?,
             open: like.like()?,
+            correction: None,
             ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
         })
     }
@@ -130,12 +168,9 @@ impl<const D: usize> ContactEquations<'_, D> {
         self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
         Ok(())
     }
-}
 
-impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
-    fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
-        self.effort.residuals += 1;
-        self.map(x)?;
+    /// Writes the residual at the mapped velocities.
+    fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
         self.matrix.multiply(velocity, residual)?;
         residual.add_scaled(-1.0, self.right_hand_side)?;
@@ -143,6 +178,32 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             cells.add_forces(velocity, residual)?;
         }
         add_contact(ghosted, self.contacts, velocity, residual, Contact::add_forces)
+    }
+}
+
+impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
+    fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
+        self.effort.residuals += 1;
+        self.map(x)?;
+        self.write_residual(residual)?;
+        if !self.equilibrated {
+            return Ok(());
+        }
+        let Scratch { velocity, open, correction, .. } = &mut *self.scratch;
+        let correction = match correction {
+            Some(correction) => correction,
+            none => none.insert(open.like()?),
+        };
+        let mut operator = Inside { matrix: self.matrix, contacts: self.contacts };
+        open.copy_from(residual)?;
+        operator.project(open)?;
+        let outcome = self.linear_solver.solve_accurately(&mut operator, open, correction)?;
+        self.effort.linear_iterations += outcome.iterations;
+        if !outcome.converged() {
+            return Err(Error::Failed(outcome.words().into()));
+        }
+        velocity.add_scaled(-1.0, correction)?;
+        self.write_residual(residual)
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
@@ -198,7 +259,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         residual: &DistributedVector,
         direction: &mut DistributedVector,
     ) -> Result<()> {
-        let Scratch { velocity, open, ghosted } = &mut *self.scratch;
+        let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
         let skew = cells.as_ref().is_some_and(|cells| !cells.is_symmetric());
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
@@ -207,6 +268,10 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let mut operator = Reduced { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
         open.copy_from(residual)?;
         operator.reduce(open)?;
+        if operator.may_project() {
+            let made = self.matrix.look(&mut |column| operator.project(column))?;
+            self.effort.refreshed += usize::from(made);
+        }
         let outcome = if coupled {
             self.effort.coupled += 1;
             self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
@@ -235,7 +300,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
 /// graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
 /// these.
 struct Reduced<'a, const D: usize> {
-    matrix: &'a Matrix,
+    matrix: &'a dyn StepMatrix,
     cells: Option<&'a mut dyn CellForces>,
     contacts: &'a [Contact<D>],
     ghosted: &'a mut Option<[DistributedVector; 2]>,
@@ -273,6 +338,47 @@ impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
     }
 
     fn may_project(&self) -> bool {
-        self.contacts.iter().any(|contact| contact.law.has_vertical_parts())
+        self.contacts.iter().any(|contact| contact.law.has_vertical_parts() || contact.friction().is_some())
+    }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.matrix.precondition(r, z)
+    }
+}
+
+/// `P K P`, where `P` holds all contact points.
+struct Inside<'a, const D: usize> {
+    matrix: &'a dyn StepMatrix,
+    contacts: &'a [Contact<D>],
+}
+
+impl<const D: usize> ProjectedOperator for Inside<'_, D> {
+    fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        self.project(y)
+    }
+
+    fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
+        let mut x = x.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.hold(&mut x));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn branches_that_come_back_after_others_are_told_with_their_period() {
+        let period = |sets: &[f64]| Effort { sets: sets.to_vec(), ..Effort::default() }.period();
+        assert_eq!(period(&[]), None);
+        assert_eq!(period(&[1.0]), None);
+        assert_eq!(period(&[1.0, 2.0, 3.0]), None, "all of them new");
+        assert_eq!(period(&[1.0, 2.0, 2.0]), None, "they stay");
+        assert_eq!(period(&[1.0, 2.0, 1.0]), Some(2));
+        assert_eq!(period(&[5.0, 1.0, 2.0, 3.0, 1.0]), Some(3));
+        assert_eq!(period(&[1.0, 2.0, 1.0, 3.0, 1.0]), Some(2), "the last time counts");
+        assert!(cycle(2).contains("that it had 2 iterations before"));
     }
 }

@@ -49,45 +49,70 @@ pub struct SolverSettings {
     pub preconditioner: Preconditioner,
     /// Newton iterations after which a step has failed.
     pub newton_iterations: usize,
+    /// Steps that one matrix is for, as far as is known.
+    pub steps: u64,
     /// How friction bounds find the pressure that they follow.
     pub friction: FrictionIteration,
 }
 
-/// Most unknowns for which a factorisation is faster than multigrid, by dimension.
-const DIRECT_2D: usize = 20_000;
-const DIRECT_3D: usize = 6_000;
+/// What a preconditioner has to serve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Service {
+    /// Dimension of the space.
+    pub dimension: usize,
+    /// Velocity components over all ranks.
+    pub unknowns: usize,
+    /// Processes.
+    pub ranks: usize,
+    /// Steps that one matrix is for, as far as is known.
+    pub steps: u64,
+}
+
+/// Steps that pay for a factorisation of a large matrix.
+const MANY_STEPS: u64 = 10;
+/// Most unknowns for which a factorisation is faster than multigrid, for few and for many steps.
+const DIRECT_2D: [usize; 2] = [20_000, 600_000];
+const DIRECT_3D: [usize; 2] = [6_000, 110_000];
 /// Most unknowns whose matrix every rank factors for itself.
 const REDUNDANT: usize = 50_000;
 /// Krylov iterations after which a linear solve has failed.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
+impl Service {
+    fn largest_factored(self) -> usize {
+        let [few, many] = if self.dimension == 2 { DIRECT_2D } else { DIRECT_3D };
+        let most = if self.steps >= MANY_STEPS { many } else { few };
+        if self.ranks > 1 { most.min(REDUNDANT) } else { most }
+    }
+}
+
 impl Preconditioner {
-    /// Replaces `Auto` by the choice for this many unknowns in this many dimensions.
-    pub fn resolve(self, dimension: usize, unknowns: usize) -> Self {
-        let direct = if dimension == 2 { DIRECT_2D } else { DIRECT_3D };
+    /// Replaces `Auto` by the choice for this service.
+    pub fn resolve(self, service: Service) -> Self {
         match self {
-            Self::Auto if unknowns <= direct => Self::Cholesky,
+            Self::Auto if service.unknowns <= service.largest_factored() => Self::Cholesky,
             Self::Auto => Self::Gamg,
             chosen => chosen,
         }
     }
 
     /// Why [`resolve`](Self::resolve) chooses what it does, in words.
-    pub fn reason(self, dimension: usize, unknowns: usize) -> String {
-        let direct = if dimension == 2 { DIRECT_2D } else { DIRECT_3D };
-        match self {
-            Self::Auto if unknowns <= direct => {
-                format!(
-                    "up to {direct} velocity components in {dimension}D a factorisation is faster than multigrid"
-                )
-            }
-            Self::Auto => {
-                format!(
-                    "above {direct} velocity components in {dimension}D multigrid is faster than a factorisation"
-                )
-            }
-            _ => "[solver] preconditioner asks for it".into(),
+    pub fn reason(self, service: Service) -> String {
+        if self != Self::Auto {
+            return "[solver] preconditioner asks for it".into();
         }
+        let Service { dimension, ranks, steps, .. } = service;
+        let most = service.largest_factored();
+        let steps = if steps >= MANY_STEPS {
+            format!("{MANY_STEPS} steps or more")
+        } else {
+            format!("fewer than {MANY_STEPS} steps")
+        };
+        let ranks = if ranks > 1 { "several ranks, each of which factors all of it" } else { "one rank" };
+        let which = if service.unknowns <= most { "up to" } else { "multigrid is; up to" };
+        format!(
+            "{which} {most} velocity components in {dimension}D a factorisation is faster, with {steps} a matrix on {ranks}"
+        )
     }
 
     /// Whether every rank factors the whole matrix for itself.
@@ -152,5 +177,23 @@ impl Preconditioner {
                 set_default_option("pc_hypre_boomeramg_relax_type_all", "Chebyshev")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_steps_on_one_rank_pay_for_larger_factors() {
+        let chosen = |unknowns, ranks, steps| {
+            Preconditioner::Auto.resolve(Service { dimension: 2, unknowns, ranks, steps })
+        };
+        assert_eq!(chosen(500_000, 1, 64), Preconditioner::Cholesky);
+        assert_eq!(chosen(500_000, 1, 2), Preconditioner::Gamg);
+        assert_eq!(chosen(500_000, 2, 64), Preconditioner::Gamg);
+        assert_eq!(chosen(40_000, 2, 64), Preconditioner::Cholesky);
+        let asked = Service { dimension: 3, unknowns: 9, ranks: 1, steps: 1 };
+        assert_eq!(Preconditioner::Gamg.resolve(asked), Preconditioner::Gamg);
     }
 }

@@ -4,6 +4,9 @@ mod adaptive;
 mod attempts;
 mod bdf2;
 mod bounded;
+mod choice;
+mod condensed;
+mod condensed_matrix;
 mod equations;
 mod flow;
 mod implicit;
@@ -19,7 +22,7 @@ mod stepper;
 
 pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
-pub use linear_solver::{FrictionIteration, Method, Preconditioner, SolverSettings};
+pub use linear_solver::{FrictionIteration, Method, Preconditioner, Service, SolverSettings};
 pub use scheme::Scheme;
 pub use step_length::{SNAP, next_step};
 pub use stepper::{StepClock, StepOutcome, Stepper};

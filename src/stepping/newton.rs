@@ -4,17 +4,16 @@ use super::{
     StepOutcome,
     attempts::{ATTEMPTS, Search},
     bounded::Bounded,
-    equations::{Effort, Scratch},
+    equations::{Effort, Scratch, StepMatrix},
     flow::{Flow, FlowStart},
-    linear_solver::{FrictionIteration, SolverSettings},
+    linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
 };
 use crate::{
     body::Body,
     effect::{COUNTS, Contact, Energy, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Matrix, ProjectedKsp, Snes},
+    petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
     session::Session,
-    state::State,
 };
 
 /// Newton's method with what it needs.
@@ -40,16 +39,28 @@ pub(super) struct Newton {
 const STEEPEST: f64 = 0.8;
 pub(super) const STEEP: f64 = 0.5;
 
+/// Linear solves stop at this share of what the step needs.
+const LINEAR_SHARE: f64 = 0.3;
+/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
+const LINEAR_REDUCTION: f64 = 1e-3;
+
 /// The equations of a step and what counts as their solution.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub step: Step,
-    pub matrix: &'a Matrix,
+    pub matrix: &'a dyn StepMatrix,
     pub right_hand_side: &'a DistributedVector,
     pub tolerance: f64,
     pub settings: SolverSettings,
     /// Where the displacement starts, if stresses are those at the end of the step.
     pub flow: Option<FlowStart<'a>>,
+}
+
+/// The converged state that a step starts from.
+#[derive(Clone, Copy)]
+pub(super) struct From<'a> {
+    pub velocity: &'a DistributedVector,
+    pub traction: Option<&'a DistributedVector>,
 }
 
 impl Task<'_> {
@@ -61,36 +72,59 @@ impl Task<'_> {
 }
 
 impl Newton {
-    /// Chooses the parameters `c` of each contact's graphs. Along the normal: above twice the steepest fall, and as stiff as
-    /// the body is against a unit pressure on the whole contact. For friction: as stiff as the body is against sliding of
-    /// its surface alone; a softer one makes the residual so steep where points begin to slide that line searches fail.
-    /// Collective.
+    /// Newton's method for unknowns laid out like `like`.
+    pub fn new<const D: usize>(
+        like: &DistributedVector,
+        contacts: &[Contact<D>],
+        linear_solver: ProjectedKsp,
+    ) -> Result<Self> {
+        let mut snes = Snes::new("", like, D)?;
+        snes.apply_options()?;
+        Ok(Self {
+            snes,
+            bounded: None,
+            linear_solver,
+            scratch: Scratch::new(like, contacts)?,
+            before: Vec::new(),
+            after: Vec::new(),
+            scales: Vec::new(),
+            start: like.like()?,
+            chosen_search: has_option("snes_linesearch_type")?,
+            flow: None,
+        })
+    }
+
+    /// Chooses the parameters `c` of each contact's graphs: as stiff as the body is against motions of its surface alone, along
+    /// the normal and in sliding, and along the normal above twice the steepest fall. With softer ones the residual is so
+    /// steep where points change their branch that line searches fail. Collective.
     pub fn choose_scales<const D: usize>(
         &mut self,
         session: &Session,
         contacts: &[Contact<D>],
         like: &DistributedVector,
-        matrix: &Matrix,
+        matrix: &dyn StepMatrix,
     ) -> Result<()> {
-        let (mut pressure, mut answer) = (like.like()?, like.like()?);
+        let (mut motion, mut answer) = (like.like()?, like.like()?);
+        let mut stiffness = |motion: &DistributedVector, square: f64| -> Result<f64> {
+            matrix.multiply(motion, &mut answer)?;
+            let [square] = session.sum([square]);
+            Ok(positive_or_one(motion.dot(&answer)? / square))
+        };
         self.scales.clear();
         for contact in contacts {
-            pressure.fill(0.0)?;
-            contact.add_unit_pressure(&mut pressure.owned_mut()?);
-            self.linear_solver.linear_solver().precondition(&pressure, &mut answer)?;
-            let [square] = session.sum([contact.normal_square(&answer.owned()?)]);
-            let normal = positive_or_one(answer.dot(&pressure)? / square);
+            motion.fill(0.0)?;
+            contact.add_normals(&mut motion.owned_mut()?);
+            let square = contact.normal_square(&motion.owned()?);
+            let normal = stiffness(&motion, square)?.max(2.0 * contact.law.monotonicity_constant());
             let tangential = if contact.friction().is_some() {
-                let mut sliding = like.like()?;
-                sliding.fill(0.0)?;
-                contact.add_unit_sliding(&mut sliding.owned_mut()?);
-                matrix.multiply(&sliding, &mut answer)?;
-                let [square] = session.sum([contact.tangential_square(&sliding.owned()?)]);
-                positive_or_one(sliding.dot(&answer)? / square)
+                motion.fill(0.0)?;
+                contact.add_unit_sliding(&mut motion.owned_mut()?);
+                let square = contact.tangential_square(&motion.owned()?);
+                stiffness(&motion, square)?
             } else {
                 normal
             };
-            self.scales.push([normal.max(2.0 * contact.law.monotonicity_constant()), tangential]);
+            self.scales.push([normal, tangential]);
         }
         Ok(())
     }
@@ -100,12 +134,12 @@ impl Newton {
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
-        state: &State,
+        from: From<'_>,
         task: Task<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
         let (step, settings) = (task.step, task.settings);
-        branches(body, &state.velocity, &mut self.before)?;
+        branches(body, from.velocity, &mut self.before)?;
         if let Some(bounded) = &mut self.bounded {
             let contacts = &mut body.contacts;
             let solved = bounded.solve(contacts, task, trial);
@@ -122,6 +156,11 @@ impl Newton {
                 (outcome.iterations, &Effort::default()),
             );
         }
+        self.linear_solver.set_tolerances(
+            LINEAR_REDUCTION,
+            LINEAR_SHARE * task.tolerance,
+            LINEAR_ITERATIONS,
+        )?;
         self.start.copy_from(trial)?;
         let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
         let (follows, chosen) = (body.contacts.iter().any(follows), self.chosen_search);
@@ -129,7 +168,13 @@ impl Newton {
             FrictionIteration::Newton => !follows || settings.friction == FrictionIteration::Newton,
             FrictionIteration::FixedPoint => follows,
         });
-        let mut attempts = attempts.by_ref().filter(|a| !chosen || a.search == Search::Backtracking);
+        // Elsewhere what is inside is no linear problem.
+        let inside = self.flow.is_none() && !body.contacts.iter().any(Contact::needs_ghosts);
+        let mut attempts = attempts.by_ref().filter(|a| match a.search {
+            Search::FullSteps => !chosen,
+            Search::Equilibrated => inside,
+            Search::Backtracking => true,
+        });
         let mut falls = largest_falls(session, &body.contacts);
         let mut effort = Effort::default();
         let mut newton_iterations = 0;
@@ -142,7 +187,7 @@ impl Newton {
                 Err((iterations, words)) => {
                     (newton_iterations, why) = (newton_iterations + iterations, words);
                     attempt = attempts.next().copied();
-                    self.start_again(body, state, trial)?;
+                    self.start_again(body, from, trial)?;
                     continue;
                 }
             }

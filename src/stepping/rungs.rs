@@ -3,7 +3,7 @@
 //! Steps come from a ladder of powers of two, its rungs. What solves with the matrix of a rung serves all lengths near it as a
 //! preconditioner: two matrices `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
 
-use super::{linear_solver::Preconditioner, newton::Newton, step_solver::Solver};
+use super::{condensed::Factored, linear_solver::Preconditioner, newton::Newton, step_solver::Solver};
 use crate::{
     error::Result,
     petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
@@ -32,6 +32,8 @@ pub(super) enum Krylov {
     Linear(Ksp),
     /// For Newton's method, with the parameters of the contact graphs.
     Newton(Box<ProjectedKsp>, Vec<[f64; 2]>),
+    /// For Newton's method on the contact alone.
+    Condensed(Box<Option<Factored>>),
 }
 
 /// A solver of linear steps, for this many unknowns. Collective.
@@ -68,6 +70,7 @@ impl Krylov {
     ) -> Result<Self> {
         Ok(match used {
             Solver::Linear(_) => Self::Linear(linear(session, chosen, unknowns)?),
+            Solver::Condensed(_) => Self::Condensed(Box::default()),
             Solver::Newton(_) => {
                 Self::Newton(Box::new(projected::<D>(session, chosen, unknowns, like)?), Vec::new())
             }
@@ -83,7 +86,8 @@ impl Krylov {
                 swap(&mut **mine, linear_solver);
                 swap(mine_scales, scales);
             }
-            (Self::Linear(_), Solver::Newton(_)) | (Self::Newton(..), Solver::Linear(_)) => {}
+            (Self::Condensed(mine), Solver::Condensed(used)) => used.exchange(mine),
+            _ => {}
         }
     }
 }
@@ -145,6 +149,7 @@ impl Preconditioner {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stepping::Service;
 
     #[test]
     fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
@@ -156,7 +161,8 @@ mod tests {
     #[test]
     fn small_problems_keep_a_ladder_and_large_ones_what_they_use() {
         let kept = |unknowns: usize, ranks| {
-            Preconditioner::Auto.resolve(3, unknowns).kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+            let service = Service { dimension: 3, unknowns, ranks, steps: 2 };
+            Preconditioner::Auto.resolve(service).kept(3, unknowns, ranks, 540.0 * unknowns as f64)
         };
         assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
         assert_eq!(kept(1_000_000, 8), 2);

@@ -1,11 +1,11 @@
 //! The matrix of a step with its solver.
 
 use super::{
-    bounded::{self, Bounded},
-    equations::Scratch,
-    flow::{Flow, FlowStart},
-    linear_solver::{LINEAR_ITERATIONS, Method, Preconditioner, SolverSettings},
-    newton::{Newton, REMEDY, Task, failed},
+    choice,
+    condensed::Condensed,
+    flow::FlowStart,
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
+    newton::{From, Newton, REMEDY, Task, failed},
     rungs::{self, Krylov, Rung, Rungs},
     stepper::StepOutcome,
 };
@@ -13,15 +13,10 @@ use crate::{
     body::Body,
     effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, Snes, has_option},
+    petsc::{DistributedVector, Ksp, Matrix},
     session::Session,
     state::State,
 };
-
-/// Linear solves stop at this share of what the step needs.
-const LINEAR_SHARE: f64 = 0.3;
-/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
-const LINEAR_REDUCTION: f64 = 1e-3;
 
 /// What a step brings to its solution.
 pub(super) struct Known<'a> {
@@ -37,6 +32,7 @@ pub(super) struct Known<'a> {
 pub(super) enum Solver {
     Linear(Ksp),
     Newton(Box<Newton>),
+    Condensed(Box<Condensed>),
 }
 
 /// A step's length with the length of the rung whose preconditioner serves it, both as matrices have them, in s.
@@ -69,44 +65,17 @@ impl StepSolver {
         settings: SolverSettings,
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
-        let preconditioner = settings.preconditioner.resolve(D, unknowns);
+        let preconditioner = settings.preconditioner.resolve(Service {
+            dimension: D,
+            unknowns,
+            ranks: session.ranks(),
+            steps: settings.steps,
+        });
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
             Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
         } else {
-            let mut snes = Snes::new("", &state.velocity, D)?;
-            snes.apply_options()?;
-            let linear_solver = rungs::projected::<D>(session, preconditioner, unknowns, &state.velocity)?;
-            let flow = if flows { Some(Flow::new(&state.velocity)?) } else { None };
-            let scratch = Scratch::new(&state.velocity, &body.contacts)?;
-            let (before, after, scales) = (Vec::new(), Vec::new(), Vec::new());
-            let bounded = match settings.method {
-                Method::Newton => None,
-                Method::VariationalInequality => {
-                    session.agree(bounded::refuse(body))?;
-                    if flows {
-                        return Err(Error::Refused(
-                            "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
-                             [time] scheme = \"lagged_euler\""
-                                .into(),
-                        ));
-                    }
-                    Some(Bounded::new(&state.velocity)?)
-                }
-            };
-            let (start, chosen_search) = (state.velocity.like()?, has_option("snes_linesearch_type")?);
-            Solver::Newton(Box::new(Newton {
-                snes,
-                bounded,
-                linear_solver,
-                scratch,
-                before,
-                after,
-                scales,
-                start,
-                chosen_search,
-                flow,
-            }))
+            choice::newton(session, body, state, settings, preconditioner)?
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
@@ -120,7 +89,7 @@ impl StepSolver {
 
     /// Whether steps are solved by Newton's method.
     pub fn is_nonlinear(&self) -> bool {
-        matches!(self.solver, Solver::Newton(_))
+        !matches!(self.solver, Solver::Linear(_))
     }
 
     /// The preconditioner in use.
@@ -132,7 +101,7 @@ impl StepSolver {
     pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
         let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
         let rung = length(&self.rung);
-        rung == Some(lengths.rung) && length(&self.between).or(rung) == Some(lengths.matrix)
+        rung == Some(self.rung_of(lengths)) && length(&self.between).or(rung) == Some(lengths.matrix)
     }
 
     /// Assembles the matrix of this length and sets the preconditioner of its rung up, unless they are there; says whether a
@@ -140,15 +109,19 @@ impl StepSolver {
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         lengths: Lengths,
         like: &DistributedVector,
     ) -> Result<bool> {
         self.between = None;
-        let made = self.rung.as_ref().is_none_or(|(known, _)| *known != lengths.rung)
-            && self.change_rung(session, body, lengths.rung, like)?;
-        if lengths.matrix != lengths.rung {
-            self.between = Some((lengths.matrix, assembled(session, body, lengths.matrix)?));
+        let rung = self.rung_of(lengths);
+        let mut made = false;
+        if self.rung.as_ref().is_none_or(|(known, _)| *known != rung) {
+            made = self.change_rung(session, body, rung, like)?;
+        }
+        if lengths.matrix != rung {
+            let rows = session.agree(body.matrix(session, lengths.matrix))?;
+            self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
         self.matrix_norm = self.matrix()?.norm()?;
         if let (Solver::Linear(ksp), Some((_, rung))) = (&mut self.solver, &self.rung) {
@@ -157,11 +130,16 @@ impl StepSolver {
         Ok(made)
     }
 
+    /// The length whose matrix is set up: what is condensed serves no other.
+    fn rung_of(&self, lengths: Lengths) -> f64 {
+        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.rung }
+    }
+
     /// Brings the rung of this length into use; says whether it had to be made. Collective.
     fn change_rung<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         length: f64,
         like: &DistributedVector,
     ) -> Result<bool> {
@@ -191,7 +169,17 @@ impl StepSolver {
             self.rung = Some((length, matrix));
             return Ok(false);
         }
-        let mut matrix = assembled(session, body, length)?;
+        let rows = session.agree(body.matrix(session, length))?;
+        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        if let Solver::Condensed(condensed) = &mut self.solver {
+            if condensed.prepare(session, body, rows)? {
+                self.rung = Some((length, matrix));
+                return Ok(true);
+            }
+            self.solver = choice::whole_newton(session, body, like, self.settings, chosen)?;
+        } else {
+            drop(rows);
+        }
         if chosen == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
@@ -206,6 +194,7 @@ impl StepSolver {
                 session.agree(newton.linear_solver.linear_solver().set_up())?;
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
+            Solver::Condensed(_) => {}
         }
         self.rung = Some((length, matrix));
         Ok(true)
@@ -225,6 +214,7 @@ impl StepSolver {
     /// Applies the preconditioner. Collective.
     pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.solve_linear(r, z),
             Solver::Linear(ksp) => ksp.precondition(r, z),
             Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
         }
@@ -252,9 +242,37 @@ impl StepSolver {
         // No residual below the rounding of `K v` is asked for, however small the forces that are left.
         let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
+        let solved = self.solve_to(session, body, state, (step, start), (forces, tolerance), trial);
+        let Err(Error::Failed(_)) = &solved else { return solved };
+        // The start may be much less than the solution, above all at rest.
+        let mut answer = forces.like()?;
+        self.precondition(forces, &mut answer)?;
+        let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
+        if floor.is_finite() && floor > tolerance {
+            if !self.is_nonlinear() {
+                trial.copy_from(&answer)?;
+            }
+            return self.solve_to(session, body, state, (step, start), (forces, floor), trial);
+        }
+        solved
+    }
+
+    /// Solves a step to this residual norm in N. Collective.
+    fn solve_to<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        (step, start): (Step, Option<FlowStart<'_>>),
+        (forces, tolerance): (&DistributedVector, f64),
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
         let Some((_, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
+        let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };
+        let task =
+            Task { step, matrix, right_hand_side: forces, tolerance, settings: self.settings, flow: start };
         match &mut self.solver {
             Solver::Linear(ksp) => {
                 ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
@@ -264,26 +282,8 @@ impl StepSolver {
                 }
                 Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
             }
-            Solver::Newton(newton) => {
-                newton.linear_solver.set_tolerances(
-                    LINEAR_REDUCTION,
-                    LINEAR_SHARE * tolerance,
-                    LINEAR_ITERATIONS,
-                )?;
-                let (right_hand_side, settings) = (forces, self.settings);
-                let task = Task { step, matrix, right_hand_side, tolerance, settings, flow: start };
-                newton.solve(session, body, state, task, trial)
-            }
+            Solver::Newton(newton) => newton.solve(session, body, from, task, trial),
+            Solver::Condensed(condensed) => condensed.solve(session, body, from, task, trial),
         }
     }
-}
-
-/// The matrix of a length. Collective.
-fn assembled<const D: usize, const S: usize>(
-    session: &Session,
-    body: &Body<D, S>,
-    length: f64,
-) -> Result<Matrix> {
-    let rows = session.agree(body.matrix(session, length))?;
-    session.agree(Matrix::symmetric(D, &rows))
 }

@@ -137,7 +137,7 @@ impl Stepper {
     pub fn prepare_length<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         length: f64,
     ) -> Result<()> {
         self.ladder = length;
@@ -148,7 +148,7 @@ impl Stepper {
     fn prepare_matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         step: Step,
     ) -> Result<()> {
         let rung = self.method.steady_length(nearest(self.ladder, step.length));

@@ -100,7 +100,9 @@ fn a_check_says_what_a_run_would_be_and_writes_nothing() {
             "theta_step",
             "viscosity_modulus",
             "monotonicity_constant",
+            "growth_constants",
             "trace_norm_squared",
+            "slip_pressure_bound",
             "explicit_step_bound",
         ];
         assert_eq!(names, expected);

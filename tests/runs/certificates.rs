@@ -53,6 +53,90 @@ fn effects_that_are_absent_leave_their_certificates_null() {
     assert!(check(&inviscid, 1)["certificates"]["theta"].is_null());
 }
 
+#[test]
+fn check_says_how_contact_pressures_grow_with_the_velocity() {
+    let growth = |case: &Case| check(case, 2)["certificates"]["growth_constants"].clone();
+    let [rest, slope] = serde_json::from_value(growth(&Case::square(8))).expect("two numbers");
+    close(rest, 0.0, 1e-12, "the paper's law at rest");
+    close(slope, 10.0, 1e-12, "the slope of the paper's law");
+    // The ends of the jump, and the slopes beside it.
+    assert_eq!(growth(&Case::of("stick_on_a_jump")), serde_json::json!([5.0, 10.0]));
+    let wall = Case::of("rigid_wall");
+    assert!(growth(&wall).is_null());
+    let job = wall.written();
+    launch::run(1, &["check", job.to_str().expect("path")]).expect(0).says(
+        "m_j = 0.0000 Pa s/m, the growth constant is infinite because a contact law ends in a vertical ray: ",
+    );
+    let springs = Case::of("compliant_foundation").set("time.end", "0.05");
+    let results = springs.run(1);
+    assert!(results.summary()["certificates"]["growth_constants"].is_null());
+    let log = results.text("run.log");
+    assert!(log.contains("there is no growth constant because compliance follows the displacement"), "{log}");
+    assert!(growth(&Case::square(8).without("contact")).is_null());
+}
+
+/// The block of `slip_weakening_block`, as good as rigid.
+fn rigid_block() -> Case {
+    Case::of("slip_weakening_block").set("material.viscosity", "{ volumetric = 1e9, shear = 1e9 }")
+}
+
+/// The pressure in Pa at which the step of a rigid block on slip weakening friction has several solutions: one that sliding
+/// and rotating add up to at its bottom, `rho h / (k fall (1 + 3 h^2 / (h^2 + l^2)))`.
+fn bound_of_rigid_block(step: f64) -> f64 {
+    let (density, height, length, fall) = (1000.0, 0.1, 0.4, 0.2 / 0.05);
+    let turning = 3.0 * height * height / (height * height + length * length);
+    density * height / (step * fall * (1.0 + turning))
+}
+
+#[test]
+fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law() {
+    let expected = bound_of_rigid_block(0.01);
+    for ranks in [1, 2] {
+        let unbounded = check(&rigid_block(), ranks);
+        close(
+            certificate(&unbounded, "slip_pressure_bound") / expected,
+            1.0,
+            1e-3,
+            "the pressure of a rigid block",
+        );
+        let words = unbounded["certificates"]["not_covered"][1].as_str().expect("words").to_owned();
+        assert!(
+            words.contains("falls by 4.0000 Pa s/m for each Pa")
+                && words.contains("for given pressures up to 2.12"),
+            "{words}"
+        );
+        // A foundation that never presses with more than 500 Pa.
+        let bounded = rigid_block().set("contact.0.normal", "{ graph = { points = [[0, 0], [1, 500]] } }");
+        let bounded = check(&bounded, ranks);
+        close(
+            certificate(&bounded, "theta_step") * expected / 500.0,
+            1.0,
+            1e-3,
+            "theta of a bounded pressure",
+        );
+        assert_eq!(certificate(&bounded, "monotonicity_constant"), 2000.0);
+        assert!(bounded["certificates"]["slip_pressure_bound"].is_null());
+        assert_eq!(bounded["certificates"]["not_covered"].as_array().map(Vec::len), Some(1));
+    }
+}
+
+#[test]
+fn a_run_is_held_against_the_pressure_that_slip_weakening_is_certified_for() {
+    for (step, beyond) in [("0.01", false), ("0.25", true)] {
+        let case = Case::of("slip_weakening_block").set("time.step", step).set("time.end", "0.5");
+        let results = case.run(2);
+        let bound = results.summary()["certificates"]["slip_pressure_bound"].as_f64().expect("a bound");
+        let most = results.number("max_slip_pressure");
+        assert!((100.0..200.0).contains(&most), "a weight of 100 Pa presses with {most} Pa");
+        assert_eq!(most > bound, beyond, "{most} {bound}");
+        let log = results.text("run.log");
+        assert_eq!(log.contains("warning: the contact pressure reached "), beyond, "{log}");
+    }
+    let tresca =
+        rigid_block().set("contact.0.friction", "{ tresca = { bound = 30 } }").set("time.end", "0.02");
+    assert!(tresca.run(1).summary()["max_slip_pressure"].is_null());
+}
+
 /// Kinetic energy at the last step of a run of 40 steps that accepts whatever stability says.
 fn kinetic_energy_after(step: f64) -> f64 {
     let case = Case::square(8)

@@ -106,3 +106,36 @@ fn a_folder_that_cannot_be_written_is_named() {
     assert_ne!(outcome.code, 0);
     outcome.says("cannot write").says("taken/history.csv");
 }
+
+/// A block that is pulled down the faster the faster it moves, up or down: against a load nothing balances it.
+fn unsolvable() -> Case {
+    Case::of("stick_on_a_jump")
+        .set("contact.0.normal", "{ graph = { points = [[0, 0]], slope_before = 15, slope_after = -15 } }")
+        .set("material.viscosity", "{ volumetric = 0, shear = 1e4 }")
+        .set("traction.0.value", "[0, -1]")
+        .set("time.step", "0.1")
+        .set("solver.accept", "['uniqueness']")
+}
+
+#[test]
+fn a_step_without_solution_fails_and_names_branches_that_come_back() {
+    for ranks in [1, 2] {
+        let failed = unsolvable().run_with(ranks, &[]).expect(1);
+        failed
+            .says("step to t = 1.000000e-1 s (length 1.000e-1 s) failed: ")
+            .says("try a smaller [time] step");
+        // Full steps alone go to and fro between both branches.
+        unsolvable().set("solver.petsc", "{ snes_linesearch_type = 'basic' }").run_with(ranks, &[]).expect(1).says(
+            "failed: too many Newton iterations; Newton's method came back to the branches of the contact graph that it had 2 \
+             iterations before; try a smaller [time] step",
+        );
+    }
+}
+
+#[test]
+fn the_log_counts_linear_systems_that_were_not_positive_definite() {
+    let case = unsolvable().set("contact.0.normal.graph.slope_before", "-15.0").set("time.end", "0.3");
+    let log = case.run(2).text("run.log");
+    let steps: Vec<&str> = log.lines().filter(|line| line.starts_with("step ")).collect();
+    assert!(steps.len() == 3 && steps.iter().all(|step| step.contains("  indefinite ")), "{log}");
+}

@@ -109,7 +109,9 @@ fn the_summary_has_the_keys_of_the_contract() {
         "theta_step",
         "viscosity_modulus",
         "monotonicity_constant",
+        "growth_constants",
         "trace_norm_squared",
+        "slip_pressure_bound",
         "explicit_step_bound",
     ] {
         assert!(certificates.contains_key(key), "{key}");

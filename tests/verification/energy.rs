@@ -4,9 +4,9 @@ use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
 use clarke::{mesh::GlobalMesh, output::history::Totals, session::Session};
 
-const JOBS: u64 = 40;
+const JOBS: u64 = 90;
 /// Random jobs under each implicit scheme.
-const IMPLICIT_JOBS: u64 = 24;
+const IMPLICIT_JOBS: u64 = 60;
 const STEPS: usize = 15;
 /// Within the bound of the explicit parts of every job.
 const STEP: f64 = 0.002;
@@ -33,7 +33,33 @@ impl Draw {
     }
 }
 
-fn material(draw: &mut Draw, dynamic: bool) -> String {
+/// A viscoplastic law; Drucker and Prager's needs three normal stresses.
+fn viscoplasticity(draw: &mut Draw, plane_stress: bool) -> String {
+    let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.0, 0.5));
+    let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
+    let perzyna = |bound: f64, more: &str| {
+        format!(
+            "perzyna = {{ relaxation = {relaxation}, yield_stress = {bound}, metric = \"{metric}\"{more} }}"
+        )
+    };
+    let laws = ["linear", "power", "hardening", "maxwell", "drucker_prager"];
+    let laws = &laws[..if plane_stress { 4 } else { 5 }];
+    match laws[draw.0 as usize % laws.len()] {
+        "power" => perzyna(bound + 0.2, ", exponent = 1.5"),
+        "hardening" => perzyna(bound, &format!(", hardening_modulus = {}", draw.between(0.5, 10.0))),
+        "maxwell" => format!(
+            "maxwell = {{ relaxation_time = {}, volumetric_relaxation_time = 0.3 }}",
+            draw.between(0.05, 1.0)
+        ),
+        "drucker_prager" => format!(
+            "drucker_prager = {{ relaxation = {relaxation}, friction_coefficient = {}, cohesion = {bound} }}",
+            draw.between(0.1, 0.5)
+        ),
+        _ => perzyna(bound, ""),
+    }
+}
+
+fn material(draw: &mut Draw, dynamic: bool, plane_stress: bool) -> String {
     let mut text = String::new();
     if dynamic {
         text += &format!("density = {}\n", draw.between(0.5, 5.0));
@@ -47,18 +73,25 @@ fn material(draw: &mut Draw, dynamic: bool) -> String {
         let (volumetric, shear) = (draw.between(-0.3, 5.0), draw.between(2.0, 20.0));
         text += &format!("viscosity = {{ volumetric = {volumetric}, shear = {shear} }}\n");
     }
-    if elastic && draw.flip() {
-        let (relaxation, bound) = (draw.between(1.0, 10.0), draw.between(0.0, 0.5));
-        let metric = draw.one_of(&["elasticity", "compliance", "frobenius"]);
-        text += &format!(
-            "viscoplasticity.perzyna = {{ relaxation = {relaxation}, yield_stress = {bound}, metric = \"{metric}\" }}\n"
-        );
+    if elastic && draw.between(0.0, 1.0) < 0.7 {
+        text += &format!("viscoplasticity.{}\n", viscoplasticity(draw, plane_stress));
     }
     text
 }
 
-fn contact(draw: &mut Draw) -> String {
-    let law = draw.one_of(&["damped", "graph", "jumps", "wall", "moving wall", "one way", "springs"]);
+fn contact<const D: usize>(draw: &mut Draw) -> String {
+    let laws = [
+        "damped",
+        "graph",
+        "jumps",
+        "wall",
+        "moving wall",
+        "one way",
+        "springs",
+        "rigid plane",
+        "springy sphere",
+    ];
+    let law = draw.one_of(&laws);
     let anywhere = law == "damped" || law == "graph";
     let friction = draw.one_of(&["none", "tresca", "coulomb", "slip weakening"]);
     let quadrature = if anywhere && friction == "none" { draw.one_of(&["nodal", "gauss"]) } else { "nodal" };
@@ -90,6 +123,19 @@ fn contact(draw: &mut Draw) -> String {
         ),
         "wall" => format!("[contact.normal.unilateral]\ngap = {gap}\n"),
         "moving wall" => format!("[contact.normal.unilateral]\ngap = \"{gap} - {high}*t + 0.01*x\"\n"),
+        "rigid plane" => {
+            let (point, normal) = if D == 2 { ("0, ", "0.1, 1") } else { ("0, 0, ", "0.1, 0.05, 1") };
+            format!(
+                "[contact.normal.unilateral]\n[contact.obstacle.plane]\npoint = [{point}\"{high}*t-0.06\"]\nnormal = [{normal}]\n"
+            )
+        }
+        "springy sphere" => {
+            let centre = if D == 2 { "0.5, " } else { "0.5, 0.4, " };
+            format!(
+                "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.sphere]\n\
+                 centre = [{centre}\"{high}*t-0.5\"]\nradius = 0.5\n"
+            )
+        }
         "one way" => "[contact.normal.unilateral]\nbound = \"velocity\"\n".into(),
         _ => {
             let (stiffness, exponent) = (draw.between(10.0, 1000.0), draw.one_of(&["1", "1.5", "2"]));
@@ -124,7 +170,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
     if D == 2 {
         job += &format!("hypothesis = \"{hypothesis}\"\n");
     }
-    job += &material(draw, dynamic);
+    job += &material(draw, dynamic, hypothesis == "plane_stress");
     // Damage and adhesion go with the lagged scheme only.
     let lags = scheme == "lagged_euler";
     let weak = &mut Draw(number + 5000, 0);
@@ -147,12 +193,13 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
         job += &format!("[[body_force]]\nvalue = {along:?}\n");
     }
     if draw.between(0.0, 1.0) < 0.7 {
-        let contact = contact(draw);
+        let contact = contact::<D>(draw);
         let rubs_along_edges = D == 3 && contact.contains("friction");
         if lags
             && !rubs_along_edges
             && !contact.contains("gauss")
             && !contact.contains("gap")
+            && !contact.contains("obstacle")
             && weak.between(0.0, 1.0) < 0.8
         {
             job += &contact.replacen("\"bottom\"", "\"bottom\", \"right\"", 1);
@@ -178,7 +225,7 @@ fn balanced<const D: usize, const S: usize>(
     number: u64,
     (hypothesis, scheme): (&str, &str),
     mesh: &GlobalMesh<D>,
-) -> Totals {
+) -> (Totals, String) {
     let text = job::<D>(number, hypothesis, scheme);
     let mut run = simulation::<D, S>(session, &text, mesh);
     let mut steps = 0;
@@ -196,7 +243,39 @@ fn balanced<const D: usize, const S: usize>(
     }
     assert_eq!(steps, STEPS);
     assert!(run.totals.turnover > 1e-6, "something happens\n{text}");
-    run.totals
+    (run.totals, text)
+}
+
+/// What each scheme must have met, as it stands in jobs, and what the lagged one alone knows.
+const MET: [&str; 20] = [
+    "plane_stress",
+    "density",
+    "viscosity",
+    "metric = \"elasticity\"",
+    "metric = \"compliance\"",
+    "metric = \"frobenius\"",
+    "exponent = 1.5 }",
+    "hardening_modulus",
+    "maxwell",
+    "drucker_prager",
+    "damped_response",
+    "[contact.normal.graph]",
+    "bound = \"velocity\"",
+    "obstacle.plane",
+    "obstacle.sphere",
+    "stiffness = ",
+    "quadrature = \"gauss\"",
+    "tresca",
+    "coulomb",
+    "slip_weakening",
+];
+const MET_BY_THE_LAGGED: [&str; 2] = ["damage", "adhesion"];
+
+fn assert_met(scheme: &str, jobs: &[String], words: &[&str]) {
+    for word in words {
+        let count = jobs.iter().filter(|job| job.contains(word)).count();
+        assert!(count >= 2, "{scheme}: {word} in {count} of {} jobs", jobs.len());
+    }
 }
 
 pub fn random_jobs(session: &Session) {
@@ -208,12 +287,13 @@ pub fn random_jobs(session: &Session) {
         _ => balanced::<3, 6>(session, number, ("", scheme), &space),
     };
     for scheme in ["implicit_euler", "bdf2"] {
-        for number in 0..IMPLICIT_JOBS {
-            run(number, scheme);
-        }
+        let jobs: Vec<String> = (0..IMPLICIT_JOBS).map(|number| run(number, scheme).1).collect();
+        assert_met(scheme, &jobs, &MET);
     }
+    let mut jobs = Vec::new();
     for number in 0..JOBS {
-        let totals = run(number, "lagged_euler");
+        let (totals, job) = run(number, "lagged_euler");
+        jobs.push(job);
         let present = [
             totals.elastic_energy,
             totals.viscous_dissipation,
@@ -225,6 +305,8 @@ pub fn random_jobs(session: &Session) {
         ];
         active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
     }
+    assert_met("lagged_euler", &jobs, &MET);
+    assert_met("lagged_euler", &jobs, &MET_BY_THE_LAGGED);
     let names = ["elastic", "viscous", "viscoplastic", "contact", "external", "damage", "adhesion"];
     for (count, what) in active.into_iter().zip(names) {
         let least = if what == "adhesion" { JOBS / 10 } else { JOBS / 5 };

@@ -54,8 +54,12 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     both.sort_unstable();
     let mut coupled = 0;
     for (law, normal) in laws().into_iter().enumerate() {
-        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction));
-        for (quadrature, friction) in nodal.into_iter().chain([(Quadrature::Gauss, None)]) {
+        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction, true));
+        // Of a fixed point, which holds the pressures that friction follows.
+        let held = FRICTION[2..].iter().map(|friction| (Quadrature::Nodal, *friction, false));
+        for (quadrature, friction, follows) in
+            nodal.into_iter().chain(held).chain([(Quadrature::Gauss, None, true)])
+        {
             let (needs_nodes, smooth) = (
                 normal.depends_on_displacement() || normal.has_vertical_parts(),
                 !normal.has_vertical_parts(),
@@ -78,7 +82,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             if let Some(friction) = friction {
                 contacts[0].add_friction(friction, &body.mesh, &body.fixed).expect("friction");
                 assert!(session.total(contacts[0].friction_point_count()) > 0);
-                contacts[0].set_friction(250.0, true);
+                contacts[0].set_friction(250.0, follows);
             }
             choose_unknowns(&mut contacts, &body.mesh).expect("square corners");
             let mut displacement = vector();
@@ -118,6 +122,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 linear_solver: &mut linear_solver,
                 session,
                 stop_at_cycles: false,
+                equilibrated: false,
                 effort: Effort::default(),
             };
             equations.linearise(&point).expect("linearised");

@@ -11,11 +11,13 @@ mod creep;
 mod damage;
 mod effects;
 mod energy;
+mod indefinite;
 mod jacobian;
 mod manufactured;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
 mod obstacles;
+mod one_cell;
 mod patch;
 mod petsc_boundary;
 mod random_laws;
@@ -52,6 +54,8 @@ fn scenario() {
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),
         "adhesion" => adhesion::all(&session),
+        "one_cell" => one_cell::all(&session),
+        "indefinite" => indefinite::solve(&session),
         "moving_obstacles" => obstacles::moving(&session),
         "impacts" => obstacles::impacts(&session),
         "bounds" => obstacles::bounds(&session),

@@ -208,6 +208,11 @@ impl<const D: usize> Friction<D> {
         self.points.iter().filter(|p| p.tangent.sticks).for_each(|point| point.set(&[0.0; D], values));
     }
 
+    /// Removes from nodal values what moves any point along its tangents.
+    pub fn hold(&self, values: &mut [f64]) {
+        self.points.iter().for_each(|point| point.set(&[0.0; D], values));
+    }
+
     /// Turns a change of velocities into the change of the unknowns, after that was done along the normals.
     pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
         for point in &self.points {
@@ -296,7 +301,7 @@ impl<const D: usize> Friction<D> {
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
-        self.points.iter().map(distance).fold(0.0, f64::max)
+        super::inclusion::worst(self.points.iter().map(distance))
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.

@@ -20,7 +20,9 @@
 mod blend;
 mod bounds;
 mod count;
+mod directions;
 mod friction;
+mod inclusion;
 mod point;
 mod sliding;
 mod tangential_point;
@@ -37,6 +39,7 @@ use friction::Friction;
 use point::{Point, Unknown, gauss_points};
 
 pub use count::{COUNTS, PointCount};
+pub use directions::{ContactNode, contact_nodes};
 pub use unknowns::choose_unknowns;
 
 /// Where on a facet the law holds.
@@ -115,11 +118,6 @@ impl<const D: usize> Contact<D> {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
             point.add_along(point.stretch, nodal);
         }
-    }
-
-    /// Adds the nodal forces of a pressure of 1 Pa; nodal quadrature.
-    pub fn add_unit_pressure(&self, forces: &mut [f64]) {
-        self.points.iter().filter(|_| !self.needs_ghosts).for_each(|point| point.push(1.0, forces));
     }
 
     /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
@@ -277,6 +275,20 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Removes from nodal values what moves any nodal point.
+    pub fn hold(&self, values: &mut [f64]) {
+        for point in &self.points {
+            match point.unknown {
+                Unknown::Parameter => point.add_along(-point.along(values), values),
+                Unknown::Velocity => values[point.node() * D..][..D].fill(0.0),
+                Unknown::Held => {}
+            }
+        }
+        if let Some(friction) = &self.friction {
+            friction.hold(values);
+        }
+    }
+
     /// Turns a change of velocities at owned nodes into the change of the unknowns. `open` holds the forces in N that the
     /// change of velocities leaves open.
     pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
@@ -367,34 +379,5 @@ impl<const D: usize> Contact<D> {
             Ok(point.weight * law.energy(point.normal_component(displacement) - gap))
         };
         self.points.iter().map(energy).sum()
-    }
-
-    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs.
-    pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
-        let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
-            let along = point.normal_component(velocity).abs().max(point.context_velocity());
-            [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
-        });
-        let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
-        [normal[0], normal[1], sliding[0], sliding[1]]
-    }
-
-    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
-    /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own.
-    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
-        // The pressure that would change the velocities by as much as they are counts where there is no other.
-        let sliding = [range[2], range[3]];
-        // So does the velocity that the pressures would change.
-        let range = [range[0].max(range[1] / self.scale), range[1].max(self.scale * range[0])];
-        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
-        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
-        let distance = |p: &Point<D>| {
-            let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
-            self.law.distance(p.normal_component(velocity), pressure, p.context, range)
-        };
-        let normal = free.map(distance).fold(0.0, f64::max);
-        let friction = self.friction.as_ref();
-        friction
-            .map_or(normal, |f| normal.max(f.inclusion_residual(&self.points, velocity, residual, sliding)))
     }
 }

@@ -108,6 +108,11 @@ impl<const D: usize> Point<D> {
         self.nodes[0] as usize
     }
 
+    /// Gives the only node of a nodal point another number.
+    pub fn set_node(&mut self, node: usize) {
+        self.nodes[0] = node as u32;
+    }
+
     /// Nodes and shares.
     pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
         self.nodes[..self.count].iter().map(|&node| node as usize).zip(self.shares)

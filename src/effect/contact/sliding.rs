@@ -72,6 +72,11 @@ impl<const D: usize> Contact<D> {
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 
+    /// The largest contact pressure in Pa at points here, at least 0, in the step just solved.
+    pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
+        self.points.iter().fold(0.0, |most, point| f64::max(most, point.pressure_at(&self.law, velocity)))
+    }
+
     /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.
     pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
         self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))

@@ -1,0 +1,61 @@
+//! The motions of nodes that contact laws see.
+
+use super::{Contact, point::Unknown, tangential_point::span_without};
+use crate::tensor::Vector;
+use std::collections::BTreeMap;
+
+/// A node of contact boundaries with the directions in which their laws act.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactNode<const D: usize> {
+    /// Its number on this rank.
+    pub node: usize,
+    /// Orthonormal directions; in the first `seen` of them laws act.
+    pub frame: [Vector<D>; D],
+    /// How many directions are seen: none where supports hold the node.
+    pub seen: usize,
+}
+
+/// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag a local component.
+pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) -> Vec<ContactNode<D>> {
+    let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
+    for contact in contacts {
+        for point in &contact.points {
+            let seen = match point.unknown {
+                Unknown::Parameter => Some(point.direction),
+                Unknown::Velocity => None,
+                Unknown::Held => Some([0.0; D]),
+            };
+            nodes.entry(point.node()).or_default().push(seen);
+        }
+        let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
+        tangential.for_each(|point| nodes.entry(point.node).or_default().push(None));
+    }
+    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+    let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
+    let frame = |(node, seen): (usize, Vec<Option<Vector<D>>>)| match seen[..] {
+        [Some(direction)] if direction == [0.0; D] => {
+            ContactNode { node, frame: std::array::from_fn(axis), seen: 0 }
+        }
+        [Some(direction)] => {
+            let rest = span_without(&axes, &[direction]).0;
+            let frame = std::array::from_fn(|i| if i == 0 { direction } else { rest[i - 1] });
+            ContactNode { node, frame, seen: 1 }
+        }
+        _ => {
+            let free = |i: &usize| !fixed[node * D + i];
+            let order: Vec<usize> = (0..D).filter(free).chain((0..D).filter(|i| !free(i))).collect();
+            let frame = std::array::from_fn(|i| axis(order[i]));
+            ContactNode { node, frame, seen: (0..D).filter(free).count() }
+        }
+    };
+    nodes.into_iter().map(frame).collect()
+}
+
+impl<const D: usize> Contact<D> {
+    /// Gives the nodes of all points other numbers: those of arrays that hold the nodes of contacts alone, and back.
+    pub fn number_nodes(&mut self, number: impl Fn(usize) -> usize) {
+        self.points.iter_mut().for_each(|point| point.set_node(number(point.node())));
+        let friction = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
+        friction.for_each(|point| point.node = number(point.node));
+    }
+}

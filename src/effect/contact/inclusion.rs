@@ -1,0 +1,47 @@
+//! How far velocities and tractions are off the graphs of the laws.
+
+use super::{
+    Contact,
+    point::{Point, Unknown},
+};
+use crate::contact::NormalLaw;
+
+/// Share of the pressure that would stop a contact boundary, beside which errors of the pressure count at least.
+const STOPPING_SHARE: f64 = 0.01;
+
+/// The largest distance; a distance that is no number is beyond all others.
+pub(super) fn worst(distances: impl Iterator<Item = f64>) -> f64 {
+    distances.fold(0.0, |worst, distance| if distance.is_nan() { f64::INFINITY } else { distance.max(worst) })
+}
+
+impl<const D: usize> Contact<D> {
+    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs.
+    pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
+        let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
+            let along = point.normal_component(velocity).abs().max(point.context_velocity());
+            [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
+        });
+        let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
+        [normal[0], normal[1], sliding[0], sliding[1]]
+    }
+
+    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
+    /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own or a smaller one.
+    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
+        let sliding = [range[2], range[3]];
+        // The velocity that the pressures would change, and the pressure that would change the velocities, count where there
+        // is no other; of the latter a share where the law has a range of its own.
+        let share = if matches!(self.law, NormalLaw::Graph(_)) { STOPPING_SHARE } else { 1.0 };
+        let range = [range[0].max(range[1] / self.scale), range[1].max(share * self.scale * range[0])];
+        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
+        let distance = |p: &Point<D>| {
+            let pressure = p.pressure_at(&self.law, velocity) - p.open_pressure(residual);
+            self.law.distance(p.normal_component(velocity), pressure, p.context, range)
+        };
+        let normal = worst(free.map(distance));
+        let friction = self.friction.as_ref();
+        friction
+            .map_or(normal, |f| normal.max(f.inclusion_residual(&self.points, velocity, residual, sliding)))
+    }
+}

@@ -1,0 +1,411 @@
+use super::{BlockRows, sys};
+use crate::error::{Error, Result};
+use std::{
+    ffi::{c_int, c_void},
+    marker::PhantomData,
+    mem::MaybeUninit,
+    ptr,
+};
+
+/// Cholesky factorisation `L L^T` by CHOLMOD of a matrix that is whole on this rank, with chosen unknowns eliminated last.
+///
+/// A solve comes in two halves, [`forward`](Self::forward) and [`backward`](Self::backward); in between stands what is left
+/// for the last unknowns, and may be replaced. PETSc's own interface to CHOLMOD knows neither halves nor orders.
+#[derive(Debug)]
+pub struct Cholesky {
+    common: Box<sys::cholmod_common>,
+    factor: *mut sys::cholmod_factor,
+    given: *mut sys::cholmod_dense,
+    halfway: *mut sys::cholmod_dense,
+    work: [*mut sys::cholmod_dense; 2],
+    block: usize,
+    /// The unknown at each place of the order of elimination.
+    order: Vec<u32>,
+    last: usize,
+    not_send: PhantomData<*mut ()>,
+}
+
+/// Nodes from which on nested dissection leaves less to factor than minimum degree.
+const DISSECTED: usize = 2_000;
+
+impl Cholesky {
+    /// Analyses the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
+    /// can't be: the rest does not tie them together.
+    pub fn new(block: usize, rows: &BlockRows, last: &[usize], known: Option<&[u32]>) -> Result<Option<Self>> {
+        let size = (rows.offsets.len() - 1) * block;
+        let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
+        // SAFETY: CHOLMOD fills the struct, which stays in its box.
+        let common = unsafe {
+            sys::cholmod_start(common.as_mut_ptr());
+            let mut common = Box::from_raw(Box::into_raw(common).cast::<sys::cholmod_common>());
+            common.print = 0;
+            common.supernodal = sys::CHOLMOD_SUPERNODAL as c_int;
+            common.nmethods = 1;
+            common.method[0].ordering = sys::CHOLMOD_GIVEN as c_int;
+            common
+        };
+        let mut cholesky = Self {
+            common,
+            factor: ptr::null_mut(),
+            given: ptr::null_mut(),
+            halfway: ptr::null_mut(),
+            work: [ptr::null_mut(); 2],
+            block,
+            order: Vec::new(),
+            last: last.len(),
+            not_send: PhantomData,
+        };
+        let mut is_last = vec![false; size];
+        last.iter().for_each(|&unknown| is_last[unknown] = true);
+        let mut order: Vec<c_int> = match known {
+            Some(order) => order.iter().map(|&unknown| unknown as c_int).collect(),
+            None => {
+                let nodes = cholesky.node_order(rows)?.into_iter().map(|node| node as usize);
+                let unknowns = nodes.flat_map(|node| (0..block).map(move |i| node * block + i));
+                let first = unknowns.filter(|&unknown| !is_last[unknown]);
+                first.chain(last.iter().copied()).map(|unknown| unknown as c_int).collect()
+            }
+        };
+        let mut lower = Lower::of(block, rows)?;
+        let mut matrix = lower.view();
+        // SAFETY: the view lives for the call, the order has as many entries as the matrix rows; the handle owns the factor.
+        unsafe {
+            cholesky.factor = sys::cholmod_analyze_p(
+                &mut matrix,
+                order.as_mut_ptr(),
+                ptr::null_mut(),
+                0,
+                &mut *cholesky.common,
+            );
+            cholesky.check()?;
+            let found = std::slice::from_raw_parts((*cholesky.factor).Perm.cast::<c_int>(), size);
+            cholesky.order = found.iter().map(|&unknown| unknown as u32).collect();
+            cholesky.given = sys::cholmod_allocate_dense(
+                size,
+                1,
+                size,
+                sys::CHOLMOD_REAL as c_int,
+                &mut *cholesky.common,
+            );
+        }
+        cholesky.check()?;
+        let tail = &cholesky.order[size - last.len()..];
+        Ok(tail.iter().all(|&unknown| is_last[unknown as usize]).then_some(cholesky))
+    }
+
+    /// Nodes in an order that leaves little to factor.
+    fn node_order(&mut self, rows: &BlockRows) -> Result<Vec<c_int>> {
+        let nodes = rows.offsets.len() - 1;
+        let (mut starts, mut indices) = (vec![0 as c_int], Vec::new());
+        for (row, range) in rows.offsets.windows(2).enumerate() {
+            let below = rows.columns[range[0]..range[1]].iter().filter(|&&column| column as usize >= row);
+            indices.extend(below.map(|&column| column as c_int));
+            starts.push(indices.len() as c_int);
+        }
+        let mut order = vec![0 as c_int; nodes];
+        let mut pattern = view(nodes, &mut starts, &mut indices, None);
+        let common = &mut *self.common;
+        // SAFETY: the view lives for the call; the order has one entry a node.
+        unsafe {
+            if nodes < DISSECTED {
+                sys::cholmod_amd(&mut pattern, ptr::null_mut(), 0, order.as_mut_ptr(), common);
+            } else {
+                sys::cholmod_metis(&mut pattern, ptr::null_mut(), 0, 1, order.as_mut_ptr(), common);
+            }
+        }
+        self.check()?;
+        Ok(order)
+    }
+
+    /// Factors a matrix of the pattern that was analysed.
+    pub fn factor(&mut self, rows: &BlockRows) -> Result<()> {
+        let mut lower = Lower::of(self.block, rows)?;
+        let mut matrix = lower.view();
+        // SAFETY: a live factor of this pattern; the view lives for the call.
+        unsafe { sys::cholmod_factorize(&mut matrix, self.factor, &mut *self.common) };
+        if self.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
+            return Err(Error::Failed(
+                "the matrix of the step is not positive definite: check densities, viscosities and moduli".into(),
+            ));
+        }
+        self.check()
+    }
+
+    /// Takes a right-hand side half through: `L y = b`.
+    pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
+        let order = &self.order;
+        // SAFETY: the handle owns as many numbers as unknowns there.
+        let given = unsafe { std::slice::from_raw_parts_mut((*self.given).x.cast::<f64>(), order.len()) };
+        given.iter_mut().zip(order).for_each(|(value, &at)| *value = right_hand_side[at as usize]);
+        self.half(sys::CHOLMOD_L as c_int, true)
+    }
+
+    /// The part of `y` of the last unknowns, in the order of [`last_unknowns`](Self::last_unknowns).
+    pub fn last_mut(&mut self) -> &mut [f64] {
+        let (first, last) = (self.order.len() - self.last, self.last);
+        if self.halfway.is_null() {
+            return &mut [];
+        }
+        // SAFETY: the handle owns as many numbers as unknowns there, once a solve went half through.
+        unsafe { std::slice::from_raw_parts_mut((*self.halfway).x.cast::<f64>().add(first), last) }
+    }
+
+    /// The order of elimination.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The last unknowns in the order in which they are eliminated.
+    pub fn last_unknowns(&self) -> &[u32] {
+        &self.order[self.order.len() - self.last..]
+    }
+
+    /// Takes `y` the other half of the way: `L^T x = y`.
+    pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
+        self.half(sys::CHOLMOD_Lt as c_int, false)?;
+        // SAFETY: as in `forward`.
+        let found =
+            unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), self.order.len()) };
+        self.order.iter().zip(found).for_each(|(&at, value)| solution[at as usize] = *value);
+        Ok(())
+    }
+
+    fn half(&mut self, system: c_int, forward: bool) -> Result<()> {
+        let [work, more] = &mut self.work;
+        let (from, to) =
+            if forward { (self.given, &mut self.halfway) } else { (self.halfway, &mut self.given) };
+        // SAFETY: live factor and vectors of its size; CHOLMOD allocates what is missing, the handle owns it.
+        unsafe {
+            sys::cholmod_solve2(
+                system,
+                self.factor,
+                from,
+                ptr::null_mut(),
+                to,
+                ptr::null_mut(),
+                work,
+                more,
+                &mut *self.common,
+            )
+        };
+        self.check()
+    }
+
+    /// The block of `L` of the last unknowns, whose product with its transpose is their Schur complement: column after
+    /// column, each from its diagonal down.
+    pub fn last_factor(&self) -> Vec<f64> {
+        let (size, last) = (self.order.len(), self.last);
+        let first = size - last;
+        let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
+        let mut columns = vec![0.0; last * (last + 1) / 2];
+        // SAFETY: a numeric supernodal factor; the lengths of its arrays are those that CHOLMOD documents.
+        unsafe {
+            let factor = &*self.factor;
+            let list = |pointer: *mut c_void, length: usize| {
+                std::slice::from_raw_parts(pointer.cast::<c_int>(), length)
+            };
+            let nodes = list(factor.super_, factor.nsuper + 1);
+            let (rows_at, values_at) =
+                (list(factor.pi, factor.nsuper + 1), list(factor.px, factor.nsuper + 1));
+            let rows = list(factor.s, factor.ssize);
+            let values = std::slice::from_raw_parts(factor.x.cast::<f64>(), factor.xsize);
+            for node in (0..factor.nsuper).rev() {
+                let own = nodes[node] as usize..nodes[node + 1] as usize;
+                if own.end <= first {
+                    break;
+                }
+                let rows = &rows[rows_at[node] as usize..rows_at[node + 1] as usize];
+                for column in own.clone().filter(|&column| column >= first) {
+                    let values = &values[values_at[node] as usize + (column - own.start) * rows.len()..];
+                    let at = start(column - first);
+                    for (&row, &value) in rows.iter().zip(values).filter(|(row, _)| **row as usize >= column)
+                    {
+                        columns[at + row as usize - column] = value;
+                    }
+                }
+            }
+        }
+        columns
+    }
+
+    fn check(&self) -> Result<()> {
+        match self.common.status {
+            status if status >= 0 => Ok(()),
+            status if status == sys::CHOLMOD_OUT_OF_MEMORY => Err(Error::Failed(
+                "not enough memory for the factors: use [solver] preconditioner = \"gamg\", or more memory".into(),
+            )),
+            status if status == sys::CHOLMOD_TOO_LARGE => Err(Error::Failed(
+                "the factors are too large for CHOLMOD's indices: use [solver] preconditioner = \"gamg\"".into(),
+            )),
+            status => Err(Error::Internal(format!("CHOLMOD error {status}"))),
+        }
+    }
+}
+
+impl Drop for Cholesky {
+    fn drop(&mut self) {
+        let common = &mut *self.common;
+        // SAFETY: the handle owns all of these; CHOLMOD takes null pointers.
+        unsafe {
+            for dense in self.work.iter_mut().chain([&mut self.given, &mut self.halfway]) {
+                sys::cholmod_free_dense(dense, common);
+            }
+            sys::cholmod_free_factor(&mut self.factor, common);
+            sys::cholmod_finish(common);
+        }
+    }
+}
+
+/// The lower half of a matrix by columns.
+struct Lower {
+    starts: Vec<c_int>,
+    indices: Vec<c_int>,
+    values: Vec<f64>,
+}
+
+impl Lower {
+    /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on.
+    fn of(block: usize, rows: &BlockRows) -> Result<Self> {
+        let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
+        let too_many = |_| {
+            Error::Refused(format!(
+                "{entries} matrix entries are more than CHOLMOD can count: use [solver] preconditioner = \"gamg\""
+            ))
+        };
+        c_int::try_from(entries).map_err(too_many)?;
+        let mut lower = Self {
+            starts: Vec::with_capacity((rows.offsets.len() - 1) * block + 1),
+            indices: Vec::with_capacity(entries),
+            values: Vec::with_capacity(entries),
+        };
+        lower.starts.push(0);
+        for (node, range) in rows.offsets.windows(2).enumerate() {
+            for i in 0..block {
+                let row = node * block + i;
+                for at in range[0]..range[1] {
+                    let first = rows.columns[at] as usize * block;
+                    for j in (0..block).filter(|j| first + j >= row) {
+                        lower.indices.push((first + j) as c_int);
+                        lower.values.push(rows.values[(at * block + i) * block + j]);
+                    }
+                }
+                lower.starts.push(lower.indices.len() as c_int);
+            }
+        }
+        Ok(lower)
+    }
+
+    fn view(&mut self) -> sys::cholmod_sparse {
+        view(self.starts.len() - 1, &mut self.starts, &mut self.indices, Some(&mut self.values))
+    }
+}
+
+/// CHOLMOD's view of the lower half of a symmetric matrix; it must not outlive the arrays.
+fn view(
+    size: usize,
+    starts: &mut [c_int],
+    indices: &mut [c_int],
+    values: Option<&mut [f64]>,
+) -> sys::cholmod_sparse {
+    let kind = if values.is_some() { sys::CHOLMOD_REAL } else { sys::CHOLMOD_PATTERN };
+    sys::cholmod_sparse {
+        nrow: size,
+        ncol: size,
+        nzmax: indices.len(),
+        p: starts.as_mut_ptr().cast(),
+        i: indices.as_mut_ptr().cast(),
+        nz: ptr::null_mut(),
+        x: values.map_or(ptr::null_mut(), |values| values.as_mut_ptr().cast()),
+        z: ptr::null_mut(),
+        stype: -1,
+        itype: sys::CHOLMOD_INT as c_int,
+        xtype: kind as c_int,
+        dtype: sys::CHOLMOD_DOUBLE as c_int,
+        sorted: 1,
+        packed: 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of masses between springs, the last one held by one: 2 on the diagonal, -1 beside it.
+    fn chain(length: usize) -> BlockRows {
+        let mut rows = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        for i in 0..length {
+            for j in i.saturating_sub(1)..(i + 2).min(length) {
+                rows.columns.push(j as u32);
+                rows.values.push(if i == j { 2.0 } else { -1.0 });
+            }
+            rows.offsets.push(rows.columns.len());
+        }
+        rows
+    }
+
+    fn solve(cholesky: &mut Cholesky, b: &[f64]) -> Vec<f64> {
+        let mut x = vec![0.0; b.len()];
+        cholesky.forward(b).unwrap();
+        cholesky.backward(&mut x).unwrap();
+        x
+    }
+
+    #[test]
+    fn both_halves_together_solve() {
+        let rows = chain(5);
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
+        cholesky.factor(&rows).unwrap();
+        // A parabola has the second difference 2.
+        let x = solve(&mut cholesky, &[2.0; 5]);
+        for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
+            assert!((found - known).abs() < 1e-13, "{x:?}");
+        }
+    }
+
+    #[test]
+    fn the_last_block_is_the_factor_of_the_schur_complement() {
+        let rows = chain(3);
+        let mut cholesky = Cholesky::new(1, &rows, &[0, 2], None).unwrap().unwrap();
+        cholesky.factor(&rows).unwrap();
+        // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
+        let l = cholesky.last_factor();
+        let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
+        for (found, known) in schur.iter().zip([1.5, -0.5, 1.5]) {
+            assert!((found - known).abs() < 1e-14, "{schur:?}");
+        }
+    }
+
+    #[test]
+    fn a_value_set_halfway_is_that_of_the_last_unknown() {
+        let rows = chain(3);
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
+        cholesky.factor(&rows).unwrap();
+        cholesky.forward(&[0.0; 3]).unwrap();
+        let along = cholesky.last_factor()[0];
+        cholesky.last_mut()[0] = 3.0 * along;
+        let mut x = [0.0; 3];
+        cholesky.backward(&mut x).unwrap();
+        for (found, known) in x.iter().zip([1.0, 2.0, 3.0]) {
+            assert!((found - known).abs() < 1e-14, "{x:?}");
+        }
+    }
+
+    #[test]
+    fn unknowns_that_the_rest_does_not_tie_together_cant_all_be_last() {
+        let rows = BlockRows {
+            offsets: vec![0, 2, 4, 6, 8],
+            columns: vec![0, 1, 0, 1, 2, 3, 2, 3],
+            values: vec![2.0, -1.0, -1.0, 2.0, 2.0, -1.0, -1.0, 2.0],
+        };
+        let both = Cholesky::new(1, &rows, &[1, 3], None).unwrap();
+        assert!(both.is_none_or(|cholesky| cholesky.last_unknowns().iter().all(|u| [1, 3].contains(u))));
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_an_error_in_words() {
+        let mut rows = chain(3);
+        rows.values[0] = -2.0;
+        let mut cholesky = Cholesky::new(1, &rows, &[1], None).unwrap().unwrap();
+        assert!(cholesky.factor(&rows).unwrap_err().to_string().contains("not positive definite"));
+    }
+}
