@@ -35,11 +35,23 @@ struct Step {
     power: f64,
 }
 
-/// What `m` and `eta` give, with derivatives by `m`, `eta` and the three components of `s*`.
-struct Values {
+/// What `m` and `eta` give.
+struct Point {
+    /// `s` and `t`.
+    stress: [f64; 3],
     projected: [f64; 3],
+    /// `|t|`, `|s|` and `|s| - |t|`.
+    projected_norm: f64,
+    norm: f64,
+    overstress: f64,
+    /// `s:(s - t)` and `dp`.
+    product: f64,
     growth: f64,
-    /// `|t|`, `|s| - |t|` and `dp` by each variable.
+}
+
+/// The same with derivatives by `m`, `eta` and the three components of `s*`.
+struct Values {
+    growth: f64,
     projected_norm: f64,
     overstress: f64,
     by_projected_norm: [f64; 5],
@@ -75,9 +87,13 @@ pub(super) fn flow<const S: usize>(
         (flow, 0.0, std::array::from_fn(diagonal))
     } else {
         let (multiplier, eta) = step.solve(norm);
-        let found = step.values(multiplier, eta);
+        let found = step.point(multiplier, eta);
         let flow = std::array::from_fn(|i| eta * step.compliance[i] * multiplier * found.projected[i]);
-        let derivative = if tangent.is_some() { step.derivative(eta, &found) } else { [[0.0; 3]; 3] };
+        let derivative = if tangent.is_some() {
+            step.derivative(eta, &step.values(multiplier, eta))
+        } else {
+            [[0.0; 3]; 3]
+        };
         (flow, found.growth, derivative)
     };
     if let Some(tangent) = tangent {
@@ -128,6 +144,18 @@ impl Step {
         let norm = (0..3).map(|i| WEIGHTS[i] * self.trial[i] * self.trial[i]).sum::<f64>().sqrt();
         let start =
             if self.yield_stress > 0.0 { (norm / self.yield_stress - 1.0) / largest } else { 1.0 / largest };
+        if self.hardening == 0.0 {
+            let factors = [0, 1, 2].map(effective);
+            return increasing_root(0.0, f64::INFINITY, start, |m| {
+                let shares = factors.map(|factor| 1.0 / (1.0 + factor * m));
+                let squares: [f64; 3] =
+                    std::array::from_fn(|i| WEIGHTS[i] * (self.trial[i] * shares[i]).powi(2));
+                let square: f64 = squares.iter().sum();
+                let fall: f64 = (0..3).map(|i| squares[i] * factors[i] * shares[i]).sum();
+                let ratio = self.yield_stress / square.sqrt();
+                [ratio - 1.0, ratio * fall / square]
+            });
+        }
         increasing_root(0.0, f64::INFINITY, start, |multiplier| {
             let values = self.values(multiplier, eta);
             let y = self.yield_stress + self.hardening * values.growth;
@@ -137,32 +165,37 @@ impl Step {
         })
     }
 
+    fn point(&self, multiplier: f64, eta: f64) -> Point {
+        let gain = self.compliance.map(|a| a * multiplier);
+        let projected: [f64; 3] =
+            std::array::from_fn(|i| self.trial[i] / (1.0 + gain[i] * (1.0 + eta * self.stiffness[i])));
+        let stress = std::array::from_fn(|i| (1.0 + gain[i]) * projected[i]);
+        let squares: [f64; 3] = std::array::from_fn(|i| WEIGHTS[i] * projected[i] * projected[i]);
+        let square: f64 = squares.iter().sum();
+        let beyond: f64 = (0..3).map(|i| squares[i] * gain[i] * (2.0 + gain[i])).sum();
+        let (projected_norm, norm) = (square.sqrt(), (square + beyond).sqrt());
+        let product: f64 = (0..3).map(|i| stress[i] * projected[i] * gain[i]).sum();
+        let overstress = beyond / (norm + projected_norm);
+        Point { stress, projected, projected_norm, norm, overstress, product, growth: eta * product / norm }
+    }
+
     fn values(&self, multiplier: f64, eta: f64) -> Values {
-        let (mut stress, mut projected) = ([0.0; 3], [0.0; 3]);
+        let Point { stress, projected, projected_norm, norm, overstress, product, growth } =
+            self.point(multiplier, eta);
         let (mut by_stress, mut by_projected) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
-        for i in 0..3 {
-            let (a, e, s) = (self.compliance[i], self.stiffness[i], self.trial[i]);
+        for (i, t) in projected.into_iter().enumerate() {
+            let (a, e) = (self.compliance[i], self.stiffness[i]);
             let below = 1.0 + a * multiplier * (1.0 + eta * e);
             let above = 1.0 + a * multiplier;
-            let t = s / below;
-            (stress[i], projected[i]) = (above * t, t);
             by_projected[i] =
                 [-t * a * (1.0 + eta * e) / below, -t * a * multiplier * e / below, 1.0 / below];
             by_stress[i] = [-t * a * eta * e / below, -above * t * a * multiplier * e / below, above / below];
         }
-        let square: f64 = (0..3).map(|i| WEIGHTS[i] * projected[i] * projected[i]).sum();
-        let projected_norm = square.sqrt();
         let gain = |i: usize| self.compliance[i] * multiplier;
-        let beyond: f64 =
-            (0..3).map(|i| WEIGHTS[i] * projected[i] * projected[i] * gain(i) * (2.0 + gain(i))).sum();
-        let norm = (square + beyond).sqrt();
-        let product: f64 = (0..3).map(|i| stress[i] * projected[i] * gain(i)).sum();
-        let growth = eta * product / norm;
         let mut values = Values {
-            projected,
             growth,
             projected_norm,
-            overstress: beyond / (norm + projected_norm),
+            overstress,
             by_projected_norm: [0.0; 5],
             by_norm: [0.0; 5],
             by_growth: [0.0; 5],
