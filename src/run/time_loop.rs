@@ -3,7 +3,7 @@
 use super::{
     Clock, Inventory, Scene, Start, build,
     deadline::Deadline,
-    folder::{prepare_folder, refuse_foreign},
+    folder::{claim_folder, prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
     restored::restore,
     setup::{Setup, setup},
@@ -43,15 +43,11 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
+    let mut log = Log::new(session.is_first(), clock.on_terminal);
+    session.agree(claim_folder(folder, &mut log))?;
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
     let restored = session.agree(restored)?;
-    let mut log = Log::new(session.is_first(), clock.on_terminal);
-    let prepared = if session.is_first() {
-        prepare_folder(folder, goes_on, &mut log).and_then(|()| log.open(&folder.join("run.log"), goes_on))
-    } else {
-        Ok(())
-    };
-    session.agree(prepared)?;
+    session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {
         restored.words.iter().for_each(|words| log.line(words));
     }
