@@ -6,6 +6,7 @@
 //! | `theta_step` | the same over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
+//! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; there if something flows | below it errors don't grow, however much flows: elastic and viscoplastic stress of the step before add up (exact without inertia, where all flows) |
 //!
 //! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
 //! which nothing flows.
@@ -69,6 +70,9 @@ pub struct Certificates {
     pub slip_pressure_bound: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
+    /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
+    #[serde(skip)]
+    pub flowing_step_bound: Option<f64>,
     /// What `theta` and `theta_step` say nothing of, in words; absent if there is nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_covered: Vec<String>,
@@ -110,7 +114,9 @@ impl Certificates {
         known.not_covered = not_covered(&body.contacts, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let waves = 1.0 / find(Kind::ExplicitStep)?;
-            known.explicit_step_bound = Some(body.flow_step_bound().map_or(waves, |flow| waves.min(flow)));
+            let flow = body.flow_step_bound();
+            known.explicit_step_bound = Some(flow.map_or(waves, |flow| waves.min(flow)));
+            known.flowing_step_bound = flow.map(|flow| 1.0 / (1.0 / waves + 1.0 / flow));
         }
         Ok(known)
     }

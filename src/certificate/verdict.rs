@@ -37,12 +37,13 @@ impl Certificates {
                 "below 1: the continuous problem has one solution"
             } else {
                 verdict.warnings.push(format!(
-                    "theta = {theta:.4} is not below 1: the continuous problem may have several solutions; more \
-                     viscosity or a contact law that falls less steeply would exclude that"
+                    "theta = {} is not below 1: the continuous problem may have several solutions; more \
+                     viscosity or a contact law that falls less steeply would exclude that",
+                    short(theta)
                 ));
                 "not below 1: the continuous problem may have several solutions"
             };
-            verdict.words.push(format!("theta = {theta:.4}, {meaning}{covered}"));
+            verdict.words.push(format!("theta = {}, {meaning}{covered}", short(theta)));
         }
         if let (Some(modulus), Some(fall), Some(trace)) =
             (self.viscosity_modulus, self.monotonicity_constant, self.trace_norm_squared)
@@ -64,6 +65,13 @@ impl Certificates {
         }
         if let Some(bound) = self.explicit_step_bound {
             verdict.stability(bound, step, accepted.explicit_stability);
+            if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
+            {
+                verdict.warnings.push(format!(
+                    "the step of {step} s is beyond {flowing:.4e} s: errors may grow where most of the body flows; a step below \
+                     {flowing:.4e} s or an implicit scheme would exclude that"
+                ));
+            }
         }
         verdict
     }
@@ -84,7 +92,8 @@ impl Verdict {
     /// For a `theta` of a step that is not below 1.
     fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
         let found = format!(
-            "theta of a step = {theta:.4} is not below 1: a step of {step} s may have several solutions"
+            "theta of a step = {} is not below 1: a step of {step} s may have several solutions",
+            short(theta)
         );
         self.words.push(found.clone());
         let largest = unique_step.map_or_else(
@@ -124,6 +133,11 @@ impl Verdict {
     }
 }
 
+/// Four decimals, of large numbers four digits.
+fn short(number: f64) -> String {
+    if number < 1e6 { format!("{number:.4}") } else { format!("{number:.3e}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,6 +153,7 @@ mod tests {
             trace_norm_squared: Some(2.24),
             slip_pressure_bound: None,
             explicit_step_bound: Some(0.12),
+            flowing_step_bound: Some(0.08),
             not_covered: Vec::new(),
         }
     }
@@ -172,6 +187,13 @@ mod tests {
         let known = Certificates { theta: Some(1.5), ..paper() };
         let verdict = known.verdict(1.0 / 64.0, None, Accepted::default());
         assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
+    }
+
+    #[test]
+    fn a_step_that_is_stable_while_little_flows_is_warned_of() {
+        let verdict = paper().verdict(0.1, None, Accepted::default());
+        assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("beyond 8.0000e-2 s"));
+        assert!(paper().verdict(0.079, None, Accepted::default()).warnings.is_empty());
     }
 
     #[test]

@@ -45,6 +45,9 @@ pub struct Perzyna {
     pub metric: Metric,
 }
 
+/// Share of the stress below which a yield stress counts as none in plane stress: squares of their ratio would overflow.
+pub(super) const NO_YIELD_STRESS: f64 = 1e-100;
+
 impl Perzyna {
     /// `(f / yield stress)^(n - 1) (s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s: zero inside the yield surface.
     ///
@@ -96,7 +99,7 @@ impl Perzyna {
     }
 
     fn project_plane_stress<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
-        if self.yield_stress == 0.0 {
+        if self.yield_stress <= NO_YIELD_STRESS * norm {
             return [0.0; S];
         }
         let p = (s[0] + s[1]) * FRAC_1_SQRT_2;

@@ -41,6 +41,8 @@ pub struct Totals {
     pub external_work: f64,
     /// Dissipated by the scheme: what the exact terms of its time discretisation took out.
     pub numerical_dissipation: f64,
+    /// Energy that was there at first or came in since: work of loads and of moving obstacles, without signs.
+    pub supplied: f64,
     /// Largest amount of energy seen in any of these, the scale of the imbalance.
     pub turnover: f64,
     /// Imbalance of the last step over the turnover.
@@ -67,7 +69,16 @@ impl Totals {
         let contact_energy = energy.stored_in_contact;
         let adhesion_energy = energy.stored_in_bonds;
         let turnover = kinetic_energy + elastic_energy + contact_energy + adhesion_energy;
-        Self { kinetic_energy, elastic_energy, contact_energy, adhesion_energy, turnover, ..Self::default() }
+        let supplied = turnover;
+        Self {
+            kinetic_energy,
+            elastic_energy,
+            contact_energy,
+            adhesion_energy,
+            supplied,
+            turnover,
+            ..Self::default()
+        }
     }
 
     /// Takes a step in.
@@ -92,6 +103,7 @@ impl Totals {
         self.adhesion_dissipation += energy.debonding;
         self.external_work += energy.work;
         self.numerical_dissipation -= energy.numerical;
+        self.supplied += energy.work.abs() + (-energy.contact).max(0.0);
         let sizes = [
             self.kinetic_energy,
             self.elastic_energy,
@@ -110,6 +122,14 @@ impl Totals {
         self.max_inclusion_residual = self.max_inclusion_residual.max(outcome.inclusion_residual);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
+    }
+}
+
+impl Totals {
+    /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
+    pub fn made_by_scheme(&self) -> f64 {
+        let made = (-self.numerical_dissipation).max(0.0);
+        if made > 0.0 { made / self.supplied } else { 0.0 }
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
-    fs::{File, OpenOptions},
+    fs::{File, OpenOptions, TryLockError},
     io::{IsTerminal, Write},
     path::Path,
 };
@@ -23,19 +23,31 @@ impl Log {
         Self { speaks, on_terminal, file: None, bar: None }
     }
 
-    /// Also writes to this file, behind what it holds if the run goes on.
-    pub fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
-        if self.speaks {
-            let mut options = OpenOptions::new();
-            options.create(true);
-            if goes_on {
-                options.append(true)
-            } else {
-                options.write(true).truncate(true)
-            };
-            self.file = Some(options.open(path).map_err(|e| Error::unwritable(path, e))?);
+    /// Takes this file for the run alone, as long as the log lives; one that is not there is made if `create` says so.
+    ///
+    /// The system frees the lock of a process that was killed. Where files can't be locked, all runs are let in.
+    pub fn claim(&mut self, path: &Path, create: bool) -> Result<()> {
+        if !self.speaks || self.file.is_some() || !(create || path.exists()) {
+            return Ok(());
         }
+        let file = OpenOptions::new().create(create).append(true).open(path);
+        let file = file.map_err(|e| Error::unwritable(path, e))?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Error::Refused(format!(
+                "{}: another run is writing into this folder; wait for its end, or choose another [output] folder",
+                path.parent().unwrap_or(path).display()
+            )));
+        }
+        self.file = Some(file);
         Ok(())
+    }
+
+    /// Writes to the file from now on, behind what it holds if the run goes on.
+    pub fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
+        match &self.file {
+            Some(file) if !goes_on => file.set_len(0).map_err(|e| Error::unwritable(path, e)),
+            _ => Ok(()),
+        }
     }
 
     /// Writes lines.

@@ -8,6 +8,9 @@ use crate::{
 };
 use std::path::Path;
 
+/// The file that every run writes, and locks while it does.
+const LOG: &str = "run.log";
+
 /// Keys of another job that a refusal names; the rest is only counted.
 const SHOWN: usize = 8;
 
@@ -31,7 +34,7 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let Ok(there) = Job::from_text(&text, "job.toml", folder, &[]).map(|loaded| loaded.job) else {
         return refuse("the folder holds results of a job that can't be read any more (its job.toml)".into());
     };
-    if !folder.join("run.log").exists() && there.to_toml()? != text {
+    if !folder.join(LOG).exists() && there.to_toml()? != text {
         return refuse(
             "the folder holds a job.toml that no run has written, and that would be replaced".into(),
         );
@@ -52,9 +55,18 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     ))
 }
 
-/// Makes the output folder; a new start removes the checkpoints of an earlier run. On one rank.
+/// Takes a folder that is there for this run alone. On one rank, before anything of it is read.
+pub(super) fn claim_folder(folder: &Path, log: &mut Log) -> Result<()> {
+    log.claim(&folder.join(LOG), false)
+}
+
+/// Makes the output folder, takes it for this run alone and opens the log; a new start removes the checkpoints of an
+/// earlier run. On one rank.
 pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
+    let file = folder.join(LOG);
+    log.claim(&file, true)?;
+    log.open(&file, goes_on)?;
     if !goes_on {
         for (_, path) in list(folder)? {
             std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;

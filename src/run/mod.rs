@@ -8,6 +8,7 @@ mod folder;
 mod header;
 mod inventory;
 mod outputs;
+mod restored;
 mod scene;
 mod setup;
 mod simulation;

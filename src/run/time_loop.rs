@@ -3,8 +3,9 @@
 use super::{
     Clock, Inventory, Scene, Start, build,
     deadline::Deadline,
-    folder::{prepare_folder, refuse_foreign},
+    folder::{claim_folder, prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
+    restored::restore,
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
     summary::{PartitionQuality, Summary, peak_memory},
@@ -13,24 +14,20 @@ use crate::{
     body::Body,
     certificate::Certificates,
     error::{Error, Exit, Result},
-    job::{Every, Job, Loaded},
-    output::{
-        checkpoint::{self, Identity},
-        checkpoint_folder::list,
-        history::Totals,
-        log::Log,
-    },
+    job::{Accept, Every, Job, Loaded},
+    output::{checkpoint::Identity, history::Totals, log::Log},
     session::Session,
     state::State,
     stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
 };
-use std::{
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 /// Runs of more steps than this log only every so many, to keep logs readable.
 const LOGGED_STEPS: u64 = 1000;
+
+/// How many times the energy that was put in an explicit scheme may make by itself. In stable steps that dissipate, it makes
+/// `q / (1 - q)` times as much at most, at the share `q` of the bound.
+const MOST_MADE: f64 = 1e4;
 
 /// Sets the problem up on all ranks and runs it. Collective.
 pub(super) fn run<const D: usize, const S: usize>(
@@ -46,15 +43,11 @@ pub(super) fn run<const D: usize, const S: usize>(
     let folder = job.output_folder();
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
+    let mut log = Log::new(session.is_first(), clock.on_terminal);
+    session.agree(claim_folder(folder, &mut log))?;
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
     let restored = session.agree(restored)?;
-    let mut log = Log::new(session.is_first(), clock.on_terminal);
-    let prepared = if session.is_first() {
-        prepare_folder(folder, goes_on, &mut log).and_then(|()| log.open(&folder.join("run.log"), goes_on))
-    } else {
-        Ok(())
-    };
-    session.agree(prepared)?;
+    session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {
         restored.words.iter().for_each(|words| log.line(words));
     }
@@ -93,48 +86,6 @@ pub(super) fn run<const D: usize, const S: usize>(
     };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
-}
-
-/// Where a restarted run comes from.
-struct Restored {
-    file: String,
-    totals: Totals,
-    /// What the log says about it.
-    words: Vec<String>,
-}
-
-/// Puts the checkpoint that `start` asks for into the state. Collective.
-fn restore<const D: usize, const S: usize>(
-    session: &Session,
-    start: &Start,
-    folder: &Path,
-    identity: &Identity,
-    body: &mut Body<D, S>,
-    state: &mut State,
-) -> Result<Option<Restored>> {
-    let candidates = match start {
-        Start::Anew | Start::Over => return Ok(None),
-        Start::From(path) => vec![path.clone()],
-        Start::Newest => session.agree(list(folder))?.into_iter().map(|(_, path)| path).collect(),
-    };
-    let mut faults = Vec::new();
-    for path in &candidates {
-        match checkpoint::restore(session, path, identity, body, state) {
-            Ok(header) => {
-                let file = path.display().to_string();
-                let mut words: Vec<String> = faults.iter().map(|fault| format!("warning: {fault}")).collect();
-                words.push(format!("going on from {file} (step {}, t = {} s)", header.step, header.time));
-                return Ok(Some(Restored { file, totals: header.totals, words }));
-            }
-            Err(error) if error.exit() == Exit::Refused => return Err(error),
-            Err(error) => faults.push(error.to_string()),
-        }
-    }
-    Err(Error::Refused(if faults.is_empty() {
-        format!("{}: no checkpoint to go on from; run without --restart", folder.display())
-    } else {
-        format!("no good checkpoint to go on from; run without --restart\n{}", faults.join("\n"))
-    }))
 }
 
 /// Steps of this length from a time to the end.
@@ -182,6 +133,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             let steps_left = steps_between(self.state.time, end, self.state.step_length);
             let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
+            self.refuse_growth()?;
             let wish = self.wish(saved_at);
             if let Some(reason) = wish.stop
                 && self.state.time < end
@@ -212,6 +164,20 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target.min(end))?;
         self.totals.pace = Some(adaptive.pace);
         Ok(outcome)
+    }
+
+    /// Fails where the explicit scheme has made so much energy by itself that nothing of the answer is left.
+    fn refuse_growth(&self) -> Result<()> {
+        let made = self.totals.made_by_scheme();
+        let explicit = self.certificates.explicit_step_bound.is_some();
+        if !explicit || self.job.solver.accept.contains(&Accept::ExplicitStability) || made <= MOST_MADE {
+            return Ok(());
+        }
+        Err(Error::Failed(format!(
+            "at t = {:.6e} s the time scheme has made {made:.1e} times the energy that was put in: explicit stress makes errors \
+             grow; take a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
+            self.state.time
+        )))
     }
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {

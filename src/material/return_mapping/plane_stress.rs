@@ -12,7 +12,10 @@
 //! equation around that one.
 
 use super::{Tangent, increasing_root};
-use crate::{material::Hardening, tensor::Mandel};
+use crate::{
+    material::{Hardening, perzyna::NO_YIELD_STRESS},
+    tensor::Mandel,
+};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Weights of `p²`, `q²`, `r²` in the square of the von Mises norm.
@@ -80,7 +83,8 @@ pub(super) fn flow<const S: usize>(
         rate: 0.5 * length / law.perzyna.relaxation,
         power: law.perzyna.exponent - 1.0,
     };
-    let (flow, growth, derivative) = if yield_stress == 0.0 && law.modulus == 0.0 {
+    let without_yield_stress = yield_stress <= NO_YIELD_STRESS * norm && step.power == 0.0;
+    let (flow, growth, derivative) = if without_yield_stress && law.modulus == 0.0 {
         let share = step.stiffness.map(|e| 1.0 / (1.0 + step.rate * e));
         let flow = std::array::from_fn(|i| step.rate * share[i] * step.trial[i]);
         let diagonal = |i: usize| std::array::from_fn(|j| if i == j { share[i] } else { 0.0 });
@@ -120,8 +124,11 @@ impl Step {
         if self.power == 0.0 {
             return (self.multiplier(self.rate), self.rate);
         }
-        // In the logarithm of eta the slope is at least 1.
-        let highest = self.rate.ln() + self.power * (norm / self.yield_stress - 1.0).ln();
+        // In the logarithm of eta the slope is at least 1. `f` is below that of `s*`, and `eta e f` below `s*`.
+        let softest = self.stiffness.into_iter().fold(f64::INFINITY, f64::min);
+        let most = (norm / self.yield_stress - 1.0).ln();
+        let left = (10.0 * norm / (self.yield_stress * self.rate * softest)).ln() / (self.power + 1.0);
+        let highest = self.rate.ln() + self.power * most.min(left);
         let open = |logarithm: f64| {
             let eta = logarithm.exp();
             let values = self.values(self.multiplier(eta), eta);

@@ -7,13 +7,17 @@
 //! q = q* - 3 G dp,   f = q - Y,   Y = Y* + h dp,   dp = (k / (3 lambda)) (f / Y)^(n - 1) f
 //! ```
 //!
-//! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`.
+//! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`. Else its logarithm is solved for that of
+//! `f`, so that neither large exponents nor overstresses far beyond the yield stress take many iterations or overflow.
 
-use super::{Tangent, add_product, increasing_root};
+use super::{Tangent, add_product};
 use crate::{
     material::Hardening,
     tensor::{Mandel, normal_components, trace},
 };
+
+/// More than any law takes.
+const ITERATIONS: usize = 100;
 
 /// Flow of the step, and growth of the accumulated strain. `start` holds `q*` and `Y*`.
 pub(super) fn flow<const S: usize>(
@@ -28,34 +32,61 @@ pub(super) fn flow<const S: usize>(
     let rate = length / (3.0 * law.perzyna.relaxation);
     let stiffness = 1.5 * shear + hardening;
     let excess = norm - yield_stress;
-    let growth = if power == 1.0 {
-        rate * excess / (1.0 + rate * stiffness)
+    let (growth, growing) = if power == 1.0 {
+        let growing = rate / (1.0 + rate * stiffness);
+        (growing * excess, growing)
     } else {
-        let overstress = increasing_root(0.0, excess, excess, |f| {
-            let y = yield_stress + hardening * (excess - f) / stiffness;
-            let ratio = (f / y).powf(power - 1.0);
-            let slope = power * ratio + (power - 1.0) * hardening / stiffness * ratio * f / y;
-            [f + stiffness * rate * ratio * f - excess, 1.0 + stiffness * rate * slope]
-        });
-        (excess - overstress) / stiffness
+        power_law(excess, yield_stress, power, (rate, stiffness, hardening))
     };
     let mean = trace(trial) / 3.0;
     let mut deviator = *trial;
     deviator.iter_mut().take(normal_components::<S>()).for_each(|d| *d -= mean);
     if let Some(tangent) = tangent {
-        let f = excess - stiffness * growth;
-        let y = yield_stress + hardening * growth;
-        let (by_overstress, by_yield_stress) = if power == 1.0 {
-            (rate, 0.0)
-        } else {
-            let ratio = (f / y).powf(power - 1.0);
-            (rate * power * ratio, -rate * (power - 1.0) * ratio * f / y)
-        };
-        let growing = by_overstress / (1.0 + stiffness * by_overstress - hardening * by_yield_stress);
         let (scale, slope) = (1.0 - 1.5 * shear * growth / norm, 1.0 - 1.5 * shear * growing);
         write_tangent(tangent, &deviator, scale, slope);
     }
     (deviator.map(|d| 1.5 * growth / norm * d), growth)
+}
+
+/// `dp`, and its derivative by `q*`, for a power `n` above 1; `rate` is `k / (3 lambda)`, `stiffness` `c`.
+fn power_law(
+    excess: f64,
+    yield_stress: f64,
+    power: f64,
+    (rate, stiffness, hardening): (f64, f64, f64),
+) -> (f64, f64) {
+    // `c dp / f`, the flow against the overstress that is left, as a logarithm: powers overflow.
+    let flow_at = |f: f64| {
+        let y = yield_stress + hardening * (excess - f) / stiffness;
+        ((stiffness * rate).ln() + (power - 1.0) * (f / y).ln(), y)
+    };
+    // Convex in the logarithm of `f`, so that Newton's method comes down to the root from above.
+    let mut logarithm = excess.ln();
+    for _ in 0..ITERATIONS {
+        let f = logarithm.exp();
+        let (flow, y) = flow_at(f);
+        let slope = 1.0 + share(flow) * (power - 1.0) * (1.0 + hardening * f / (stiffness * y));
+        let change = (logarithm + softplus(flow) - excess.ln()) / slope;
+        logarithm -= change;
+        if change.abs() <= 2.0 * f64::EPSILON * (1.0 + logarithm.abs()) {
+            break;
+        }
+    }
+    let overstress = logarithm.exp();
+    let (flow, y) = flow_at(overstress);
+    let by_yield_stress = hardening * (power - 1.0) * overstress / y;
+    let growing = power / (stiffness * ((-flow).exp() + power) + by_yield_stress);
+    (excess * share(flow) / stiffness, growing)
+}
+
+/// `ln(1 + e^x)`.
+fn softplus(x: f64) -> f64 {
+    x.max(0.0) + (-x.abs()).exp().ln_1p()
+}
+
+/// `e^x / (1 + e^x)`.
+fn share(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
 }
 
 /// The tangent of scaling the deviator by `scale`, its length growing by `slope`.

@@ -236,3 +236,41 @@ fn slow_relaxation_leaves_the_stress_where_it_was() {
         }
     }
 }
+
+/// How far a mapped stress is off its equation `s = s* - k E X(s)`, relative to what rounding of `s*` makes of it.
+fn off<const S: usize>(law: &Perzyna, trial: &Mandel<S>) -> f64 {
+    let (length, mut tangent) = (0.1, [[0.0; S]; S]);
+    let found = Viscoplasticity::Perzyna(*law).return_stress(trial, length, 0.0, Some(&mut tangent));
+    let found = found.expect("flow");
+    assert!(tangent.iter().flatten().all(|t| t.abs() < 2.0), "{law:?}: {tangent:?}");
+    let back = add_scaled(&found.stress, length, &law.elasticity.apply(&law.strain_rate(&found.stress)));
+    let overstress = von_mises(&found.stress) - law.yield_stress;
+    let rounding = 1e-10 + 1e-13 * law.exponent * largest(trial) / overstress;
+    difference(&back, trial) / largest(trial) / rounding
+}
+
+#[test]
+fn stresses_far_beyond_the_yield_stress_flow_as_their_law_says() {
+    for (exponent, least) in [(1.0, 1e-200), (2.0, 1e-12), (5.0, 1e-12), (20.0, 1e-12)] {
+        for yield_stress in
+            [1.0, 1e-3, 1e-6, 1e-12, 1e-30, 1e-120, 1e-200].into_iter().filter(|y| *y >= least)
+        {
+            for relaxation in [100.0, 1.0, 1e-4, 1e-8] {
+                let sizes = [1.0, 1e-3, 1e-6, 1e-9].into_iter().filter(|size| *size >= 2.0 * yield_stress);
+                for (size, metric) in sizes.flat_map(|size| METRICS.map(|metric| (size, metric))) {
+                    let law = |hypothesis| {
+                        let law = perzyna(hypothesis, metric, exponent);
+                        Perzyna { yield_stress, relaxation, ..law }
+                    };
+                    let plane = off(&law(Hypothesis::PlaneStress), &[3.0 * size, -2.0 * size, size]);
+                    let space = [3.0, -2.0, 1.0, 0.5, 0.0, 4.0].map(|s| s * size);
+                    let space = off(&law(Hypothesis::Space), &space);
+                    let what = format!(
+                        "exponent {exponent}, yield stress {yield_stress}, {relaxation}, {size}, {metric:?}"
+                    );
+                    assert!(plane < 1.0 && space < 1.0, "{what}: {plane:e}, {space:e}");
+                }
+            }
+        }
+    }
+}
