@@ -200,7 +200,7 @@ fn run(
         Outcome::Stopped => None,
         Outcome::Ran { record, .. } => {
             say(&format!("ablation {name}: {}", record.error.as_deref().unwrap_or("completed")));
-            Some(record)
+            Some(*record)
         }
     })
 }

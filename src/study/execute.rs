@@ -17,7 +17,7 @@ pub enum Outcome {
     /// It was run now, or found as an earlier study left it.
     Ran {
         /// What is known about it.
-        record: Record,
+        record: Box<Record>,
         /// Whether it was found.
         found: bool,
     },
@@ -35,7 +35,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
     let digest = session.agree(digests)?;
     let found = if session.is_first() { Record::of_finished(folder, &digest, repetitions) } else { None };
     if let Some(record) = Record::share(session, found)? {
-        return Ok(Outcome::Ran { record, found: true });
+        return Ok(Outcome::Ran { record: Box::new(record), found: true });
     }
     let mut record = Record::new(digest);
     for _ in 0..repetitions {
@@ -62,7 +62,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
     }
     session.agree(written)?;
     match Record::share(session, Some(record))? {
-        Some(record) => Ok(Outcome::Ran { record, found: false }),
+        Some(record) => Ok(Outcome::Ran { record: Box::new(record), found: false }),
         None => Ok(Outcome::Stopped),
     }
 }

@@ -58,6 +58,9 @@ pub struct Place {
     pub cells: Vec<f64>,
 }
 
+/// A quantity, the space whose norm is taken, and whether that is at the end alone.
+type Kind = (Quantity, Space, bool);
+
 /// Errors of the run in `folder` in some norms. Collective.
 pub fn errors<const D: usize>(
     session: &Session,
@@ -82,7 +85,7 @@ pub fn errors<const D: usize>(
     };
     let pair = Pair::new(session, &run, against);
     let mut found = Errors { notes: covered(pair.uncovered)?, ..Errors::default() };
-    let mut known: Vec<((Quantity, Space, bool), (Vec<Squares>, Place))> = Vec::new();
+    let mut known: Vec<(Kind, (Vec<Squares>, Place))> = Vec::new();
     for norm in norms {
         let kind = (norm.of, norm.space, norm.over == Over::End);
         if !known.iter().any(|(other, _)| *other == kind) {
@@ -113,7 +116,7 @@ fn over_time<const D: usize>(
     session: &Session,
     pair: &Pair<D>,
     run: &StoredFields<D>,
-    (of, space, at_end): (Quantity, Space, bool),
+    (of, space, at_end): Kind,
 ) -> Result<(Vec<Squares>, Place)> {
     let last = run.times.len().saturating_sub(1);
     let steps = if at_end { last..last + 1 } else { 0..last + 1 };

@@ -125,7 +125,7 @@ fn announced(
         None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
     };
     say(&format!("run {count:<9} {:<40} {words}", planned.name));
-    Ok(Some(Ran { record, found }))
+    Ok(Some(Ran { record: *record, found }))
 }
 
 /// The repetition that counts.
