@@ -14,7 +14,7 @@ use std::ptr;
 ///
 /// To PETSc the operator is a shell matrix whose null space is the complement of the subspace: it projects every result
 /// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] takes the preconditioner of the constant
-/// matrix, or one made for its own subspace if that lacks [`WORTH`] directions or more. From then on it is made anew only
+/// matrix, or one made for its own subspace if that lacks 16 directions or more. From then on it is made anew only
 /// when a solve has not converged in as many iterations as that is worth ([`ProjectedKsp::set_patience`]), and the solve
 /// goes on from where it was.
 #[derive(Debug)]

@@ -19,7 +19,7 @@ pub trait ProjectedOperator {
         true
     }
 
-    /// `z = M^-1 r`, where [`ProjectedKsp::precondition_by_operator`] asks for it.
+    /// `z = M^-1 r`, where [`super::ProjectedKsp::precondition_by_operator`] asks for it.
     fn precondition(&mut self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("an operator without a preconditioner was asked for one".into()))
     }
