@@ -127,6 +127,25 @@ fn the_notched_plate_is_as_its_page_says() {
 }
 
 #[test]
+fn the_clamped_square_is_as_its_page_says() {
+    let mesh = two(read(&folder("meshes", "clamped_square.msh")).unwrap());
+    is_sound(&mesh);
+    assert_eq!((mesh.nodes.len(), mesh.cell_count()), (495, 895));
+    assert!((whole(&mesh) - 1.0).abs() < 1e-12);
+    for side in ["left", "right", "bottom", "top"] {
+        assert!((boundary_measure(&mesh, side) - 1.0).abs() < 1e-12);
+    }
+    assert_eq!(mesh.regions, ["body"]);
+    assert!(mesh.quality_summary().smallest > 0.5);
+    for cell in 0..mesh.cell_count() {
+        let [x, y] = mesh.centroid(cell);
+        let wanted = 0.08 * x.hypot(y.min(1.0 - y)).sqrt();
+        let side = (mesh.measure(cell) * 4.0 / 3f64.sqrt()).sqrt();
+        assert!((0.5..1.6).contains(&(side / wanted)), "cell {cell}: {side} m, {wanted} m wanted");
+    }
+}
+
+#[test]
 fn the_wheel_segment_is_as_its_page_says() {
     let mesh = three(read(&folder("meshes", "wheel_segment.msh")).unwrap());
     is_sound(&mesh);
