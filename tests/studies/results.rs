@@ -47,7 +47,12 @@ fn errors_against_a_known_solution_fall_with_the_orders_of_theory() {
     // The norm of v = sin(pi x) sin(pi y) is 1/2.
     let relative = number(&results, "/runs/5/errors/0/relative");
     assert!((relative - 2.0 * number(&results, "/runs/5/errors/0/error")).abs() < 1e-6 * relative);
-    for file in ["study.csv", "study.md", "work-precision-velocity_h_end.svg"] {
+    for file in [
+        "study.csv",
+        "study.md",
+        "work-precision-velocity_h_end-time.svg",
+        "work-precision-velocity_h_end-work.svg",
+    ] {
         assert!(scene.path("out/study").join(file).exists(), "{file}");
     }
     let csv = std::fs::read_to_string(scene.path("out/study/study.csv")).expect("study.csv");
