@@ -45,7 +45,7 @@ impl Graph {
         if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
             return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
         }
-        let reach = reach(&points, &slopes);
+        let reach = reach(&points);
         Ok(Self { points, slopes, reach })
     }
 
@@ -157,6 +157,11 @@ impl Graph {
         self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
     }
 
+    /// Whether there is no pressure at any velocity.
+    pub fn is_zero(&self) -> bool {
+        self.reach[1] == 0.0 && self.slopes.iter().all(|slope| *slope == 0.0)
+    }
+
     /// Distance of a pair (velocity, pressure) to the graph, both scaled by the range of its corners, or by this one where
     /// that is larger.
     pub fn distance(&self, velocity: f64, pressure: f64, range: [f64; 2]) -> f64 {
@@ -180,12 +185,9 @@ impl Graph {
     }
 }
 
-/// Largest velocity and pressure among the corners. A graph without any pressure has none to compare with: 1 Pa counts.
-fn reach(points: &[[f64; 2]], slopes: &[f64]) -> [f64; 2] {
-    let largest = |[v, p]: [f64; 2], point: &[f64; 2]| [v.max(point[0].abs()), p.max(point[1].abs())];
-    let [velocity, pressure] = points.iter().fold([0.0; 2], largest);
-    let nothing = pressure == 0.0 && slopes.iter().all(|slope| *slope == 0.0);
-    [velocity, if nothing { 1.0 } else { pressure }]
+/// Largest velocity and pressure among the corners.
+fn reach(points: &[[f64; 2]]) -> [f64; 2] {
+    points.iter().fold([0.0; 2], |[v, p], point| [f64::max(v, point[0].abs()), f64::max(p, point[1].abs())])
 }
 
 fn ray_distance(point: [f64; 2], from: [f64; 2], along: [f64; 2]) -> f64 {

@@ -15,10 +15,13 @@ pub(super) fn worst(distances: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs.
+    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs. Where the
+    /// law knows no pressure, the velocity is that in any direction: what is felt along the others bounds what can be told.
     pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
+        let nothing = matches!(&self.law, NormalLaw::Graph(graph) if graph.is_zero());
         let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
-            let along = point.normal_component(velocity).abs().max(point.context_velocity());
+            let moved = if nothing { point.speed(velocity) } else { point.normal_component(velocity).abs() };
+            let along = moved.max(point.context_velocity());
             [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
         });
         let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
@@ -31,7 +34,10 @@ impl<const D: usize> Contact<D> {
         let sliding = [range[2], range[3]];
         // The velocity that the pressures would change, and the pressure that would change the velocities, count where there
         // is no other; of the latter a share where the law has a range of its own.
-        let share = if matches!(self.law, NormalLaw::Graph(_)) { STOPPING_SHARE } else { 1.0 };
+        let share = match &self.law {
+            NormalLaw::Graph(graph) if !graph.is_zero() => STOPPING_SHARE,
+            _ => 1.0,
+        };
         let range = [range[0].max(range[1] / self.scale), range[1].max(share * self.scale * range[0])];
         let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());

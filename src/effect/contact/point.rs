@@ -130,6 +130,12 @@ impl<const D: usize> Point<D> {
         sum
     }
 
+    /// Length of the mean of nodal values.
+    pub fn speed(&self, nodal: &[f64]) -> f64 {
+        let mean = |i: usize| self.nodes().map(|(node, share)| share * nodal[node * D + i]).sum();
+        norm::<D>(&std::array::from_fn(mean))
+    }
+
     /// The component of a nodal value along the free part of the normal.
     #[inline]
     pub fn along(&self, nodal: &[f64]) -> f64 {
