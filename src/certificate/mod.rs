@@ -111,7 +111,7 @@ impl Certificates {
             let bound = if solvable { 1.0 / find(Kind::SlipPressure)? } else { 0.0 };
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
-        known.not_covered = not_covered(&body.contacts, known.slip_pressure_bound);
+        known.not_covered = not_covered(&body.contacts, known.theta_step, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let waves = 1.0 / find(Kind::ExplicitStep)?;
             let flow = body.flow_step_bound();
@@ -147,7 +147,11 @@ fn growth<const D: usize>(contacts: &[Contact<D>]) -> std::result::Result<Option
 }
 
 /// What depends on contact pressures that are part of the solution.
-fn not_covered<const D: usize>(contacts: &[Contact<D>], slip_pressure_bound: Option<f64>) -> Vec<String> {
+fn not_covered<const D: usize>(
+    contacts: &[Contact<D>],
+    theta_step: Option<f64>,
+    slip_pressure_bound: Option<f64>,
+) -> Vec<String> {
     let mut words = Vec::new();
     if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
         words.push(
@@ -158,7 +162,14 @@ fn not_covered<const D: usize>(contacts: &[Contact<D>], slip_pressure_bound: Opt
     }
     for fall in contacts.iter().filter_map(Contact::unknown_fall) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
-            format!("; for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against")
+            // Where nothing else falls, theta is proportional to the pressure.
+            let each = match theta_step {
+                Some(0.0) => format!("theta of a step is {:.4e} for each Pa, so that ", 1.0 / bound),
+                _ => String::new(),
+            };
+            format!(
+                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against"
+            )
         });
         words.push(format!(
             "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \

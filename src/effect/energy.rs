@@ -27,7 +27,7 @@ pub struct Energy {
     pub viscous: f64,
     /// Taken up by viscoplastic flow in the step: dissipated, or stored by hardening.
     pub viscoplastic: f64,
-    /// Dissipated by contact in the step, or given to a moving obstacle.
+    /// Dissipated by contact in the step, given to a moving obstacle, or taken up by a foundation that remembers.
     pub contact: f64,
     /// Work of loads in the step.
     pub work: f64,
