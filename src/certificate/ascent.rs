@@ -23,12 +23,11 @@ pub(super) trait Quotient {
 }
 
 /// What an ascent found.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Peak {
     /// The number wanted; approached from below.
     pub value: f64,
-    /// Relative change in the last iteration.
-    pub change: f64,
+    /// Where it was found.
+    pub vector: DistributedVector,
 }
 
 /// A vector with its images under all forms.
@@ -64,18 +63,20 @@ impl Direction {
     }
 }
 
-/// Climbs from `start` until the relative change falls below `tolerance` twice, or for so many iterations. Collective.
+/// Climbs from `start`, at first also toward `beside`, until the relative change falls below `tolerance` twice, or for so many
+/// iterations. Collective.
 pub(super) fn climb(
     session: &Session,
     quotient: &mut dyn Quotient,
     start: DistributedVector,
+    beside: Option<DistributedVector>,
     tolerance: f64,
     iterations: usize,
 ) -> Result<Peak> {
     let mut current = Direction::new(quotient, start)?;
-    let mut previous: Option<Direction> = None;
+    let mut previous = beside.map(|vector| Direction::new(quotient, vector)).transpose()?;
     let mut values = diagonal(&grams(session, &[&current])?, 0);
-    let mut peak = Peak { value: quotient.value(&values), change: f64::INFINITY };
+    let mut peak = quotient.value(&values);
     let mut calm = 0;
     for _ in 0..iterations {
         let (numerator, denominator) = quotient.weights(&values);
@@ -104,14 +105,14 @@ pub(super) fn climb(
         values = (0..quotient.forms()).map(|form| bilinear(&grams[form], &factors, count)).collect();
         (current, previous) = (next, Some(along));
         let value = quotient.value(&values);
-        let change = ((value - peak.value) / value).abs();
-        peak = Peak { value, change };
+        let change = ((value - peak) / value).abs();
+        peak = value;
         calm = if change < tolerance { calm + 1 } else { 0 };
         if calm == 2 {
             break;
         }
     }
-    Ok(peak)
+    Ok(Peak { value: peak, vector: current.vector })
 }
 
 /// The best combination of the first `n` directions, each brought to length 1 in the denominator first.

@@ -45,6 +45,8 @@ use serde::{Deserialize, Serialize};
 const TOLERANCE: f64 = 1e-5;
 /// Iterations after which it is taken as it is.
 const ITERATIONS: usize = 60;
+/// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
+const RIGID: f64 = 1e12;
 
 /// Constants of the problem; null where they have no meaning.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -63,7 +65,7 @@ pub struct Certificates {
     /// Why there are no growth constants although there is contact, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unbounded_growth: Option<String>,
-    /// `|gamma|^2` of the normal trace in m.
+    /// `|gamma|^2` of the normal trace in m; null where it is infinite: the supports leave a rigid motion against the contact.
     pub trace_norm_squared: Option<f64>,
     /// Contact pressure in Pa up to which a step has one solution, if pressures are given, where friction weakens under a
     /// pressure that no law bounds; 0: at none.
@@ -97,14 +99,16 @@ impl Certificates {
             ..Self::default()
         };
         let scheme_is_implicit = scheme.scheme().is_implicit();
-        let mut find = |kind: Kind| find(session, body, state, scheme, kind);
+        let mut starts = Starts::default();
+        let mut find = |kind: Kind| find(session, body, state, scheme, kind, &mut starts);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
-            known.trace_norm_squared = Some(find(Kind::TraceNorm)?);
             known.theta_step = Some(if falling { find(Kind::ThetaStep)? } else { 0.0 });
             if viscous {
                 known.theta = Some(if falling { find(Kind::Theta)? } else { 0.0 });
             }
+            known.trace_norm_squared =
+                Some(find(Kind::TraceNorm)?).filter(|norm| *norm < RIGID * length(session, &body.mesh.nodes));
         }
         if body.contacts.iter().any(|contact| contact.unknown_fall().is_some()) {
             let solvable = known.theta_step.is_some_and(|theta| theta < 1.0);
@@ -131,8 +135,18 @@ impl Certificates {
         if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
         }
-        Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep)?))
+        Ok(Some(1.0 / find(session, body, state, scheme, Kind::UniqueStep, &mut Starts::default())?))
     }
+}
+
+/// The longest side of the box around these nodes on all ranks. Collective.
+fn length<const D: usize>(session: &Session, nodes: &[[f64; D]]) -> f64 {
+    let bound = |sign: f64| -> [f64; D] {
+        let most = |i| nodes.iter().map(|node| sign * node[i]).fold(f64::NEG_INFINITY, f64::max);
+        session.largest(std::array::from_fn(most))
+    };
+    let (high, low) = (bound(1.0), bound(-1.0));
+    (0..D).map(|i| high[i] + low[i]).fold(0.0, f64::max)
 }
 
 /// Growth constants that hold for all contacts, if there are any contacts.
@@ -185,17 +199,45 @@ fn find<const D: usize, const S: usize>(
     state: &State,
     scheme: &mut Stepper,
     kind: Kind,
+    starts: &mut Starts,
 ) -> Result<f64> {
     let mut pencil = Pencil { body, scheme, kind };
-    let start = if kind == Kind::ExplicitStep {
-        rough(body, state)?
-    } else {
-        let pull = pull(body, state)?;
-        let mut start = pull.like()?;
-        pencil.precondition(&pull, &mut start)?;
-        start
+    if kind == Kind::ExplicitStep {
+        let start = rough(body, state)?;
+        return Ok(climb(session, &mut pencil, start, None, TOLERANCE, ITERATIONS)?.value);
+    }
+    let pulled = match &starts.pulled {
+        Some(pulled) => copy(pulled)?,
+        None => {
+            let pull = pull(body, state)?;
+            let mut pulled = pull.like()?;
+            pencil.precondition(&pull, &mut pulled)?;
+            starts.pulled = Some(copy(&pulled)?);
+            pulled
+        }
     };
-    Ok(climb(session, &mut pencil, start, TOLERANCE, ITERATIONS)?.value)
+    let (start, beside) = match starts.peak.take() {
+        Some(peak) => (peak, Some(pulled)),
+        None => (pulled, None),
+    };
+    let peak = climb(session, &mut pencil, start, beside, TOLERANCE, ITERATIONS)?;
+    starts.peak = Some(peak.vector);
+    Ok(peak.value)
+}
+
+fn copy(vector: &DistributedVector) -> Result<DistributedVector> {
+    let mut copy = vector.like()?;
+    copy.copy_from(vector)?;
+    Ok(copy)
+}
+
+/// Where ascents start: suprema of the contact's pull lie near each other.
+#[derive(Default)]
+struct Starts {
+    /// What a pull at the whole contact boundary leads to.
+    pulled: Option<DistributedVector>,
+    /// Where the last supremum was found.
+    peak: Option<DistributedVector>,
 }
 
 /// Which supremum is sought.

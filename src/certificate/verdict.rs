@@ -45,14 +45,20 @@ impl Certificates {
             };
             verdict.words.push(format!("theta = {}, {meaning}{covered}", short(theta)));
         }
-        if let (Some(modulus), Some(fall), Some(trace)) =
-            (self.viscosity_modulus, self.monotonicity_constant, self.trace_norm_squared)
-        {
-            let (sign, meaning) =
-                if modulus > fall * trace { (">", "holds") } else { ("<=", "does not hold") };
+        if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, self.monotonicity_constant) {
+            let product = match self.trace_norm_squared {
+                Some(trace) => fall * trace,
+                None if fall > 0.0 => f64::INFINITY,
+                None => 0.0,
+            };
+            let (sign, meaning) = if modulus > product { (">", "holds") } else { ("<=", "does not hold") };
+            let size = if product < f64::INFINITY {
+                format!("{product:.4} Pa s")
+            } else {
+                "infinite (the supports leave a rigid motion against the contact free)".to_owned()
+            };
             verdict.words.push(format!(
-                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {:.4} Pa s: condition (13) {meaning}",
-                fall * trace
+                "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) {meaning}"
             ));
         }
         if let Some(theta) = self.theta_step {
@@ -180,6 +186,17 @@ mod tests {
             wall.ends_with("Pa s/m, the growth constant is infinite: hypothesis H(j) does not cover it"),
             "{wall}"
         );
+    }
+
+    #[test]
+    fn a_rigid_motion_against_the_contact_leaves_the_condition_to_laws_that_never_fall() {
+        let words = |fall: f64| {
+            let known =
+                Certificates { trace_norm_squared: None, monotonicity_constant: Some(fall), ..paper() };
+            known.verdict(1.0 / 64.0, None, Accepted::default()).words[2].clone()
+        };
+        assert_eq!(words(0.0), "m_A = 50.0000 Pa s > m_j |gamma|^2 = 0.0000 Pa s: condition (13) holds");
+        assert!(words(0.1).contains("<= m_j |gamma|^2 = infinite") && words(0.1).contains("does not hold"));
     }
 
     #[test]

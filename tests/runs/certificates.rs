@@ -54,6 +54,12 @@ fn effects_that_are_absent_leave_their_certificates_null() {
 }
 
 #[test]
+fn the_trace_norm_of_a_free_body_is_infinite() {
+    let free = check(&Case::square(8).without("support"), 2);
+    assert!(free["certificates"]["trace_norm_squared"].is_null(), "{free}");
+}
+
+#[test]
 fn check_says_how_contact_pressures_grow_with_the_velocity() {
     let growth = |case: &Case| check(case, 2)["certificates"]["growth_constants"].clone();
     let [rest, slope] = serde_json::from_value(growth(&Case::square(8))).expect("two numbers");
