@@ -32,7 +32,7 @@ use std::{
 pub struct Made {
     /// The page.
     pub page: PathBuf,
-    /// How many pictures stand in it, each also beside it as SVG and PNG.
+    /// How many pictures stand in it, each also beside it (beside its study) as SVG and PNG.
     pub pictures: usize,
     /// Files that are missing or unreadable, in words.
     pub missing: Vec<String>,
@@ -58,8 +58,9 @@ pub fn report(folder: &Path) -> Result<Made> {
         "Made by solver report, version {VERSION}. All quantities in SI units. The pictures stand beside this page as SVG \
          and PNG files."
     );
-    write(&path, page.html(&made_by).as_bytes())?;
-    Ok(Made { page: path, pictures: page.pictures().len(), missing })
+    let html = page.html(&made_by);
+    write(&path, html.as_bytes())?;
+    Ok(Made { page: path, pictures: html.matches("<figure").count(), missing })
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -204,7 +204,7 @@ fn over_time(
     let chart =
         Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
     let worst = chosen.iter().map(|run| {
-        format!("{} largest at t = {} s, after {} steps", run.name, size(run.places[norm].worst), run.steps)
+        format!("{} ({} steps) largest at t = {} s", run.name, run.steps, size(run.places[norm].worst))
     });
     let worst = worst.collect::<Vec<_>>().join("; ");
     Ok(Some(Picture::new(
