@@ -143,11 +143,12 @@ impl<'a> Body<'a> {
             }
         };
         let figures = format!("from {} to {} {unit}", number(low), number(high));
+        let figures = figures.trim_end();
         Ok(Picture::new(
             name,
-            format!("Deformed mesh coloured by {quantity}, {figures}, at {} s", number(self.snapshot.time)),
+            format!("Mesh coloured by {quantity}, {figures}, at {} s", number(self.snapshot.time)),
             format!(
-                "Deformed mesh ({}) at t = {} s, coloured by {quantity}: {figures}.{seen}",
+                "Mesh ({}) at t = {} s, coloured by {quantity}: {figures}.{seen}",
                 self.magnified(),
                 number(self.snapshot.time)
             ),

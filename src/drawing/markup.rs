@@ -37,10 +37,18 @@ pub fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in rows {
-        let cells = row.iter().map(|cell| format!("<td>{}</td>", escape(cell)));
+        let cells = row.iter().map(|cell| {
+            let class = if is_short(cell) { " class=\"short\"" } else { "" };
+            format!("<td{class}>{}</td>", escape(cell))
+        });
         let _ = writeln!(out, "<tr>{}</tr>", cells.collect::<String>());
     }
     out + "</tbody></table></div>\n"
+}
+
+/// Whether a cell is a number, maybe with its unit, that no line should break.
+fn is_short(cell: &str) -> bool {
+    cell.len() <= 16 && cell.starts_with(|c: char| c.is_ascii_digit() || "-−".contains(c))
 }
 
 /// Wide tables scroll by themselves, also from the keyboard.
@@ -61,6 +69,12 @@ pub fn paragraph(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_in_tables_stay_in_one_line() {
+        let html = table("", &["a", "b"], &[vec!["2.1e-3".into(), "5 points on a long line".into()]]);
+        assert!(html.contains("<td class=\"short\">2.1e-3</td><td>5 points"), "{html}");
+    }
 
     #[test]
     fn nothing_a_job_says_becomes_markup() {

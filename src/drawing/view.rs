@@ -72,6 +72,40 @@ pub fn outline(snapshot: &Snapshot) -> Vec<Vec<u32>> {
     lines
 }
 
+/// Unit normals out of the body at nodes of its boundary: the mean over the facets between these nodes, by their size.
+pub fn normals(snapshot: &Snapshot, nodes: &[usize]) -> Vec<[f64; 3]> {
+    let mut sums: BTreeMap<u32, [f64; 3]> = nodes.iter().map(|node| (*node as u32, [0.0; 3])).collect();
+    let mut add = |facet: &[u32], normal: [f64; 3]| {
+        if facet.iter().all(|node| sums.contains_key(node)) {
+            for node in facet {
+                let sum = sums.entry(*node).or_default();
+                *sum = std::array::from_fn(|i| sum[i] + normal[i]);
+            }
+        }
+    };
+    let at = |node: u32| snapshot.nodes[node as usize];
+    if snapshot.dimension() == 2 {
+        let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(snapshot.cells.len());
+        for n in snapshot.cells() {
+            let sides = [[n[0], n[1], n[2]], [n[1], n[2], n[0]], [n[2], n[0], n[1]]];
+            edges.extend(sides.map(|[a, b, opposite]| ([a.min(b), a.max(b)], opposite)));
+        }
+        edges.sort_unstable();
+        for same in edges.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1) {
+            let ([a, b], opposite) = same[0];
+            let [along, inward] = [minus(at(b), at(a)), minus(at(opposite), at(a))];
+            let normal = [along[1], -along[0], 0.0];
+            add(&[a, b], if dot(normal, inward) > 0.0 { normal.map(|c| -c) } else { normal });
+        }
+    } else {
+        for face in faces(snapshot) {
+            let [a, b, c] = face.nodes.map(at);
+            add(&face.nodes, cross(minus(b, a), minus(c, a)));
+        }
+    }
+    nodes.iter().map(|node| unit(sums[&(*node as u32)])).collect()
+}
+
 fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> Face {
     let at = |node: u32| snapshot.nodes[node as usize];
     let [a, b, c] = key.map(at);
@@ -167,6 +201,20 @@ mod tests {
             let [a, b, c] = face.nodes.map(|n| body.nodes[n as usize]);
             assert!(dot(cross(minus(b, a), minus(c, a)), minus(middle, a)) < 0.0, "{face:?} looks inwards");
         }
+    }
+
+    #[test]
+    fn normals_are_means_over_the_facets_between_the_nodes() {
+        let square = Snapshot {
+            nodes: vec![[0.0; 3], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            cells: vec![0, 1, 2, 0, 2, 3],
+            corners: 3,
+            ..Snapshot::default()
+        };
+        assert_eq!(normals(&square, &[0, 1]), [[0.0, -1.0, 0.0]; 2]);
+        let corner = normals(&square, &[0, 1, 2])[1];
+        assert!((corner[0] - 0.2f64.sqrt()).abs() < 1e-15 && (corner[1] + 0.8f64.sqrt()).abs() < 1e-15);
+        assert_eq!(normals(&pair(), &[0, 1, 2]), [[0.0, 0.0, -1.0]; 3]);
     }
 
     #[test]

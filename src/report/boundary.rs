@@ -5,13 +5,14 @@ use super::{
     body::{Body, Coloured},
     chart::{Axis, Band, Chart, Look, Series},
     colour::{BANDS, CIVIDIS, Colour, LINES},
+    friction::{self, Rubbing},
     law::Law,
     markup::table,
     picture::Picture,
     scale::{extent, number},
     table::Table,
 };
-use crate::{error::Result, output::field_snapshot::Snapshot};
+use crate::{contact::FrictionLaw, error::Result, output::field_snapshot::Snapshot};
 use std::collections::HashMap;
 
 /// Bands behind a chart beyond which they would only confuse.
@@ -28,26 +29,59 @@ pub struct Boundary<'a> {
     /// When, in s.
     pub time: f64,
     law: Option<&'a Law>,
+    friction: Option<FrictionLaw>,
     table: Table,
     points: Vec<[f64; 3]>,
     arc: Vec<f64>,
     dimension: usize,
+    /// The body at the same time, with the numbers of the boundary's nodes and normals out of it there.
+    behind: Option<(&'a Snapshot, Vec<usize>, Vec<[f64; 3]>)>,
+}
+
+/// What acts on a boundary.
+pub struct Laws {
+    /// Along the normal.
+    pub normal: Law,
+    /// In sliding.
+    pub friction: Option<FrictionLaw>,
 }
 
 impl<'a> Boundary<'a> {
-    /// The profile of this name, with the law that acts there.
-    pub fn new(profiles: &Table, name: &'a str, law: Option<&'a Law>) -> Self {
+    /// The profile of this name, with the laws that act there.
+    pub fn new(
+        profiles: &Table,
+        name: &'a str,
+        laws: Option<&'a Laws>,
+        snapshot: Option<&'a Snapshot>,
+    ) -> Self {
+        let (law, friction) = (laws.map(|laws| &laws.normal), laws.and_then(|laws| laws.friction));
         let table = profiles.of(name).last("time");
         let dimension = if table.header().iter().any(|column| column == "z") { 3 } else { 2 };
         let axes = ["x", "y", "z"].map(|axis| table.column(axis).unwrap_or_else(|| vec![0.0; table.len()]));
         let points: Vec<[f64; 3]> = (0..table.len()).map(|n| [0, 1, 2].map(|axis| axes[axis][n])).collect();
         let time = table.column("time").and_then(|times| times.last().copied()).unwrap_or(0.0);
-        if dimension == 3 {
-            return Self { name, time, law, table, points, arc: vec![], dimension };
+        let mut boundary =
+            Self { name, time, law, friction, table, points, arc: vec![], dimension, behind: None };
+        if dimension == 2 {
+            let (order, arc) = along_curve(&boundary.points);
+            boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
+            (boundary.table, boundary.arc) = (boundary.table.picked(&order), arc);
         }
-        let (order, arc) = along_curve(&points);
-        let points = order.iter().map(|at| points[*at]).collect();
-        Self { name, time, law, table: table.picked(&order), points, arc, dimension }
+        if let Some(snapshot) = snapshot.filter(|snapshot| snapshot.time == time) {
+            boundary.behind = boundary.nodes_of(snapshot).map(|nodes| {
+                let normals = super::view::normals(snapshot, &nodes);
+                (snapshot, nodes, normals)
+            });
+        }
+        boundary
+    }
+
+    /// The numbers of the boundary's nodes in the body, if all are there.
+    fn nodes_of(&self, snapshot: &Snapshot) -> Option<Vec<usize>> {
+        let bits = |p: &[f64; 3]| p.map(f64::to_bits);
+        let nodes: HashMap<[u64; 3], usize> =
+            snapshot.nodes.iter().enumerate().map(|(n, p)| (bits(p), n)).collect();
+        self.points.iter().map(|p| nodes.get(&bits(p)).copied()).collect()
     }
 
     /// All pictures: quantities along the boundary (on its surface in space), and its nodes on the law.
@@ -64,6 +98,7 @@ impl<'a> Boundary<'a> {
             out.extend(self.quantity(column, snapshot)?);
         }
         out.extend(self.on_law()?);
+        out.extend(self.on_friction()?);
         Ok(out)
     }
 
@@ -179,7 +214,11 @@ impl<'a> Boundary<'a> {
         let column = |name: &str| self.table.column(name);
         let (u, v, p) =
             (column("normal_displacement")?, column("normal_velocity")?, column("contact_pressure")?);
-        let node = |n: usize| [law.abscissa(self.time, &self.points[n], u[n], v[n]), p[n]];
+        if law.needs_normals() && self.behind.is_none() {
+            return None;
+        }
+        let normal = |n: usize| self.behind.as_ref().map_or([0.0; 3], |(_, _, normals)| normals[n]);
+        let node = |n: usize| [law.abscissa(self.time, (&self.points[n], &normal(n)), u[n], v[n]), p[n]];
         let nodes: Vec<[f64; 2]> = (0..self.points.len()).map(node).collect();
         let on = law.branches_of(&nodes);
         (!nodes.is_empty()).then_some((nodes, on))
@@ -239,20 +278,41 @@ impl<'a> Boundary<'a> {
         if bands.len() > MOST_BANDS || bands.len() < 2 { Vec::new() } else { bands }
     }
 
+    /// The nodes on the graph of friction.
+    fn on_friction(&self) -> Result<Option<Picture>> {
+        let (Some(law), Some((snapshot, nodes, normals))) = (&self.friction, &self.behind) else {
+            return Ok(None);
+        };
+        let Some(velocity) = &snapshot.velocity else { return Ok(None) };
+        let pressure = self.table.column("contact_pressure").unwrap_or_default();
+        let tractions: Vec<Vec<f64>> = ["x", "y", "z"]
+            .iter()
+            .filter_map(|axis| self.table.column(&format!("friction_traction_{axis}")))
+            .collect();
+        if tractions.is_empty() || pressure.len() != nodes.len() {
+            return Ok(None);
+        }
+        let sliding = |n: usize| {
+            let (v, normal) = (velocity[nodes[n]], normals[n]);
+            let along: f64 = (0..3).map(|i| v[i] * normal[i]).sum();
+            (0..3).map(|i| (v[i] - along * normal[i]).powi(2)).sum::<f64>().sqrt()
+        };
+        let size = |n: usize| tractions.iter().map(|t| t[n] * t[n]).sum::<f64>().sqrt();
+        let rubbing: Vec<Rubbing> = (0..nodes.len())
+            .map(|n| Rubbing { speed: sliding(n), traction: size(n), pressure: pressure[n] })
+            .collect();
+        friction::picture(self.name, self.time, law, &rubbing)
+    }
+
     /// The deformed mesh of a plane body with the boundary's normal velocity and contact pressure as arrows.
-    pub fn arrows(&self, body: &Body, snapshot: &Snapshot) -> Result<Vec<Picture>> {
-        if self.dimension != 2 || snapshot.time != self.time {
+    pub fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
+        let Some((_, nodes, normals)) = self.behind.as_ref().filter(|(_, nodes, _)| nodes.len() > 1) else {
+            return Ok(Vec::new());
+        };
+        if self.dimension != 2 {
             return Ok(Vec::new());
         }
-        let bits = |p: &[f64; 3]| p.map(f64::to_bits);
-        let nodes: HashMap<[u64; 3], usize> =
-            snapshot.nodes.iter().enumerate().map(|(n, p)| (bits(p), n)).collect();
-        let found: Vec<usize> = self.points.iter().filter_map(|p| nodes.get(&bits(p)).copied()).collect();
-        if found.len() != self.points.len() || found.len() < 2 {
-            return Ok(Vec::new());
-        }
-        let feet: Vec<[f64; 2]> = found.iter().map(|node| body.place(*node)).collect();
-        let normals = self.outward(snapshot, &found);
+        let feet: Vec<[f64; 2]> = nodes.iter().map(|node| body.place(*node)).collect();
         let mut out = Vec::new();
         for (column, words, colour, inward) in [
             ("normal_velocity", "normal velocity", LINES[0], false),
@@ -287,32 +347,6 @@ impl<'a> Boundary<'a> {
             ));
         }
         Ok(out)
-    }
-
-    /// Unit normals out of the body at the boundary's nodes, from their neighbours along it and the cells behind.
-    fn outward(&self, snapshot: &Snapshot, nodes: &[usize]) -> Vec<[f64; 2]> {
-        let mut behind: HashMap<usize, [f64; 3]> = nodes.iter().map(|node| (*node, [0.0; 3])).collect();
-        for cell in snapshot.cells() {
-            for corner in cell {
-                let Some(sum) = behind.get_mut(&(*corner as usize)) else { continue };
-                for other in cell {
-                    let [x, y, _] = snapshot.nodes[*other as usize];
-                    *sum = [sum[0] + x, sum[1] + y, sum[2] + 1.0];
-                }
-            }
-        }
-        let last = nodes.len() - 1;
-        let normal = |n: usize| {
-            let (before, after) = (self.points[n.saturating_sub(1)], self.points[(n + 1).min(last)]);
-            let along = [after[0] - before[0], after[1] - before[1]];
-            let size = along[0].hypot(along[1]);
-            let [x, y, _] = self.points[n];
-            let [a, b, count] = behind[&nodes[n]];
-            let normal = [along[1] / size, -along[0] / size];
-            let inside = (a / count - x) * normal[0] + (b / count - y) * normal[1];
-            if inside > 0.0 { normal.map(|c| -c) } else { normal }
-        };
-        (0..nodes.len()).map(normal).collect()
     }
 }
 

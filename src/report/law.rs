@@ -2,9 +2,10 @@
 
 use super::scale::{extent, number};
 use crate::{
-    contact::{DampedResponse, Graph, Symmetry},
+    contact::{Gap, Graph, NormalLaw},
     error::Result,
-    job::{self, Contact, NormalLaw, Scalar},
+    job::Contact,
+    run::normal_law,
 };
 
 /// Points of a curved law that are joined by straight lines.
@@ -15,7 +16,7 @@ const SAMPLES: usize = 120;
 pub struct Law {
     shape: Shape,
     /// The distance that the body may move before it is felt, where the law is one of the displacement.
-    gap: Option<Scalar>,
+    gap: Option<Gap>,
 }
 
 #[derive(Debug, Clone)]
@@ -36,31 +37,16 @@ pub struct Branch {
 }
 
 impl Law {
-    /// The law of a contact of a job; nothing where it depends on the way to an obstacle, which only the run knows.
-    pub fn of(contact: &Contact) -> Result<Option<Self>> {
-        let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
-        let of_velocity = |graph| Self { shape: Shape::Graph(graph), gap: None };
-        let of_displacement =
-            |shape, gap: &Option<Scalar>| Self { shape, gap: Some(gap.clone().unwrap_or_default()) };
-        let law = match &contact.normal {
-            NormalLaw::DampedResponse(d) => {
-                let symmetry = match d.symmetry {
-                    job::Symmetry::Even => Symmetry::Even,
-                    job::Symmetry::Odd => Symmetry::Odd,
-                    job::Symmetry::OneSided => Symmetry::OneSided,
-                };
-                let (breakpoints, slopes) = (d.breakpoints.clone(), d.slopes.clone());
-                of_velocity(DampedResponse { breakpoints, slopes, symmetry }.graph()?)
-            }
-            NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
-            NormalLaw::Unilateral(u) if u.bound == job::Bound::Velocity => of_velocity(wall()?),
-            _ if contact.obstacle.is_some() => return Ok(None),
+    /// The law of a contact of a job.
+    pub fn of(contact: &Contact) -> Result<Self> {
+        let (law, gap) = normal_law(contact)?;
+        Ok(match law {
+            NormalLaw::Graph(graph) => Self { shape: Shape::Graph(graph), gap: None },
+            NormalLaw::Unilateral(graph) => Self { shape: Shape::Graph(graph), gap: Some(gap) },
             NormalLaw::Compliance(c) => {
-                of_displacement(Shape::Power { stiffness: c.stiffness, exponent: c.exponent }, &c.gap)
+                Self { shape: Shape::Power { stiffness: c.stiffness, exponent: c.exponent }, gap: Some(gap) }
             }
-            NormalLaw::Unilateral(u) => of_displacement(Shape::Graph(wall()?), &u.gap),
-        };
-        Ok(Some(law))
+        })
     }
 
     /// What the pressure is a graph of, and its unit.
@@ -68,9 +54,21 @@ impl Law {
         if self.gap.is_some() { ("penetration", "m") } else { ("normal velocity", "m/s") }
     }
 
-    /// That quantity of a node.
-    pub fn abscissa(&self, time: f64, point: &[f64], displacement: f64, velocity: f64) -> f64 {
-        self.gap.as_ref().map_or(velocity, |gap| displacement - gap.evaluate(time, point))
+    /// That quantity of a node with this outward normal; not a number where there is no gap.
+    pub fn abscissa(
+        &self,
+        time: f64,
+        (point, normal): (&[f64; 3], &[f64; 3]),
+        displacement: f64,
+        velocity: f64,
+    ) -> f64 {
+        let Some(gap) = &self.gap else { return velocity };
+        gap.at(time, point, normal).map_or(f64::NAN, |gap| displacement - gap)
+    }
+
+    /// Whether the normals of the nodes matter.
+    pub fn needs_normals(&self) -> bool {
+        self.gap.as_ref().is_some_and(|gap| !matches!(gap, Gap::Distance(_)))
     }
 
     /// Its parts, from left to right.
@@ -177,14 +175,20 @@ fn graph_branches(graph: &Graph, unit: &str) -> Vec<Branch> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Bound, Compliance, Quadrature, Unilateral};
+    use crate::job::{self, Bound, Compliance, NormalLaw, Obstacle, Plane, Quadrature, Scalar, Unilateral};
 
-    fn law(normal: NormalLaw) -> Law {
+    const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
+
+    fn against(normal: NormalLaw, obstacle: Option<Obstacle>) -> Law {
         let on = vec!["bottom".into()];
         let quadrature = Quadrature::Nodal;
         let contact =
-            Contact { on, quadrature, normal, obstacle: None, friction: None, adhesion: None, memory: None };
-        Law::of(&contact).expect("law").expect("graph")
+            Contact { on, quadrature, normal, obstacle, friction: None, adhesion: None, memory: None };
+        Law::of(&contact).expect("law")
+    }
+
+    fn law(normal: NormalLaw) -> Law {
+        against(normal, None)
     }
 
     fn paper() -> Law {
@@ -219,7 +223,7 @@ mod tests {
     fn nodes_at_a_rigid_wall_are_closed_and_others_open() {
         let gap = Some(Scalar::Number(0.01));
         let law = law(NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap }));
-        let at = |u: f64| law.abscissa(0.0, &[0.0, 0.0], u, 0.0);
+        let at = |u: f64| law.abscissa(0.0, (&[0.0; 3], &DOWN), u, 0.0);
         let nodes = [[at(0.01), 5.0], [at(0.004), 0.0], [f64::NEG_INFINITY, 0.0]];
         assert_eq!(law.branches_of(&nodes), [1, 0, 0], "the last has nothing to touch");
         let line = law.line(&[[at(0.01), 5.0], [at(0.004), 0.0]]);
@@ -230,8 +234,19 @@ mod tests {
     fn springs_are_felt_beyond_their_gap() {
         let spring = Compliance { stiffness: 100.0, exponent: 2.0, gap: Some(Scalar::Number(0.1)) };
         let law = law(NormalLaw::Compliance(spring));
-        let nodes = [[law.abscissa(0.0, &[], 0.3, 0.0), 4.0], [law.abscissa(0.0, &[], 0.05, 0.0), 0.0]];
-        assert_eq!(law.branches_of(&nodes), [1, 0]);
+        let at = |u: f64| law.abscissa(0.0, (&[0.0; 3], &DOWN), u, 0.0);
+        assert_eq!(law.branches_of(&[[at(0.3), 4.0], [at(0.05), 0.0]]), [1, 0]);
         assert_eq!(law.quantity().0, "penetration");
+        assert!(!law.needs_normals());
+    }
+
+    #[test]
+    fn the_gap_to_a_plane_that_moves_is_measured_along_the_normal() {
+        let numbers = |values: [f64; 2]| values.map(Scalar::Number).to_vec();
+        let plane = Plane { point: numbers([0.0, -0.5]), normal: numbers([0.0, 1.0]) };
+        let spring = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
+        let law = against(NormalLaw::Compliance(spring), Some(Obstacle::Plane(plane)));
+        assert!(law.needs_normals());
+        assert!((law.abscissa(0.0, (&[3.0, 0.0, 0.0], &DOWN), 0.6, 0.0) - 0.1).abs() < 1e-15);
     }
 }

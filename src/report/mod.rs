@@ -4,6 +4,7 @@ mod arc;
 mod boundary;
 mod facts;
 mod found;
+mod friction;
 mod history;
 mod law;
 mod page;
@@ -13,10 +14,10 @@ mod table;
 use crate::{
     drawing::{body, chart, colour, markup, picture, scale, view},
     error::{Error, Result},
-    run::VERSION,
+    run::{VERSION, friction_law},
 };
 use body::Body;
-use boundary::Boundary;
+use boundary::{Boundary, Laws};
 use found::{Found, Gap};
 use law::Law;
 use markup::{escape, paragraph};
@@ -31,7 +32,7 @@ use std::{
 pub struct Made {
     /// The page.
     pub page: PathBuf,
-    /// How many pictures stand in it, each also beside it as SVG and PNG.
+    /// How many pictures stand in it, each also beside it (beside its study) as SVG and PNG.
     pub pictures: usize,
     /// Files that are missing or unreadable, in words.
     pub missing: Vec<String>,
@@ -57,8 +58,9 @@ pub fn report(folder: &Path) -> Result<Made> {
         "Made by solver report, version {VERSION}. All quantities in SI units. The pictures stand beside this page as SVG \
          and PNG files."
     );
-    write(&path, page.html(&made_by).as_bytes())?;
-    Ok(Made { page: path, pictures: page.pictures().len(), missing })
+    let html = page.html(&made_by);
+    write(&path, html.as_bytes())?;
+    Ok(Made { page: path, pictures: html.matches("<figure").count(), missing })
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -133,19 +135,21 @@ fn body_section(page: &mut Page, found: &Found) -> Result<()> {
 }
 
 fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
-    let mut contacts: Vec<(&[String], Option<Law>)> = Vec::new();
+    let mut contacts: Vec<(&[String], Laws)> = Vec::new();
     for contact in found.job.iter().flat_map(|job| &job.contact) {
-        contacts.push((&contact.on, Law::of(contact)?));
+        let friction = contact.friction.as_ref().map(friction_law);
+        contacts.push((&contact.on, Laws { normal: Law::of(contact)?, friction }));
     }
     let mut seen = Vec::new();
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
         seen = profiles.names();
         for name in &seen {
             let contact = contacts.iter().find(|(on, _)| on.contains(name));
-            let boundary = Boundary::new(profiles, name, contact.and_then(|(_, law)| law.as_ref()));
-            let mut pictures = boundary.pictures(found.snapshot.as_ref())?;
-            if let Some(snapshot) = found.snapshot.as_ref().filter(|_| contact.is_some()) {
-                pictures.extend(boundary.arrows(&Body::new(snapshot), snapshot)?);
+            let snapshot = found.snapshot.as_ref();
+            let boundary = Boundary::new(profiles, name, contact.map(|(_, laws)| laws), snapshot);
+            let mut pictures = boundary.pictures(snapshot)?;
+            if let Some(snapshot) = snapshot.filter(|_| contact.is_some()) {
+                pictures.extend(boundary.arrows(&Body::new(snapshot))?);
             }
             let heading =
                 format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });

@@ -8,7 +8,6 @@ use crate::error::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::Value;
 use std::{
-    collections::HashMap,
     fmt::Write,
     path::{Path, PathBuf},
 };
@@ -21,7 +20,7 @@ pub fn is_study(folder: &Path) -> bool {
 /// The page: what `study.md` says, or the tables of `study.json` where there is none; and all SVG files of the folder.
 pub fn page(folder: &Path) -> Result<Page> {
     let words = folder.join("study.md");
-    let mut captions = HashMap::new();
+    let mut captions = Vec::new();
     let (title, body) = if words.is_file() {
         let text = std::fs::read_to_string(&words).map_err(|error| Error::unreadable(&words, error))?;
         markdown(&text, &mut captions)
@@ -39,21 +38,25 @@ pub fn page(folder: &Path) -> Result<Page> {
     Ok(page)
 }
 
-/// The SVG files as images: nothing in them can reach the page.
-fn pictures(folder: &Path, captions: &HashMap<String, String>) -> Result<String> {
+/// The SVG files as images, in the order of their captions: nothing in them can reach the page.
+fn pictures(folder: &Path, captions: &[(String, String)]) -> Result<String> {
     let unreadable = |error: std::io::Error| Error::unreadable(folder, error);
     let mut files: Vec<PathBuf> = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         files.extend(path.extension().is_some_and(|extension| extension == "svg").then_some(path));
     }
-    files.sort();
+    let caption = |file: &Path| {
+        captions.iter().position(|(name, _)| file.file_name().is_some_and(|f| f == name.as_str()))
+    };
+    files.sort_by_key(|file| (caption(file).unwrap_or(captions.len()), file.clone()));
     let mut out = String::new();
     for file in files {
         let bytes = std::fs::read(&file).map_err(|error| Error::unreadable(&file, error))?;
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let name =
-            captions.get(name.as_ref()).cloned().unwrap_or_else(|| name.trim_end_matches(".svg").into());
+        let name = caption(&file).map_or_else(
+            || file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            |at| captions[at].1.clone(),
+        );
         // Writing to a String cannot fail.
         let _ = writeln!(
             out,
@@ -100,7 +103,7 @@ fn plain(value: &Value) -> String {
 
 /// Headings, paragraphs, lists and tables of a Markdown text as HTML; its first heading and the captions of its pictures
 /// apart.
-fn markdown(text: &str, captions: &mut HashMap<String, String>) -> (Option<String>, String) {
+fn markdown(text: &str, captions: &mut Vec<(String, String)>) -> (Option<String>, String) {
     let text = plain_words(text);
     let (mut title, mut out) = (None, String::new());
     let mut lines = text.lines().peekable();
@@ -130,14 +133,14 @@ fn markdown(text: &str, captions: &mut HashMap<String, String>) -> (Option<Strin
             let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
             out += &format!("<ul>\n{items}</ul>\n");
         } else if let Some((caption, file)) = line.strip_prefix("![").and_then(|rest| rest.split_once("](")) {
-            captions.insert(file.trim_end_matches(')').to_owned(), caption.to_owned());
+            captions.push((file.trim_end_matches(')').to_owned(), caption.to_owned()));
         } else if !line.is_empty() {
             let mut words = line.to_owned();
             let goes_on = |next: &&str| !next.trim().is_empty() && !next.starts_with(['|', '#', '-', '!']);
             while let Some(next) = lines.next_if(goes_on) {
                 words = format!("{words} {}", next.trim());
             }
-            out += &format!("<p>{}</p>\n", escape(&words));
+            out += &format!("<p>{}</p>\n", escape(&words.replace("\\|", "|")));
         }
     }
     (title, out)
@@ -149,7 +152,10 @@ fn plain_words(text: &str) -> String {
 }
 
 fn cells(line: &str) -> Vec<String> {
-    line.trim().trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+    // Bars that belong to the words stand behind a backslash.
+    let bar = "\u{fffe}";
+    let line = line.replace("\\|", bar);
+    line.trim().trim_matches('|').split('|').map(|cell| cell.trim().replace(bar, "|")).collect()
 }
 
 #[cfg(test)]
@@ -158,13 +164,17 @@ mod tests {
 
     #[test]
     fn a_table_in_markdown_becomes_a_table_and_nothing_becomes_markup() {
-        let text = "# Orders\n\nText <b>\ngoes **on**.\n\n| h | error |\n|---|---:|\n| 1/8 | 0.5 |\n\n- one\n- two\n\n![Cost](c.svg)\n";
-        let mut captions = HashMap::new();
+        let text = "# Orders\n\nText <b>\ngoes **on** \\| off.\n\n| h | error |\n|---|---:|\n| 1/8 | 0.5 |\n\n- one\n- two\n\n![Cost](c.svg)\n";
+        let mut captions = Vec::new();
         let (title, html) = markdown(text, &mut captions);
-        assert_eq!(captions["c.svg"], "Cost");
+        assert_eq!(captions, [("c.svg".to_owned(), "Cost".to_owned())]);
         assert_eq!(title.as_deref(), Some("Orders"));
-        assert!(html.contains("<p>Text &lt;b&gt; goes on.</p>"), "{html}");
-        assert!(html.contains("<td>1/8</td><td>0.5</td>") && !html.contains("---"), "{html}");
+        assert!(html.contains("<p>Text &lt;b&gt; goes on | off.</p>"), "{html}");
+        assert!(
+            html.contains("<td class=\"short\">1/8</td><td class=\"short\">0.5</td>")
+                && !html.contains("---"),
+            "{html}"
+        );
         assert!(html.contains("<li>one</li>\n<li>two</li>"), "{html}");
     }
 
@@ -176,7 +186,10 @@ mod tests {
         std::fs::write(folder.path().join("cost.svg"), "<svg/>").expect("written");
         assert!(is_study(folder.path()));
         let html = page(folder.path()).expect("page").html("");
-        assert!(html.contains("<th scope=\"col\">seconds</th>") && html.contains("<td>16</td>"), "{html}");
+        assert!(
+            html.contains("<th scope=\"col\">seconds</th>") && html.contains("<td class=\"short\">16</td>"),
+            "{html}"
+        );
         assert!(html.contains("alt=\"cost\" src=\"data:image/svg+xml;base64,PHN2Zy8+\"/>"), "{html}");
     }
 }

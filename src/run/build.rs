@@ -224,7 +224,7 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 }
 
 /// The law of a contact, and the gap it is felt beyond.
-fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
+pub fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
     let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
     let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Gap::default());
     let gap = |given: &Option<Scalar>| gap(contact.obstacle.as_ref(), given.as_ref());
@@ -262,7 +262,8 @@ fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
     }
 }
 
-fn friction_law(law: &Friction) -> FrictionLaw {
+/// The friction law that a job describes.
+pub fn friction_law(law: &Friction) -> FrictionLaw {
     match law {
         Friction::Tresca(t) => FrictionLaw::Tresca { bound: t.bound },
         Friction::Coulomb(c) => FrictionLaw::Coulomb { coefficient: c.coefficient },

@@ -15,6 +15,7 @@ mod simulation;
 mod summary;
 mod time_loop;
 
+pub use build::{friction_law, normal_law};
 pub use check::Report;
 pub use inventory::Inventory;
 pub use scene::{Scene, whole_mesh};

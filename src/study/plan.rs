@@ -106,6 +106,15 @@ impl Plan {
                 }
             },
         };
+        let known = |name: &&String| runs.iter().any(|run: &Planned| run.name == **name);
+        let pictured = study.pictures.over_time.iter().chain(&study.pictures.in_space);
+        let unknown: Vec<String> =
+            pictured.filter(|name| !known(name)).map(|name| format!("`{name}`")).collect();
+        if !unknown.is_empty() && refusals.is_empty() {
+            let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+            let (unknown, names) = (unknown.join(", "), names.join(", "));
+            refusals.push(format!("[pictures] names {unknown}, but the runs are {names}"));
+        }
         if !refusals.is_empty() {
             return Err(Error::Refused(refusals.join("\n\n")));
         }

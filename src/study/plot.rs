@@ -35,6 +35,7 @@ pub fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     let mut pictures = Vec::new();
     for (at, norm) in results.norms.iter().enumerate() {
         pictures.extend(costs(results, at, norm)?);
+        pictures.extend(tolerances(results, at, norm)?);
         let of = plan.study.norm.get(at).map(|norm| (norm.of, norm.space));
         pictures.extend(over_time(plan, results, at, norm, of)?);
         pictures.extend(on_the_body(plan, results, at, norm, of)?);
@@ -128,6 +129,50 @@ fn unit(of: Option<(Quantity, Space)>) -> &'static str {
     }
 }
 
+/// What the solver's tolerance changes, over the error that is left at the tightest one.
+fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Option<Picture>> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for row in &results.tolerances {
+        let Some(run) = results.runs.iter().find(|run| run.name == row.run) else { continue };
+        let share = row.changes.get(norm).and_then(|change| change.as_ref()?.share_of_error);
+        let cells: Vec<String> = run.cells.iter().map(u32::to_string).collect();
+        let steps = run.adaptive.map_or(format!("k = {} s", size(run.step)), |_| "adaptive".into());
+        let name = format!("{}, {}, {steps}", run.scheme, cells.join(" × "));
+        let point = [row.tolerance, share.unwrap_or(0.0)];
+        match curves.iter_mut().find(|curve| curve.name == name) {
+            Some(curve) => curve.points.push(point),
+            None => curves.push(Curve { name, points: vec![point] }),
+        }
+    }
+    if curves.is_empty() {
+        return Ok(None);
+    }
+    let lines = curves.iter().take(LINES.len()).enumerate();
+    let series =
+        lines.map(|(place, c)| Series::new(place, c.name.clone(), Look::Dotted, c.points.clone())).collect();
+    let tolerance = Axis { quantity: "tolerance of the solver", unit: "" };
+    let chart = Chart {
+        logarithmic: true,
+        logarithmic_x: true,
+        levels: vec![(1.0, "as large as the error of mesh and steps".into())],
+        ..Chart::new(tolerance, Axis { quantity: "change over the error", unit: "" }, series)
+    };
+    let most = curves.iter().map(|curve| {
+        let harmless = curve.points.iter().filter(|point| point[1] <= 0.1).map(|point| point[0]);
+        format!("{} up to {}", curve.name, size(harmless.fold(0.0, f64::max)))
+    });
+    let most = most.collect::<Vec<_>>().join("; ");
+    Ok(Some(Picture::new(
+        &format!("solver-tolerance-{}", shown.name),
+        format!("Chart of changes by the solver's tolerance; below a tenth of the error: {most}"),
+        format!(
+            "What the solver's tolerance changes, {}. Below a tenth of the error: {most}.",
+            shown.meaning
+        ),
+        chart.svg()?,
+    )))
+}
+
 /// Errors over time of the runs that the study names, or of the most accurate one of each scheme.
 fn over_time(
     plan: &Plan,
@@ -159,7 +204,7 @@ fn over_time(
     let chart =
         Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
     let worst = chosen.iter().map(|run| {
-        format!("{} largest at t = {} s, after {} steps", run.name, size(run.places[norm].worst), run.steps)
+        format!("{} ({} steps) largest at t = {} s", run.name, run.steps, size(run.places[norm].worst))
     });
     let worst = worst.collect::<Vec<_>>().join("; ");
     Ok(Some(Picture::new(

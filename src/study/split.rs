@@ -24,6 +24,13 @@ pub fn add_parts(
         let folder = from.loaded.job.output_folder();
         Ok(in_dimension(session, dimension, folder, target, &plan.study.norm)?.measured)
     };
+    for (at, run) in plan.runs.iter().enumerate().filter(|(_, run)| run.cells == reference.cells) {
+        if plan.study.compare.split && is_like_base(run) {
+            for error in results.runs[at].errors.iter_mut().take(plan.study.norm.len()).flatten() {
+                (error.of_steps, error.of_mesh) = (Some(error.error), Some(0.0));
+            }
+        }
+    }
     for (planned, made) in plan.split.iter().zip(on_meshes).filter(|(_, made)| made.record.is_complete()) {
         let of_mesh = distance(planned, reference, made.record.dimension)?;
         for (at, run) in plan.runs.iter().enumerate() {

@@ -117,11 +117,13 @@ fn markdown(results: &Results, pictures: &[Picture]) -> String {
     results.notes.iter().for_each(|note| out.push_str(&format!("{note}\n\n")));
     if let Some(reference) = &results.reference {
         let cells: Vec<String> = reference.cells.iter().map(u32::to_string).collect();
+        let steps = reference.adaptive.map_or(format!("steps of {} s", reference.step), |tolerance| {
+            format!("{} adaptive steps, tolerance {tolerance}", reference.steps)
+        });
         out.push_str(&format!(
-            "Reference: {} with {} cells and steps of {} s.\n\n",
+            "Reference: {} with {} cells and {steps}.\n\n",
             reference.scheme,
-            cells.join(" x "),
-            reference.step
+            cells.join(" x ")
         ));
     }
     table::all(results).iter().for_each(|table| out.push_str(&table.markdown()));

@@ -11,6 +11,7 @@ mod failures;
 mod friction;
 mod hdf5_file;
 mod indicator;
+mod iterations;
 mod launch;
 mod materials;
 mod outputs;

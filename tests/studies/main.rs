@@ -8,3 +8,4 @@ mod refusals;
 mod resume;
 mod results;
 mod scene;
+mod steps;

@@ -83,6 +83,14 @@ fn steps_that_the_reference_does_not_have_are_refused() {
 }
 
 #[test]
+fn errors_that_cant_be_split_and_pictures_of_no_run_are_refused() {
+    let text = refused(&format!("[[run]]\n[compare]\nsplit = true\n{SOLUTION}"));
+    assert!(text.contains("errors can't be split here") && text.contains("[reference.run]"), "{text}");
+    let text = refused("[[run]]\nname = \"coarse\"\n[pictures]\nover_time = [\"coarse\", \"fine\"]\n");
+    assert!(text.contains("[pictures] names `fine`, but the runs are coarse"), "{text}");
+}
+
+#[test]
 fn a_run_whose_job_is_refused_is_named_with_the_fault() {
     let text = refused("[[run]]\nname = \"long\"\nstep = 5.0\n[[run]]\nset = [\"time.stp=1\"]\n");
     assert!(text.contains("the job of run long step 5 is refused"), "{text}");

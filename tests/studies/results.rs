@@ -169,7 +169,14 @@ fn studies_of_the_repository_load() {
         }
     }
     names.sort();
-    let known = [("graded_corners", 8), ("wang_cheng_honest_reference", 12), ("wang_cheng_table_1", 4)];
+    let known = [
+        ("graded_corners", 8),
+        ("solver_tolerance", 18),
+        ("wang_cheng_honest_reference", 63),
+        ("wang_cheng_start_up", 4),
+        ("wang_cheng_table_1", 4),
+        ("wang_cheng_work_precision", 36),
+    ];
     assert_eq!(names, known.map(|(name, runs)| (name.to_owned(), runs)));
 }
 

@@ -14,6 +14,7 @@ mod energy;
 mod indefinite;
 mod indicator;
 mod jacobian;
+mod ladder;
 mod manufactured;
 mod memory;
 #[path = "../mpirun/mod.rs"]
@@ -67,6 +68,8 @@ fn scenario() {
         "several_laws" => obstacles::several(&session, &folder),
         "random_laws" => random_laws::solve(&session),
         "subspace" => subspace::solve(&session),
+        "ladder_plane" => ladder::plane(&session),
+        "ladder_space" => ladder::space(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "scheme_adapted" => schemes::adapted(&session),

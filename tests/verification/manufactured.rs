@@ -48,7 +48,12 @@ fn sum(terms: Vec<String>) -> String {
 }
 
 /// Component (i, j) of the total stress.
-fn stress<const D: usize>(field: &Field<D>, elastic: (f64, f64), i: usize, j: usize) -> String {
+fn stress<const D: usize>(
+    field: &Field<D>,
+    (follows, elastic): (&str, (f64, f64)),
+    i: usize,
+    j: usize,
+) -> String {
     let part = |(volumetric, shear): (f64, f64)| {
         let mut terms = vec![format!("{}*({}+{})", 0.5 * shear, field.text(i, &[j]), field.text(j, &[i]))];
         if i == j {
@@ -57,33 +62,90 @@ fn stress<const D: usize>(field: &Field<D>, elastic: (f64, f64), i: usize, j: us
         }
         sum(terms)
     };
-    format!("({}*{}+{}*{})", field.time.text(0, "t"), part(elastic), field.time.text(1, "t"), part(VISCOSITY))
+    format!("({follows}*{}+{}*{})", part(elastic), field.time.text(1, "t"), part(VISCOSITY))
 }
 
 /// Component i of `density u'' - div sigma`.
-fn body_force<const D: usize>(field: &Field<D>, elastic: (f64, f64), i: usize) -> String {
+fn body_force<const D: usize>(field: &Field<D>, (follows, elastic): (&str, (f64, f64)), i: usize) -> String {
     let divergence = |(volumetric, shear): (f64, f64)| {
         let along = sum((0..D).map(|k| field.text(k, &[i, k])).collect());
         let around = sum((0..D).map(|k| field.text(i, &[k, k])).collect());
         format!("({}*{along}+{}*{around})", volumetric + 0.5 * shear, 0.5 * shear)
     };
     format!(
-        "{DENSITY}*{}*{}-({}*{}+{}*{})",
+        "{DENSITY}*{}*{}-({follows}*{}+{}*{})",
         field.time.text(2, "t"),
         field.text(i, &[]),
-        field.time.text(0, "t"),
         divergence(elastic),
         field.time.text(1, "t"),
         divergence(VISCOSITY)
     )
 }
 
+/// What the body touches below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touch {
+    /// A linear damper.
+    Damper,
+    /// A spring whose force is a power of the penetration.
+    Spring,
+    /// The same, with Coulomb's friction along it.
+    Rubbing,
+    /// A damper, with a given bound of friction along it.
+    Dragging,
+}
+
+/// A spring is felt from this place on, has this stiffness and this exponent.
+const SPRING: (f64, f64, f64) = (-2.0, 0.8, 1.5);
+/// Coulomb's coefficient and Tresca's bound.
+const FRICTION: (f64, f64) = (0.3, 0.7);
+
+/// What acts beside the body's own inertia, elasticity and viscosity, and how steps are taken.
+#[derive(Debug, Clone)]
+pub struct Case<'a> {
+    pub hypothesis: &'a str,
+    pub scheme: &'a str,
+    pub quadrature: &'a str,
+    /// More of the material.
+    pub extra: &'a str,
+    /// Time in which stress relaxes, if it does.
+    pub relaxation: Option<f64>,
+    pub touch: Touch,
+    pub end: f64,
+    pub step: f64,
+}
+
 /// The job whose solution is the motion: held on the left, a linear damper below, tractions on all other sides.
 pub fn job<const D: usize>(hypothesis: &str, quadrature: &str, extra: &str, end: f64, step: f64) -> String {
-    let (field, elastic) = (motion::<D>(), elasticity(hypothesis));
-    let mut job = format!("{}[time]\nend = {end}\nstep = {step}\n[material]\n", any_mesh::<D>());
+    let (scheme, relaxation, touch) = ("lagged_euler", None, Touch::Damper);
+    job_of::<D>(&Case { hypothesis, scheme, quadrature, extra, relaxation, touch, end, step })
+}
+
+/// The factor of the elastic stress: `T`, or the solution of `S' + S / relaxation = T'` that starts with it.
+fn elastic_factor(time: Wave, relaxation: Option<f64>) -> String {
+    let Some(tau) = relaxation else { return time.text(0, "t") };
+    let turns = time.number * tau;
+    let [cosine, sine] = [1.0, turns].map(|factor| factor * turns / (1.0 + turns * turns));
+    let rest = time.value(0, 0.0) - cosine * time.phase.cos() - sine * time.phase.sin();
+    let angle = format!("({}*t+{})", time.number, time.phase);
+    format!("({cosine}*cos{angle}+{sine}*sin{angle}+{rest}*exp(-t/{tau}))")
+}
+
+/// The same with what the case says.
+pub fn job_of<const D: usize>(case: &Case) -> String {
+    let (field, elastic) = (motion::<D>(), elasticity(case.hypothesis));
+    let factor = elastic_factor(field.time, case.relaxation);
+    let elastic = (factor.as_str(), elastic);
+    let Case { scheme, end, step, extra, quadrature, .. } = case;
+    let mut job =
+        format!("{}[time]\nend = {end}\nstep = {step}\nscheme = \"{scheme}\"\n[material]\n", any_mesh::<D>());
     if D == 2 {
-        job += &format!("hypothesis = \"{hypothesis}\"\n");
+        job += &format!("hypothesis = \"{}\"\n", case.hypothesis);
+    }
+    if let Some(tau) = case.relaxation {
+        job += &format!(
+            "viscoplasticity.maxwell = {{ relaxation_time = {tau}, volumetric_relaxation_time = {tau} }}\n"
+        );
     }
     job += &format!(
         "density = {DENSITY}\nelasticity = {{ youngs_modulus = {MODULUS}, poisson_ratio = {RATIO} }}\n\
@@ -102,22 +164,52 @@ pub fn job<const D: usize>(hypothesis: &str, quadrature: &str, extra: &str, end:
         let value: Vec<String> = (0..D)
             .map(|i| {
                 let mut text = format!("{sign}*{}", stress(&field, elastic, i, axis));
-                if name == "bottom" && i == low {
-                    text += &format!("+{DAMPER}*{}*{}", field.time.text(1, "t"), field.text(low, &[]));
+                if name == "bottom" {
+                    text += &format!("+{}", against_touch(&field, case.touch, i));
                 }
                 text
             })
             .collect();
         job += &format!("[[traction]]\non = [\"{name}\"]\nvalue = {value:?}\n");
     }
-    job += &format!(
-        "[[contact]]\non = [\"bottom\"]\nquadrature = \"{quadrature}\"\n[contact.normal.damped_response]\n\
-         breakpoints = []\nslopes = [{DAMPER}]\nsymmetry = \"odd\"\n"
-    );
+    let spring =
+        format!("compliance]\nstiffness = {}\nexponent = {}\ngap = {}\n", SPRING.1, SPRING.2, SPRING.0);
+    let damper = format!("damped_response]\nbreakpoints = []\nslopes = [{DAMPER}]\nsymmetry = \"odd\"\n");
+    let normal = if matches!(case.touch, Touch::Spring | Touch::Rubbing) { spring } else { damper };
+    job +=
+        &format!("[[contact]]\non = [\"bottom\"]\nquadrature = \"{quadrature}\"\n[contact.normal.{normal}");
+    match case.touch {
+        Touch::Rubbing => job += &format!("[contact.friction.coulomb]\ncoefficient = {}\n", FRICTION.0),
+        Touch::Dragging => job += &format!("[contact.friction.tresca]\nbound = {}\n", FRICTION.1),
+        Touch::Damper | Touch::Spring => {}
+    }
     let at_start = |order: i32| -> Vec<String> {
         (0..D).map(|i| format!("{}*{}", field.time.value(order, 0.0), field.text(i, &[]))).collect()
     };
     job + &format!("[initial]\ndisplacement = {:?}\nvelocity = {:?}\n", at_start(0), at_start(1))
+}
+
+/// Component i of what has to act below against what is touched there: pressure, and friction while all slides.
+fn against_touch<const D: usize>(field: &Field<D>, touch: Touch, i: usize) -> String {
+    let low = D - 1;
+    let velocity = |i: usize| format!("({}*{})", field.time.text(1, "t"), field.text(i, &[]));
+    let displacement = format!("({}*{})", field.time.text(0, "t"), field.text(low, &[]));
+    let pressure = match touch {
+        Touch::Damper | Touch::Dragging => format!("(-{DAMPER}*{})", velocity(low)),
+        Touch::Spring | Touch::Rubbing => {
+            format!("({}*max(-{displacement}-{},0)^{})", SPRING.1, SPRING.0, SPRING.2)
+        }
+    };
+    if i == low {
+        return format!("(-{pressure})");
+    }
+    let bound = match touch {
+        Touch::Damper | Touch::Spring => return "0".into(),
+        Touch::Rubbing => format!("{}*{pressure}", FRICTION.0),
+        Touch::Dragging => FRICTION.1.to_string(),
+    };
+    let squares: Vec<String> = (0..low).map(|j| format!("{0}*{0}", velocity(j))).collect();
+    format!("{bound}*{}/sqrt({})", velocity(i), squares.join("+"))
 }
 
 /// Places in the unit simplex and weights: three Gauss points in each direction, collapsed.
@@ -174,7 +266,7 @@ fn errors<const D: usize, const S: usize>(
 }
 
 /// Errors of velocity and displacement at the end.
-fn measured<const D: usize, const S: usize>(
+pub fn measured<const D: usize, const S: usize>(
     session: &Session,
     job: &str,
     mesh: &GlobalMesh<D>,
@@ -188,18 +280,18 @@ fn measured<const D: usize, const S: usize>(
     let velocity = errors(session, &run, &run.state.velocity.local().expect("velocity"), time.value(1, end));
     let displacement =
         errors(session, &run, &run.state.displacement.local().expect("displacement"), time.value(0, end));
-    assert!(run.totals.viscoplastic_dissipation == 0.0, "it does not flow");
+    assert_eq!(run.totals.viscoplastic_dissipation != 0.0, job.contains("maxwell"), "whether it flows");
     assert!(run.totals.max_energy_imbalance < 1e-9);
     [velocity[0], velocity[1], displacement[0], displacement[1]]
 }
 
-fn assert_orders(what: &str, coarse: [f64; 4], fine: [f64; 4], ratio: f64) {
+pub fn assert_orders(what: &str, coarse: [f64; 4], fine: [f64; 4], ratio: f64, least: f64) {
     let orders = std::array::from_fn::<f64, 4, _>(|n| (coarse[n] / fine[n]).ln() / ratio.ln());
     println!(
         "{what}: errors {fine:.5?}, orders {orders:.3?} (velocity in L2, its strain, displacement in L2, its strain)"
     );
     for n in [0, 2] {
-        assert!((1.85..2.3).contains(&orders[n]), "{what}: order in L2 {orders:?}");
+        assert!((least..2.3).contains(&orders[n]), "{what}: order in L2 {orders:?}");
         assert!((0.9..1.2).contains(&orders[n + 1]), "{what}: order of strain {orders:?}");
     }
 }
@@ -214,12 +306,12 @@ pub fn plane(session: &Session) {
     let [coarse, fine] = [10, 20].map(|n| {
         measured::<2, 3>(session, &job::<2>("plane_stress", "nodal", "", end, step(n)), &mesh(n), end)
     });
-    assert_orders("plane stress", coarse, fine, 2.0);
+    assert_orders("plane stress", coarse, fine, 2.0, 1.85);
     let idle = "viscoplasticity.perzyna = { relaxation = 1, yield_stress = 1000 }";
     let [coarse, fine] = [10, 20].map(|n| {
         measured::<2, 4>(session, &job::<2>("plane_strain", "gauss", idle, end, step(n)), &mesh(n), end)
     });
-    assert_orders("plane strain", coarse, fine, 2.0);
+    assert_orders("plane strain", coarse, fine, 2.0, 1.85);
 }
 
 pub fn space(session: &Session) {
@@ -229,7 +321,7 @@ pub fn space(session: &Session) {
         let job = job::<3>("", "nodal", "", end, 0.5 / (n * n) as f64);
         measured::<3, 6>(session, &job, &mesh, end)
     });
-    assert_orders("space", coarse, fine, 2.0);
+    assert_orders("space", coarse, fine, 2.0, 1.85);
 }
 
 /// Velocities of runs on one mesh whose steps are halved: their differences halve too.

@@ -76,8 +76,10 @@ fn check_scheme(findings: &mut Findings<'_>) {
         if findings.root.find(&place).is_none() {
             continue;
         }
-        let message =
-            format!("damage, adhesion and contact memory are not available with the scheme \"{scheme}\" yet");
+        let message = format!(
+            "damage, adhesion and contact memory take the state before a step: \"{scheme}\" would lose its order or its \
+             freedom of step with them"
+        );
         findings.fault(&place, message, "take scheme = \"lagged_euler\"");
     }
 }

@@ -1,0 +1,60 @@
+//! Newton and linear iterations of small jobs beside stored numbers, so that effort cannot creep up unseen.
+//!
+//! One may be off on one rank with a factor. On several ranks, and with multigrid, sums are taken in another order, by which
+//! an iteration more or less may be needed here and there: a tenth either way.
+
+use crate::case::Case;
+
+/// Share by which counts on several ranks or with multigrid may differ.
+const MARGIN: f64 = 0.1;
+
+/// What is wrong with the counts of a job.
+fn count(name: &str, case: &Case, ranks: usize, stored: [f64; 2]) -> Option<String> {
+    let results = case.run(ranks);
+    let found = ["newton_iterations", "linear_iterations"].map(|key| results.number(key));
+    println!("{name} on {ranks}: {found:?}");
+    let exact = ranks == 1 && results.summary()["preconditioner"] == "cholesky";
+    let within =
+        |(found, stored): (f64, f64)| (found - stored).abs() <= if exact { 1.0 } else { MARGIN * stored };
+    let fits = found.into_iter().zip(stored).all(within);
+    (!fits).then(|| format!("{name} on {ranks}: {found:?}, stored {stored:?}"))
+}
+
+fn assert_counts(jobs: &[(&str, &Case, usize, [f64; 2])]) {
+    let wrong: Vec<String> =
+        jobs.iter().filter_map(|(name, case, ranks, stored)| count(name, case, *ranks, *stored)).collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn small_jobs_take_as_many_iterations_as_they_did() {
+    let of_paper = |scheme: &str, steps: u32| {
+        let step = (1.0 / f64::from(steps)).to_string();
+        Case::square(16)
+            .set("time.scheme", &format!("'{scheme}'"))
+            .set("time.step", &step)
+            .set("solver.preconditioner", "'cholesky'")
+    };
+    let [few, many] = [of_paper("lagged_euler", 16), of_paper("lagged_euler", 64)];
+    let [euler, bdf2] = ["implicit_euler", "bdf2"].map(|scheme| of_paper(scheme, 16));
+    let jobs = ["papers/wang_cheng_bdf2", "stick_on_a_jump", "oblique_sliding"];
+    let [adaptive, jump, oblique] = jobs.map(Case::of);
+    assert_counts(&[
+        ("lagged_euler, 16 steps", &few, 1, [60.0, 141.0]),
+        ("lagged_euler, 64 steps", &many, 1, [153.0, 353.0]),
+        ("implicit_euler", &euler, 1, [58.0, 151.0]),
+        ("bdf2", &bdf2, 1, [62.0, 157.0]),
+        (jobs[0], &adaptive, 1, [150.0, 352.0]),
+        (jobs[1], &jump, 1, [397.0, 396.0]),
+        (jobs[2], &oblique, 1, [100.0, 103.0]),
+        ("lagged_euler, 16 steps", &few, 2, [60.0, 141.0]),
+        ("implicit_euler", &euler, 2, [58.0, 151.0]),
+    ]);
+}
+
+#[test]
+fn multigrid_takes_as_many_iterations_as_it_did() {
+    let gamg = |case: Case| case.set("solver.preconditioner", "'gamg'");
+    let [square, cube] = [gamg(Case::square(32)), gamg(Case::cube(6)).set("time.end", "0.25")];
+    assert_counts(&[("square", &square, 1, [66.0, 447.0]), ("cube", &cube, 2, [17.0, 98.0])]);
+}
