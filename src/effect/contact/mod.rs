@@ -25,6 +25,7 @@ mod friction;
 mod inclusion;
 mod point;
 mod sliding;
+mod starts;
 mod tangential_point;
 mod unknowns;
 
