@@ -62,3 +62,29 @@ fn what_is_found_beyond_one_is_a_solution_and_others_are_told() {
         }
     }
 }
+
+/// With mass the layer has one motion in time, whatever its steps: up to the first rest position that it meets.
+#[test]
+fn adaptive_steps_follow_the_one_motion_though_longer_ones_have_several_solutions() {
+    for (load, rest) in
+        family(&[(10.8, 10.8 / 11.0), (13.0, 2.5)], &[(8.0, 8.0 / 11.0), (10.99, 10.99 / 11.0), (11.5, 2.25)])
+    {
+        for scheme in ["implicit_euler", "bdf2"] {
+            let case = Case::of("hard/three_solutions")
+                .set("material.density", "1.0")
+                .set("traction.0.value", &format!("[0, {:?}]", -load))
+                .without("solver.guesses")
+                .set("time.scheme", &format!("'{scheme}'"))
+                .set("time.step", "0.001")
+                .set("time.end", "100.0")
+                .set("time.adaptive", "{ tolerance = 1e-3, smallest_step = 1e-7, largest_step = 8.0 }");
+            let what = format!("{load} Pa, {scheme}");
+            case.run_with(1, &["--set", "solver.accept=[]"]).expect(2).says("theta of a step");
+            let results = case.run(1);
+            let found = -results.table("probes.csv").last("velocity_y");
+            let (steps, taken_back) = (results.number("steps"), results.number("rejected_steps"));
+            println!("{what}: at rest at {found:.6} m/s after {steps} steps, {taken_back} taken back");
+            crate::assert_close(found, rest, 1e-4, &what);
+        }
+    }
+}
