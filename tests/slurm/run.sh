@@ -17,6 +17,8 @@ fi
 
 here=$(mktemp -d)
 export SLURM_CONF=$here/slurm.conf SOLVER=$solver
+# As in the batch scripts: threaded BLAS rounds otherwise.
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 daemons=()
 end_daemons() {
