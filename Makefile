@@ -33,7 +33,7 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
-	@echo 'make hard      what make test samples of faults, many times; random input; a Slurm of its own (an hour; docs/stability.md)'
+	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (hours; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
 	@echo 'make clean     remove everything that was compiled'
@@ -54,8 +54,9 @@ run: deps
 test: deps
 	cargo test --release --locked
 
-# Kills, full disks, damaged files; then bytes for the readers; then Slurm, where root has one to start.
+# Families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
+	CLARKE_HARD=1 cargo test --release --locked --test hard -- --test-threads 1 --nocapture
 	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
 	fuzz/run.sh
 	cargo build --release --locked

@@ -87,6 +87,9 @@ enum Command {
         /// Also run the base job without each of its effects: what each costs and changes.
         #[arg(long)]
         ablate: bool,
+        /// Only every N-th run from the I-th on, and no tables: for N jobs of a cluster; the study then finds all runs finished.
+        #[arg(long, value_name = "I/N", conflicts_with = "ablate")]
+        part: Option<study::Part>,
     },
     /// Pictures and one self-contained HTML page.
     Report {
@@ -139,7 +142,9 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
-        Some(Command::Study { study, overrides, ablate }) => run_study(&study, &overrides, ablate),
+        Some(Command::Study { study, overrides, ablate, part }) => {
+            run_study(&study, &overrides, ablate, part)
+        }
         Some(Command::Report { folder }) => report_on(&folder),
         None => match &cli.run {
             Some(arguments) => run_job(arguments),
@@ -298,11 +303,14 @@ fn on_all_ranks(
     })
 }
 
-fn run_study(path: &Path, overrides: &[String], ablate: bool) -> Result<Exit> {
+fn run_study(path: &Path, overrides: &[String], ablate: bool, part: Option<study::Part>) -> Result<Exit> {
     in_session(|session, _| {
         let colour = std::io::stderr().is_terminal();
         let plan = session.agree(study::Plan::load(path, overrides, colour))?;
-        study::study(session, &plan, ablate)
+        match part {
+            Some(part) => study::study_part(session, &plan, part),
+            None => study::study(session, &plan, ablate),
+        }
     })
 }
 

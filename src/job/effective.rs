@@ -14,6 +14,7 @@ const NO_PHYSICS: &[&str] = &[
     "checkpoint",
     "output",
     "solver.accept",
+    "solver.guesses",
     "solver.inclusion_tolerance",
     "solver.max_newton_iterations",
     "solver.method",

@@ -57,6 +57,12 @@ pub struct Totals {
     pub newton_iterations: u64,
     /// Linear iterations.
     pub linear_iterations: u64,
+    /// Steps for which other solutions were looked for.
+    pub guessed_steps: u64,
+    /// Steps for which some were found.
+    pub steps_with_several: u64,
+    /// Most different solutions of a step.
+    pub most_solutions: u64,
     /// Where adaptive steps are on their ladder.
     #[serde(default)]
     pub pace: Option<Pace>,
@@ -122,6 +128,9 @@ impl Totals {
         self.max_inclusion_residual = self.max_inclusion_residual.max(outcome.inclusion_residual);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
+        self.guessed_steps += u64::from(outcome.solutions > 0);
+        self.steps_with_several += u64::from(outcome.solutions > 1);
+        self.most_solutions = self.most_solutions.max(outcome.solutions as u64);
     }
 }
 

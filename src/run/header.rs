@@ -74,6 +74,12 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     if let (Some(total), Some(share)) = (summary.error_indicator, summary.relative_error_indicator) {
         log.line(format!("indicator  error of the stress {total:.4e}, {:.1} % of its norm", 100.0 * share));
     }
+    if let Some(guesses) = summary.guesses {
+        log.line(format!(
+            "guesses    {} of {} steps have several solutions, at most {} were found",
+            guesses.steps_with_several, guesses.steps, guesses.most_solutions
+        ));
+    }
     let seconds: Vec<String> = summary
         .wall_seconds
         .iter()

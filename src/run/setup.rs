@@ -64,6 +64,9 @@ pub(super) fn setup<const D: usize, const S: usize>(
     } else {
         None
     };
+    if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
+        scheme.guesses = job.solver.guesses as usize;
+    }
     let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict })

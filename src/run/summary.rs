@@ -65,6 +65,9 @@ pub struct Summary {
     /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds: what
     /// `certificates.slip_pressure_bound` is to be held against.
     pub max_slip_pressure: Option<f64>,
+    /// What was found from other starts of steps; there if any were tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guesses: Option<Guesses>,
     /// What is known about solvability and stability.
     pub certificates: Certificates,
     /// Seconds by phase, of the slowest rank.
@@ -75,6 +78,17 @@ pub struct Summary {
     pub partition: PartitionQuality,
     /// What was allocated for the effects.
     pub inventory: Inventory,
+}
+
+/// What other starts of steps found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Guesses {
+    /// Steps that were solved from other starts, too.
+    pub steps: u64,
+    /// Steps with several solutions among these.
+    pub steps_with_several: u64,
+    /// Most different solutions of a step.
+    pub most_solutions: u64,
 }
 
 /// How the mesh was split.

@@ -8,7 +8,7 @@ use super::{
     restored::restore,
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
-    summary::{PartitionQuality, Summary, peak_memory},
+    summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     body::Body,
@@ -126,7 +126,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let outcome = self.take_step(length, end)?;
+            let outcome = self.take_step(length, end).map_err(|error| self.explain(error))?;
             self.totals.add(&outcome);
             watch_slip(self.session, &self.body, &self.state, &mut self.totals)?;
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
@@ -164,6 +164,17 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target.min(end))?;
         self.totals.pace = Some(adaptive.pace);
         Ok(outcome)
+    }
+
+    /// Adds what the certificates say to the words of a step that failed.
+    fn explain(&self, error: Error) -> Error {
+        match (error, self.certificates.theta_step) {
+            (Error::Failed(words), Some(theta)) if theta >= 1.0 => Error::Failed(format!(
+                "{words}; theta of a step = {theta:.3e} is not below 1, which the job accepts: a step may have several \
+                 solutions, and none that goes on from the step before"
+            )),
+            (error, _) => error,
+        }
     }
 
     /// Fails where the explicit scheme has made so much energy by itself that nothing of the answer is left.
@@ -310,6 +321,11 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
             max_slip_pressure: self.totals.max_slip_pressure,
+            guesses: (self.totals.guessed_steps > 0).then_some(Guesses {
+                steps: self.totals.guessed_steps,
+                steps_with_several: self.totals.steps_with_several,
+                most_solutions: self.totals.most_solutions,
+            }),
             certificates: self.certificates.clone(),
             wall_seconds: self.seconds(),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
@@ -347,6 +363,7 @@ fn kinds(outcome: &StepOutcome) -> String {
         ("slipping", points.slipping),
         ("separated", points.separated),
         ("indefinite", outcome.indefinite_solves),
+        ("solutions", outcome.solutions),
     ];
     let counts = told.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}  "));
     let last = points.branches.iter().rposition(|count| *count > 0);

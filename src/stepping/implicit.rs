@@ -8,7 +8,7 @@
 //! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`, for the velocity in the
 //! metric of the mass and for the stress in that of the compliance. For implicit Euler only the last term is left.
 
-use super::{flow::FlowStart, stepper::released_by_contact};
+use super::{contacts::released_by_contact, flow::FlowStart};
 use crate::{
     body::Body,
     effect::{Blend, Energy, Form, Step},

@@ -7,7 +7,7 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::stepper::released_by_contact;
+use super::contacts::released_by_contact;
 use crate::{
     body::Body,
     effect::{Energy, Step},

@@ -236,6 +236,7 @@ impl Newton {
             points: PointCount::from_array(session.sum(points)),
             indefinite_solves: effort.indefinite,
             inclusion_residual: inclusion,
+            solutions: 0,
             energy: Energy::default(),
         })
     }

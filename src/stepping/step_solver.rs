@@ -19,6 +19,7 @@ use crate::{
 };
 
 /// What a step brings to its solution.
+#[derive(Clone, Copy)]
 pub(super) struct Known<'a> {
     /// The right-hand side in N.
     pub forces: &'a DistributedVector,

@@ -2,6 +2,8 @@
 
 use super::{
     adaptive::Norms,
+    contacts::{commit_tractions, prepare_contacts},
+    guesses::{is_new, other_solutions},
     linear_solver::{Preconditioner, SolverSettings},
     rungs::nearest,
     scheme::{Method, Scheme},
@@ -10,7 +12,7 @@ use super::{
 use crate::{
     body::Body,
     effect::{Energy, Form, PointCount, Step},
-    error::Result,
+    error::{Error, Result},
     petsc::{DistributedVector, Stage},
     session::Session,
     state::State,
@@ -35,6 +37,8 @@ pub struct StepOutcome {
     pub indefinite_solves: usize,
     /// Largest scaled distance to the contact graphs.
     pub inclusion_residual: f64,
+    /// Different solutions that were found, where others were looked for; else 0.
+    pub solutions: usize,
     /// Energies of the step, over all ranks.
     pub energy: Energy,
 }
@@ -85,6 +89,8 @@ pub struct Stepper {
     trial: DistributedVector,
     /// Length in s through which the ladder of preconditioners goes.
     ladder: f64,
+    /// Other starts from which steps with contact are solved, to look for other solutions.
+    pub guesses: usize,
     /// Preconditioners that were made.
     pub set_ups: u64,
     /// Seconds by phase.
@@ -110,6 +116,7 @@ impl Stepper {
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
             ladder: 1.0,
+            guesses: 0,
             set_ups: 0,
             clock: StepClock::default(),
         })
@@ -205,22 +212,56 @@ impl Stepper {
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
         self.write_right_hand_side(session, body, state, step)?;
-        self.extrapolate(state, step)?;
-        session.agree(prepare_contacts(body, state, step))?;
-        self.method.prepare_contacts(body, state)?;
+        self.start(session, body, state, step)?;
         drop(stage);
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
+        let others = if self.guesses > 0 && !body.contacts.is_empty() {
+            let known = Known {
+                forces: &self.right_hand_side,
+                rounding: self.method.rounding(session),
+                start: self.method.flow_start(),
+            };
+            let (solver, trial) = (&mut self.solver, &self.trial);
+            let others = other_solutions(session, (body, state), step, known, solver, trial, self.guesses)?;
+            self.start(session, body, state, step)?;
+            Some(others)
+        } else {
+            None
+        };
+        let outcome = self.solve(session, body, state, step, others.as_deref());
+        drop(stage);
+        self.clock.solve += solving.elapsed();
+        outcome
+    }
+
+    /// Solves the prepared step, and tells how many different solutions it has beside these. Collective.
+    fn solve<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        others: Option<&[DistributedVector]>,
+    ) -> Result<StepOutcome> {
         let known = Known {
             forces: &self.right_hand_side,
             rounding: self.method.rounding(session),
             start: self.method.flow_start(),
         };
-        let outcome = self.solver.solve(session, body, state, step, known, &mut self.trial);
-        drop(stage);
-        self.clock.solve += solving.elapsed();
-        outcome
+        let solved = self.solver.solve(session, body, state, step, known, &mut self.trial);
+        let Some(others) = others else { return solved };
+        match solved {
+            Ok(outcome) => {
+                let solutions = others.len() + usize::from(is_new(others, &self.trial)?);
+                Ok(StepOutcome { solutions, ..outcome })
+            }
+            Err(Error::Failed(words)) => {
+                Err(Error::Failed(format!("{words}; solutions found from other starts: {}", others.len())))
+            }
+            Err(other) => Err(other),
+        }
     }
 
     /// Commits the step that was attempted last, and completes its outcome. Collective.
@@ -324,7 +365,19 @@ impl Stepper {
         Ok(())
     }
 
-    /// Starts from the velocity extrapolated linearly in time.
+    /// Starts from the velocity extrapolated linearly in time, and prepares the contacts. Collective.
+    fn start<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        self.extrapolate(state, step)?;
+        session.agree(prepare_contacts(body, state, step))?;
+        self.method.prepare_contacts(body, state)
+    }
+
     fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
         self.trial.copy_from(&state.velocity)?;
         if step.previous_length > 0.0 && state.step > 1 {
@@ -334,49 +387,4 @@ impl Stepper {
         }
         Ok(())
     }
-}
-
-/// Adds what contact released in a committed step.
-pub(super) fn released_by_contact<const D: usize, const S: usize>(
-    body: &Body<D, S>,
-    state: &State,
-    step: Step,
-    energy: &mut Energy,
-) -> Result<()> {
-    let velocity = state.velocity.local()?;
-    for contact in &body.contacts {
-        let [given, numerical] = contact.release(&velocity, step.length);
-        energy.contact += given;
-        energy.numerical += numerical;
-    }
-    Ok(())
-}
-
-/// Takes in what the step brings to the points of all contacts.
-fn prepare_contacts<const D: usize, const S: usize>(
-    body: &mut Body<D, S>,
-    state: &State,
-    step: Step,
-) -> Result<()> {
-    if body.contacts.is_empty() {
-        return Ok(());
-    }
-    let displacement = state.displacement.local()?;
-    for contact in &mut body.contacts {
-        contact.prepare(step.time, step.length, &displacement)?;
-    }
-    if let Some(traction) = &state.contact_traction {
-        let traction = traction.owned()?;
-        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
-    }
-    Ok(())
-}
-
-/// Puts the pressures of the step just taken into the state.
-fn commit_tractions<const D: usize, const S: usize>(body: &Body<D, S>, state: &mut State) -> Result<()> {
-    let Some(traction) = &mut state.contact_traction else { return Ok(()) };
-    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
-    traction.fill(0.0);
-    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
-    Ok(())
 }

@@ -14,6 +14,7 @@ mod execute;
 mod measure;
 mod orders;
 mod overlap;
+mod part;
 mod plan;
 mod plot;
 mod record;
@@ -24,6 +25,7 @@ mod table;
 mod targets;
 mod write;
 
+pub use part::Part;
 pub use plan::Plan;
 pub use results::Results;
 
@@ -98,6 +100,32 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
+}
+
+/// Runs a share of the study's runs, each in its own folder, and writes no tables: the study, started on as many ranks when
+/// all shares are done, finds them finished. Collective.
+pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
+    let say = |words: &str| {
+        if session.is_first() {
+            let _ = writeln!(std::io::stdout(), "{words}");
+        }
+    };
+    let repetitions = plan.study.timing.repetitions as usize;
+    let reference = match &plan.reference {
+        Some(PlannedReference::Run(planned)) => Some(&**planned),
+        _ => None,
+    };
+    let once = reference.into_iter().chain(&plan.split).map(|planned| (planned, 1));
+    let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
+    let mut failed = 0;
+    for (index, (planned, repetitions)) in all.iter().enumerate().filter(|(index, _)| part.has(*index)) {
+        let count = format!("{}/{}", index + 1, all.len());
+        match announced(session, planned, *repetitions, &count, &say)? {
+            Some(ran) => failed += usize::from(ran.record.error.is_some()),
+            None => return stopped(&say),
+        }
+    }
+    Ok(if failed > 0 { Exit::Failed } else { Exit::Done })
 }
 
 fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {

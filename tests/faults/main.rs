@@ -17,6 +17,7 @@ mod kills;
 #[allow(dead_code)]
 mod launch;
 mod limits;
+mod matrix;
 #[path = "../mpirun/mod.rs"]
 #[allow(dead_code)]
 mod mpirun;

@@ -1,6 +1,6 @@
 #!/bin/bash
-# A job under a real Slurm on this machine: warned before its time limit and preempted by another job, it is requeued until
-# it is done, and its answer is that of a run that was left alone.
+# Jobs under a real Slurm on this machine: a study as a job array has the errors of the study run at one go; a job that is warned
+# before its time limit and preempted by another job is requeued until it is done, with the answer of a run left alone.
 #
 #   tests/slurm/run.sh SOLVER
 #
@@ -17,6 +17,8 @@ fi
 
 here=$(mktemp -d)
 export SLURM_CONF=$here/slurm.conf SOLVER=$solver
+# As in the batch scripts: threaded BLAS rounds otherwise.
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 daemons=()
 end_daemons() {
@@ -98,6 +100,39 @@ wait_for_start() { # JOB TIMES
     tail -60 clarke-*.log >&2
     exit 1
 }
+
+# A study whose runs are shared out over an array, and put together by a job that waits for it.
+cat >study.toml <<END
+[base]
+job = "$root/jobs/papers/wang_cheng_2022.toml"
+[product]
+schemes = ["lagged_euler"]
+cells   = [[4, 4], [8, 8]]
+steps   = [0.0625, 0.03125]
+[reference.run]
+cells = [16, 16]
+step  = 0.015625
+[[norm]]
+of   = "velocity"
+in   = "H"
+over = "end"
+END
+script=$root/jobs/cluster/study.sbatch
+array=$(sbatch --parsable --array=1-3 --ntasks=2 --time=5 "$script" study.toml)
+collects=$(sbatch --parsable --dependency=afterok:"$array" --ntasks=2 --time=5 "$script" study.toml)
+echo "array $array of three tasks: five runs of a study"
+wait_for "$collects" JobState COMPLETED
+[[ $(cat clarke-study-"$array"_*.log | grep -c '^run .* s$') -eq 5 ]]
+[[ $(grep -c 'found finished' clarke-study-"$collects"_*.log) -eq 5 ]]
+cp out/study/study.json array.json
+rm -r out/study
+mpirun --oversubscribe --bind-to none -n 2 "$solver" study study.toml >study.log
+python3 - array.json out/study/study.json <<'END'
+import json, sys
+one, other = ([run["errors"][0]["error"] for run in json.load(open(name))["runs"]] for name in sys.argv[1:])
+assert len(one) == 4 and all(abs(a - b) < 1e-10 * a for a, b in zip(one, other)), (one, other)
+END
+echo "array $array: the errors of the study run at one go"
 
 id=$(sbatch --parsable --ntasks=2 --time=1 --signal=B:USR1@30 "$root/jobs/cluster/slurm.sbatch" job.toml)
 echo "job $id: until its limit warns it"

@@ -54,3 +54,26 @@ fn more_repetitions_than_were_kept_run_again() {
     assert_eq!(scene.results()["runs"][0]["repetitions"].as_array().expect("list").len(), 2);
     assert_eq!(found(&scene.study(1, &["--set", "timing.repetitions=2"]).expect(0).stdout), 2);
 }
+
+#[test]
+fn parts_of_a_study_are_put_together_by_the_study() {
+    let scene = scene();
+    let whole = scene.study(1, &[]).expect(0);
+    let alone = scene.results();
+    std::fs::remove_dir_all(scene.path("out")).expect("removed");
+    for part in ["2/2", "1/2"] {
+        let outcome = scene.study(1, &["--part", part]).expect(0);
+        assert_eq!(
+            outcome.stdout.matches("\nrun ").count() + usize::from(outcome.stdout.starts_with("run ")),
+            1
+        );
+        assert!(!scene.path("out/study/study.json").exists(), "no tables yet");
+    }
+    let collected = scene.study(1, &[]).expect(0);
+    assert_eq!((found(&whole.stdout), found(&collected.stdout)), (0, 2));
+    let error = |results: &serde_json::Value, run| number(results, &format!("/runs/{run}/errors/0/error"));
+    for run in 0..2 {
+        assert_eq!(error(&alone, run), error(&scene.results(), run));
+    }
+    let _ = scene.study(1, &["--part", "3/2"]).expect(2);
+}

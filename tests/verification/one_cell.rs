@@ -152,8 +152,25 @@ fn refusal(session: &Session) {
     set_up(&job("bottom", "newton")).expect("Newton's method takes any normal");
 }
 
+/// Where the graph is vertical its velocity is known to the last digit, whatever the pressure is.
+fn pushed_hard(session: &Session) {
+    let nodes = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    let mesh = part(session, &cell(nodes, vec![0, 1, 2], vec![[0, 1], [1, 2], [2, 0]]));
+    let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
+    let law = NormalLaw::Graph(Graph::new(vec![[3e-10, -1e9], [3e-10, 1e9]], 1.0, 1.0).expect("graph"));
+    let contact = Contact::new(session, &mesh, &facets, Quadrature::Nodal, law, Gap::default(), &[false; 6]);
+    let mut contacts = [contact.expect("contact")];
+    choose_unknowns(&mut contacts, &mesh).expect("one normal");
+    let mut values = vec![-7e8; 6];
+    contacts[0].map(&mut values);
+    let touching =
+        facets.iter().flat_map(|&f| mesh.facets[f as usize]).map(|node| values[node as usize * 2 + 1]);
+    assert_eq!(touching.collect::<Vec<_>>(), [-3e-10, -3e-10]);
+}
+
 pub fn all(session: &Session) {
     by_hand(session);
+    pushed_hard(session);
     refusal(session);
 }
 

@@ -25,6 +25,7 @@ mod friction;
 mod inclusion;
 mod point;
 mod sliding;
+mod starts;
 mod tangential_point;
 mod unknowns;
 
@@ -176,7 +177,9 @@ impl<const D: usize> Contact<D> {
             let along = point.along(values);
             let found = point.resolve(law, scale, along);
             point.pressure = found.pressure;
-            point.add_along(found.velocity / point.stretch - along, values);
+            // In two terms: the parameter may be much more than the velocity, which would drown in its rounding.
+            point.add_along(-along, values);
+            point.add_along(found.velocity / point.stretch, values);
         }
         if let Some(friction) = &mut self.friction {
             friction.map(&self.points, values);

@@ -79,6 +79,11 @@ pub struct Solver {
     pub friction: FrictionIteration,
     /// Warnings that should not stop the run.
     pub accept: Vec<Accept>,
+    /// Where a step may have several solutions (theta_step not below 1, accepted as "uniqueness"): from how many other
+    /// velocities of the contact boundary each step is solved again. Log and summary say how many different solutions were
+    /// found; the run goes on with the usual one. 0: none.
+    #[schemars(range(max = 1000))]
+    pub guesses: u32,
     /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
     #[schemars(example = serde_json::json!({ "snes_monitor": "" }))]
     pub petsc: BTreeMap<String, String>,
@@ -94,6 +99,7 @@ impl Default for Solver {
             max_newton_iterations: 50,
             friction: FrictionIteration::Newton,
             accept: Vec::new(),
+            guesses: 0,
             petsc: BTreeMap::new(),
         }
     }

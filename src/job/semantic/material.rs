@@ -106,9 +106,14 @@ pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
             && poisson_ratio > LOCKING
             && hypothesis != Some(Hypothesis::PlaneStress)
         {
+            let remedy = if dimension == 2 {
+                "a rectangle with diagonal = \"crossed\" does not lock (docs/stability.md)"
+            } else {
+                "compare with a finer mesh (docs/stability.md)"
+            };
             findings.warnings.push(format!(
                 "{path}.elasticity.poisson_ratio = {poisson_ratio}: linear elements lock above {LOCKING}; \
-                 expect displacements that are too small, and compare with a finer mesh"
+                 expect displacements that are too small; {remedy}"
             ));
         }
     }

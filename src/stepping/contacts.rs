@@ -1,0 +1,56 @@
+//! What contacts take in before a step and give after it.
+
+use crate::{
+    body::Body,
+    effect::{Energy, Step},
+    error::Result,
+    state::State,
+};
+
+/// Adds what contact released in a committed step.
+pub(super) fn released_by_contact<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+    step: Step,
+    energy: &mut Energy,
+) -> Result<()> {
+    let velocity = state.velocity.local()?;
+    for contact in &body.contacts {
+        let [given, numerical] = contact.release(&velocity, step.length);
+        energy.contact += given;
+        energy.numerical += numerical;
+    }
+    Ok(())
+}
+
+/// Takes in what the step brings to the points of all contacts.
+pub(super) fn prepare_contacts<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+    step: Step,
+) -> Result<()> {
+    if body.contacts.is_empty() {
+        return Ok(());
+    }
+    let displacement = state.displacement.local()?;
+    for contact in &mut body.contacts {
+        contact.prepare(step.time, step.length, &displacement)?;
+    }
+    if let Some(traction) = &state.contact_traction {
+        let traction = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+    }
+    Ok(())
+}
+
+/// Puts the pressures of the step just taken into the state.
+pub(super) fn commit_tractions<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &mut State,
+) -> Result<()> {
+    let Some(traction) = &mut state.contact_traction else { return Ok(()) };
+    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
+    traction.fill(0.0);
+    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
+    Ok(())
+}

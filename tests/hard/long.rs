@@ -1,0 +1,85 @@
+//! Very many steps: no drift of the balance, no memory that grows, sums that keep their digits.
+
+use crate::{assert_close, case::Case, results::Results, thorough};
+
+/// A million steps, or a sample.
+fn steps() -> usize {
+    if thorough() { 1_000_000 } else { 5_000 }
+}
+
+/// What is in the body and what left it, less what was put in, over what was put in.
+fn missing(results: &Results) -> f64 {
+    let history = results.table("history.csv");
+    let kept = [
+        "kinetic_energy",
+        "elastic_energy",
+        "viscous_dissipation",
+        "viscoplastic_dissipation",
+        "contact_dissipation",
+        "numerical_dissipation",
+    ];
+    let kept: f64 = kept.iter().map(|column| history.last(column)).sum();
+    (kept - history.last("external_work")).abs()
+        / history.numbers("viscous_dissipation").last().expect("a step")
+}
+
+/// A square of two cells, loaded to and fro, on a law with kinks.
+fn shaken(steps: usize) -> Case {
+    Case::square(1)
+        .set("traction.0.value", "['0', '-10*sin(2*pi*t)']")
+        .set("output.probe", "[{ name = 'tip', point = [1, 0] }]")
+        .without("output.profile")
+        .without("output.fields")
+        .set("time.step", "0.01")
+        .set("time.end", &format!("{:?}", steps as f64 * 0.01))
+}
+
+#[test]
+fn a_million_steps_of_a_small_job_drift_in_nothing_and_take_no_more_memory() {
+    let steps = steps();
+    let few = shaken(steps / 10).run(1).number("peak_memory_bytes");
+    let case = shaken(steps);
+    let results = case.run(1);
+    let missing = missing(&results);
+    let grown = results.number("peak_memory_bytes") - few;
+    let imbalance = results.number("max_energy_imbalance");
+    println!(
+        "{steps} steps: {missing:.1e} of the energy is missing, worst step {imbalance:.1e}, memory grew by {grown:e} bytes"
+    );
+    assert_eq!(results.number("steps"), steps as f64);
+    assert!(missing < 1e-9 && imbalance < 1e-9, "{missing:e}, {imbalance:e}");
+    assert!(grown < 2e6, "memory grew by {grown:e} bytes");
+    let velocity = results.table("probes.csv").numbers("velocity_y");
+    let period = |n: usize| &velocity[100 * n..100 * (n + 1)];
+    let largest = velocity.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let last = steps / 100 - 1;
+    let off = period(last - 1).iter().zip(period(last)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("the last period differs from the one before by {off:e} m/s");
+    assert!(off < 1e-9 * largest, "{off:e}");
+}
+
+/// A bar that creeps at a constant rate: strain and history cancel to a stress that is ever smaller beside them.
+#[test]
+fn the_history_keeps_its_digits_while_it_is_summed_up() {
+    let (steps, step) = (steps(), 0.01);
+    let case = Case::of("hard/nearly_perfect_plasticity")
+        .set("mesh.rectangle.cells", "[1, 1]")
+        .set("material.viscosity", "{ volumetric = 0.0, shear = 50.0 }")
+        .set("material.viscoplasticity.perzyna.relaxation", "100.0")
+        .without("material.viscoplasticity.perzyna.hardening_modulus")
+        .set("traction.0.value", "[15.0, 0.0]")
+        .set("time.scheme", "'lagged_euler'")
+        .set("time.step", &format!("{step}"))
+        .set("time.end", &format!("{:?}", steps as f64 * step));
+    let results = case.run(1);
+    let velocity = results.table("probes.csv").numbers("velocity_x");
+    let (half, last) = (velocity[steps / 2], velocity[steps - 1]);
+    println!(
+        "after {steps} steps the rate is {last:.17}, half way {half:.17}; {:.1e} apart",
+        (last / half - 1.0).abs()
+    );
+    let moved = results.table("probes.csv").last("displacement_x");
+    println!("strain {moved:.6}");
+    assert_close(last, half, 1e-9, "rate of creep");
+    assert!(results.number("max_energy_imbalance") < 1e-9);
+}
