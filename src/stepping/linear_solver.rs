@@ -120,11 +120,11 @@ impl Preconditioner {
         matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
     }
 
-    /// Iterations that cost as much as making it anew (measured, see docs/contact-preconditioner.md).
+    /// Iterations that cost as much as making it anew; in 3D that never pays (measured, see docs/contact-preconditioner.md).
     pub(super) fn patience(self, dimension: usize) -> usize {
         match self {
-            Self::Auto | Self::Cholesky if dimension == 2 => 5,
-            Self::Auto | Self::Cholesky => 40,
+            _ if dimension == 3 => usize::MAX,
+            Self::Auto | Self::Cholesky => 5,
             Self::Gamg | Self::Boomeramg => 40,
         }
     }
