@@ -34,8 +34,14 @@ pub struct Boundary<'a> {
     points: Vec<[f64; 3]>,
     arc: Vec<f64>,
     dimension: usize,
-    /// The body at the same time, with the numbers of the boundary's nodes and normals out of it there.
-    behind: Option<(&'a Snapshot, Vec<usize>, Vec<[f64; 3]>)>,
+    behind: Option<Behind<'a>>,
+}
+
+/// The body at the same time, with the numbers of the boundary's nodes and normals out of it there.
+struct Behind<'a> {
+    snapshot: &'a Snapshot,
+    nodes: Vec<usize>,
+    normals: Vec<[f64; 3]>,
 }
 
 /// What acts on a boundary.
@@ -70,7 +76,7 @@ impl<'a> Boundary<'a> {
         if let Some(snapshot) = snapshot.filter(|snapshot| snapshot.time == time) {
             boundary.behind = boundary.nodes_of(snapshot).map(|nodes| {
                 let normals = super::view::normals(snapshot, &nodes);
-                (snapshot, nodes, normals)
+                Behind { snapshot, nodes, normals }
             });
         }
         boundary
@@ -217,7 +223,7 @@ impl<'a> Boundary<'a> {
         if law.needs_normals() && self.behind.is_none() {
             return None;
         }
-        let normal = |n: usize| self.behind.as_ref().map_or([0.0; 3], |(_, _, normals)| normals[n]);
+        let normal = |n: usize| self.behind.as_ref().map_or([0.0; 3], |behind| behind.normals[n]);
         let node = |n: usize| [law.abscissa(self.time, (&self.points[n], &normal(n)), u[n], v[n]), p[n]];
         let nodes: Vec<[f64; 2]> = (0..self.points.len()).map(node).collect();
         let on = law.branches_of(&nodes);
@@ -280,7 +286,7 @@ impl<'a> Boundary<'a> {
 
     /// The nodes on the graph of friction.
     fn on_friction(&self) -> Result<Option<Picture>> {
-        let (Some(law), Some((snapshot, nodes, normals))) = (&self.friction, &self.behind) else {
+        let (Some(law), Some(Behind { snapshot, nodes, normals })) = (&self.friction, &self.behind) else {
             return Ok(None);
         };
         let Some(velocity) = &snapshot.velocity else { return Ok(None) };
@@ -306,7 +312,9 @@ impl<'a> Boundary<'a> {
 
     /// The deformed mesh of a plane body with the boundary's normal velocity and contact pressure as arrows.
     pub fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
-        let Some((_, nodes, normals)) = self.behind.as_ref().filter(|(_, nodes, _)| nodes.len() > 1) else {
+        let Some(Behind { nodes, normals, .. }) =
+            self.behind.as_ref().filter(|behind| behind.nodes.len() > 1)
+        else {
             return Ok(Vec::new());
         };
         if self.dimension != 2 {
