@@ -54,8 +54,9 @@ run: deps
 test: deps
 	cargo test --release --locked
 
-# Families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
+# Random contact laws; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
+	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test verification random_laws
 	CLARKE_HARD=1 cargo test --release --locked --test hard -- --test-threads 1 --nocapture
 	CLARKE_HARD=1 cargo test --release --locked --test faults -- --test-threads 1 --nocapture
 	fuzz/run.sh
