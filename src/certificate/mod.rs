@@ -41,10 +41,8 @@ use crate::{
 use ascent::{Quotient, climb};
 use serde::{Deserialize, Serialize};
 
-/// Relative change at which a supremum counts as found. That of the explicit step stands among many others that are nearly as
-/// large and is approached slowly.
+/// Relative change at which a supremum counts as found.
 const TOLERANCE: f64 = 1e-5;
-const STEP_TOLERANCE: f64 = 1e-4;
 /// Iterations after which it is taken as it is.
 const ITERATIONS: usize = 60;
 /// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
@@ -206,7 +204,7 @@ fn find<const D: usize, const S: usize>(
     let mut pencil = Pencil { body, scheme, kind };
     if kind == Kind::ExplicitStep {
         let start = rough(body, state)?;
-        return Ok(climb(session, &mut pencil, start, None, STEP_TOLERANCE, ITERATIONS)?.value);
+        return Ok(climb(session, &mut pencil, start, None, TOLERANCE, ITERATIONS)?.value);
     }
     let pulled = match &starts.pulled {
         Some(pulled) => copy(pulled)?,
