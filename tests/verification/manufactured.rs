@@ -137,8 +137,8 @@ pub fn job_of<const D: usize>(case: &Case) -> String {
     let factor = elastic_factor(field.time, case.relaxation);
     let elastic = (factor.as_str(), elastic);
     let Case { scheme, end, step, extra, quadrature, .. } = case;
-    let mut job =
-        format!("{}[time]\nend = {end}\nstep = {step}\nscheme = \"{scheme}\"\n[material]\n", any_mesh::<D>());
+    let scheme = if *scheme == "lagged_euler" { String::new() } else { format!("scheme = \"{scheme}\"\n") };
+    let mut job = format!("{}[time]\nend = {end}\nstep = {step}\n{scheme}[material]\n", any_mesh::<D>());
     if D == 2 {
         job += &format!("hypothesis = \"{}\"\n", case.hypothesis);
     }
