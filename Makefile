@@ -24,7 +24,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps build run test hard lint install clean
+.PHONY: help deps build run test hard bench lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
+	@echo 'make bench     kernels of a step against the memory bandwidth'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (hours; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -62,6 +63,10 @@ hard: deps
 	fuzz/run.sh
 	cargo build --release --locked
 	tests/slurm/run.sh $(binary)
+
+# Kernels against the memory bandwidth of this machine.
+bench: deps
+	cargo bench --locked --bench kernels
 
 lint: deps
 	cargo fmt --all --check

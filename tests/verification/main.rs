@@ -21,6 +21,7 @@ mod memory;
 mod mpirun;
 mod obstacles;
 mod one_cell;
+mod orders;
 mod patch;
 mod petsc_boundary;
 mod random_laws;
@@ -68,6 +69,8 @@ fn scenario() {
         "several_laws" => obstacles::several(&session, &folder),
         "random_laws" => random_laws::solve(&session),
         "subspace" => subspace::solve(&session),
+        "orders_plane" => orders::plane(&session),
+        "orders_space" => orders::space(&session),
         "ladder_plane" => ladder::plane(&session),
         "ladder_space" => ladder::space(&session),
         "manufactured_plane" => manufactured::plane(&session),

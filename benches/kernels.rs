@@ -1,0 +1,135 @@
+//! Kernels of a step against the memory bandwidth of the same machine in the same run: `cargo bench --bench kernels`.
+//!
+//! Each kernel's traffic is what it has to read and write once if nothing stays in cache between passes: nodes of cells,
+//! geometry, histories, nodal values. The last lines are ratios to the triad `a = b + s c`, whose traffic is counted
+//! without what the cache fetches before it writes.
+
+use clarke::{
+    body::Body,
+    effect::{Form, Step},
+    job::Job,
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, box_mesh, rectangle},
+    },
+    run::Simulation,
+    session::{Mpi, Session},
+    space::Simplex,
+};
+use criterion::{Criterion, Throughput};
+use std::{
+    hint::black_box,
+    mem::size_of,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+/// Numbers of a triad's array: three of them are far larger than any cache.
+const TRIAD: usize = 1 << 24;
+/// Repetitions of which the fastest counts.
+const REPETITIONS: usize = 9;
+
+/// A kernel with the bytes that it has to move.
+struct Kernel<'a> {
+    name: String,
+    bytes: usize,
+    run: Box<dyn FnMut() + 'a>,
+}
+
+fn fastest(run: &mut dyn FnMut()) -> f64 {
+    let seconds = |_| {
+        let start = Instant::now();
+        run();
+        start.elapsed().as_secs_f64()
+    };
+    (0..REPETITIONS).map(seconds).fold(f64::INFINITY, f64::min)
+}
+
+fn simulation<const D: usize, const S: usize>(
+    session: &Session,
+    job: &str,
+    mesh: GlobalMesh<D>,
+) -> Simulation<D, S> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job);
+    let text = std::fs::read_to_string(&path).expect("the job");
+    let multigrid = "solver.preconditioner=\"gamg\"".to_owned();
+    let mut loaded = Job::from_text(&text, job, Path::new("."), &[multigrid]).expect("a job");
+    Simulation::new(session, &mut loaded, Some(mesh)).expect("a simulation")
+}
+
+/// Bytes of a pass over cells: their nodes, their geometry, so many numbers of each cell, and so many of each node.
+fn traffic<const D: usize, const S: usize>(body: &Body<D, S>, per_cell: usize, per_node: usize) -> usize {
+    let cell = (D + 1) * size_of::<u32>() + size_of::<Simplex<D>>() + per_cell * size_of::<f64>();
+    body.mesh.cell_count() * cell + body.mesh.nodes.len() * per_node * size_of::<f64>()
+}
+
+fn kernels<'a, const D: usize, const S: usize>(name: &str, run: &'a mut Simulation<D, S>) -> Vec<Kernel<'a>> {
+    let step = Step { time: 0.125, length: 0.0625, previous_length: 0.0625 };
+    let (body, state) = (&mut run.body, &run.state);
+    let count = body.mesh.nodes.len() * D;
+    // Displacement and velocity are read; forces are read and written; the history is read, its trial written.
+    let history = traffic(body, 2 * S, 4 * D);
+    let form = traffic(body, 0, 3 * D);
+    let body = std::rc::Rc::new(std::cell::RefCell::new(body));
+    let other = body.clone();
+    let (mut forces, mut product) = (vec![0.0; count], vec![0.0; count]);
+    let x: Vec<f64> = (0..count).map(|i| (i as f64).sin()).collect();
+    vec![
+        Kernel {
+            name: format!("history and right-hand side, {name}"),
+            bytes: history,
+            run: Box::new(move || {
+                let mut body = body.borrow_mut();
+                black_box(body.add_explicit_forces(state, step, &mut forces).expect("forces"));
+            }),
+        },
+        Kernel {
+            name: format!("a form without its matrix, {name}"),
+            bytes: form,
+            run: Box::new(move || other.borrow().add_form(Form::Viscosity, &x, &mut product)),
+        },
+    ]
+}
+
+fn triad() -> Kernel<'static> {
+    let (mut a, b, c) = (vec![0.0; TRIAD], vec![1.0; TRIAD], vec![2.0; TRIAD]);
+    Kernel {
+        name: "triad".into(),
+        bytes: 3 * TRIAD * size_of::<f64>(),
+        run: Box::new(move || {
+            let s = black_box(3.0);
+            a.iter_mut().zip(&b).zip(&c).for_each(|((a, b), c)| *a = b + s * c);
+            black_box(&a);
+        }),
+    }
+}
+
+fn main() {
+    let mpi = Mpi::start().expect("MPI");
+    let session = mpi.session().expect("PETSc");
+    let square = rectangle([1.0; 2], [700; 2], Diagonal::Right, [1.0; 2]).expect("a square");
+    let cube = box_mesh([1.0; 3], [44; 3], [1.0; 3]).expect("a cube");
+    let mut plane = simulation::<2, 3>(&session, "wang_cheng_2022.toml", square);
+    let mut space = simulation::<3, 6>(&session, "wang_cheng_cube.toml", cube);
+    let mut all = vec![triad()];
+    all.extend(kernels("980,000 triangles", &mut plane));
+    all.extend(kernels("511,104 tetrahedra", &mut space));
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_secs(2))
+        .configure_from_args();
+    let mut group = criterion.benchmark_group("kernels");
+    for kernel in &mut all {
+        group.throughput(Throughput::Bytes(kernel.bytes as u64));
+        group.bench_function(&kernel.name, |bencher| bencher.iter(&mut kernel.run));
+    }
+    group.finish();
+    let rate = |kernel: &mut Kernel| kernel.bytes as f64 / fastest(&mut kernel.run) / 1e9;
+    let bandwidth = rate(&mut all[0]);
+    println!("\n{:<55} {:>8} {:>8}", "kernel", "GB/s", "of triad");
+    for kernel in &mut all {
+        let rate = rate(kernel);
+        println!("{:<55} {rate:>8.2} {:>8.2}", kernel.name, rate / bandwidth);
+    }
+}

@@ -1,0 +1,133 @@
+//! Rung 8 where no motion can be prescribed: the order in the step of each effect under each of its schemes, from the
+//! differences of runs whose steps are halved.
+
+use crate::manufactured::{Case, Touch, job_of};
+use crate::run_on;
+use crate::scenes::simulation;
+use clarke::{
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, box_mesh, rectangle},
+    },
+    output::history::Totals,
+    session::Session,
+};
+
+const END: f64 = 0.4;
+const ALL: &[(&str, f64)] = &[("lagged_euler", 1.0), ("implicit_euler", 1.0), ("bdf2", 2.0)];
+/// Effects that take the state before a step.
+const LAGGED: &[(&str, f64)] = &[("lagged_euler", 1.0)];
+
+/// An effect: its tables, and what tells that it acted.
+struct Acting {
+    name: &'static str,
+    material: &'static str,
+    contact: &'static str,
+    schemes: &'static [(&'static str, f64)],
+    sign: fn(&Totals) -> f64,
+}
+
+const EFFECTS: [Acting; 6] = [
+    Acting {
+        name: "linear flow",
+        material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5 }",
+        contact: "",
+        schemes: ALL,
+        sign: |totals| totals.viscoplastic_dissipation,
+    },
+    Acting {
+        name: "flow by a power, with hardening",
+        material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5, exponent = 2.0, hardening_modulus = 1.5 }",
+        contact: "",
+        schemes: ALL,
+        sign: |totals| totals.viscoplastic_dissipation,
+    },
+    Acting {
+        name: "flow on a cone",
+        material: "viscoplasticity.drucker_prager = { relaxation = 2.0, friction_coefficient = 0.3, cohesion = 0.4 }",
+        contact: "",
+        schemes: ALL,
+        sign: |totals| totals.viscoplastic_dissipation,
+    },
+    Acting {
+        name: "damage",
+        material: "damage = { threshold = 0.1, viscosity = 5.0 }",
+        contact: "",
+        schemes: LAGGED,
+        sign: |totals| totals.damage_dissipation,
+    },
+    Acting {
+        name: "adhesion",
+        material: "",
+        contact: "[contact.adhesion]\nstiffness = 3.0\nenergy = 0.1\nviscosity = 2.0\n",
+        schemes: LAGGED,
+        sign: |totals| totals.adhesion_dissipation,
+    },
+    Acting {
+        name: "memory",
+        material: "",
+        contact: "[contact.memory]\nstiffness_rate = 4.0\ndecay_time = 0.5\n",
+        schemes: LAGGED,
+        sign: |totals| totals.contact_dissipation.abs(),
+    },
+];
+
+/// The orders of velocity and displacement at the end.
+fn orders<const D: usize, const S: usize>(
+    session: &Session,
+    mesh: &GlobalMesh<D>,
+    effect: &Acting,
+    scheme: &str,
+) -> [f64; 2] {
+    let hypothesis = if D == 2 { "plane_strain" } else { "" };
+    let fields = [16, 32, 64].map(|steps: u32| {
+        let step = END / f64::from(steps);
+        let (quadrature, extra, end) = ("nodal", effect.material, END);
+        let case =
+            Case { hypothesis, scheme, quadrature, extra, relaxation: None, touch: Touch::Damper, end, step };
+        let text = job_of::<D>(&case).replacen("[initial]", &format!("{}[initial]", effect.contact), 1);
+        let mut run = simulation::<D, S>(session, &text, mesh);
+        while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
+        assert!((effect.sign)(&run.totals) > 1e-3, "{}, {scheme}: {:?}", effect.name, run.totals);
+        [&run.state.velocity, &run.state.displacement].map(|f| f.owned().expect("values").to_vec())
+    });
+    std::array::from_fn(|field| {
+        let distance = |a: usize, b: usize| {
+            let pairs = fields[a][field].iter().zip(&fields[b][field]);
+            session.sum([pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>()])[0].sqrt()
+        };
+        (distance(0, 1) / distance(1, 2)).log2()
+    })
+}
+
+fn all<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
+    for effect in &EFFECTS {
+        for (scheme, expected) in effect.schemes {
+            let found = orders::<D, S>(session, mesh, effect, scheme);
+            println!("{}, {scheme}, {D}D: {found:.3?}", effect.name);
+            assert!(
+                found.iter().all(|order| (order - expected).abs() < 0.25),
+                "{}, {scheme}, {D}D: orders {found:?} of velocity and displacement, not {expected}",
+                effect.name
+            );
+        }
+    }
+}
+
+pub fn plane(session: &Session) {
+    all::<2, 4>(session, &rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh"));
+}
+
+pub fn space(session: &Session) {
+    all::<3, 6>(session, &box_mesh([1.0; 3], [3; 3], [1.0; 3]).expect("mesh"));
+}
+
+#[test]
+fn every_effect_is_of_the_order_of_its_schemes_in_the_plane() {
+    run_on(&[1], "orders_plane");
+}
+
+#[test]
+fn every_effect_is_of_the_order_of_its_schemes_in_space() {
+    run_on(&[1], "orders_space");
+}
