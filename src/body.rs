@@ -7,6 +7,7 @@ pub use implicit::Cells;
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
+    material::Isotropic,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
     session::Session,
@@ -107,6 +108,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Whether effects stand for this form in all of the body.
     pub fn has_form_everywhere(&self, form: Form) -> bool {
         self.effects.iter().any(|e| e.form() == Some(form) && e.is_everywhere())
+    }
+
+    /// The tensor of a material in a form, if it has one.
+    pub fn tensor(&self, form: Form, material: usize) -> Option<Isotropic> {
+        self.effects.iter().filter(|e| e.form() == Some(form)).find_map(|e| e.tensor(material))
     }
 
     /// Adds `F x` of a form to `forces`; both with ghosts, held components not yet zeroed.

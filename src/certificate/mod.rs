@@ -19,10 +19,13 @@
 //! times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. Where the normal law has no
 //! largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1 with that fall,
 //! `1 / sup of sum fall int w_tau^2` over `(K w, w) - sum (m_j int w_nu^2 + m_t int w_tau^2)`; a run is held against it. Suprema
-//! run over velocities that the supports allow. Numerically they are approached from below. Where a region of the body has no
+//! run over velocities that the supports allow. Numerically they are approached from below. On meshes of more than 10,000 velocity
+//! components `explicit_step_bound` is the least of the bounds of single cells, which is never too large, unless a step of the
+//! run is longer than that. Where a region of the body has no
 //! viscosity, `m_A` is 0 and `theta` has no meaning.
 
 mod ascent;
+mod cells;
 mod forms;
 mod small_eigen;
 mod verdict;
@@ -43,6 +46,8 @@ use serde::{Deserialize, Serialize};
 
 /// Relative change at which a supremum counts as found.
 const TOLERANCE: f64 = 1e-5;
+/// Velocity components up to which the sharp bound of explicit steps costs next to nothing.
+const SMALL: usize = 10_000;
 /// Iterations after which it is taken as it is.
 const ITERATIONS: usize = 60;
 /// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
@@ -72,6 +77,10 @@ pub struct Certificates {
     pub slip_pressure_bound: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
+    /// Whether the largest stable step may be longer than that: of a large mesh the bound of its cells is enough, where no step
+    /// is longer.
+    #[serde(skip)]
+    pub explicit_bound_is_least: bool,
     /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
     #[serde(skip)]
     pub flowing_step_bound: Option<f64>,
@@ -81,12 +90,14 @@ pub struct Certificates {
 }
 
 impl Certificates {
-    /// Computes what the body and the scheme, prepared for its step, call for. Collective.
+    /// Computes what the body and the scheme, prepared for its step, call for, where no step is longer than `longest` in s.
+    /// Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         state: &State,
         scheme: &mut Stepper,
+        longest: f64,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
         let growth = growth(&body.contacts);
@@ -117,9 +128,17 @@ impl Certificates {
         }
         known.not_covered = not_covered(&body.contacts, known.theta_step, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
-            let waves = 1.0 / find(Kind::ExplicitStep)?;
             let flow = body.flow_step_bound();
-            known.explicit_step_bound = Some(flow.map_or(waves, |flow| waves.min(flow)));
+            let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
+            let is_large = body.unknowns(session) > SMALL;
+            let least = cells::explicit_step_bound(session, body).filter(|waves| is_large && decides(waves));
+            let waves = match least {
+                Some(waves) => waves,
+                None => 1.0 / find(Kind::ExplicitStep)?,
+            };
+            let bound = flow.map_or(waves, |flow| waves.min(flow));
+            known.explicit_step_bound = Some(bound);
+            known.explicit_bound_is_least = least == Some(bound);
             known.flowing_step_bound = flow.map(|flow| 1.0 / (1.0 / waves + 1.0 / flow));
         }
         Ok(known)

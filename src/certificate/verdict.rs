@@ -70,7 +70,7 @@ impl Certificates {
             }
         }
         if let Some(bound) = self.explicit_step_bound {
-            verdict.stability(bound, step, accepted.explicit_stability);
+            verdict.stability(bound, self.explicit_bound_is_least, step, accepted.explicit_stability);
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
@@ -113,10 +113,11 @@ impl Verdict {
         );
     }
 
-    fn stability(&mut self, bound: f64, step: f64, accepted: bool) {
+    fn stability(&mut self, bound: f64, is_least: bool, step: f64, accepted: bool) {
         if step < bound {
+            let least = if is_least { "at least " } else { "" };
             self.words.push(format!(
-                "steps are stable up to {bound:.4e} s: explicit elastic and viscoplastic stress, adhesion, \
+                "steps are stable up to {least}{bound:.4e} s: explicit elastic and viscoplastic stress, adhesion, \
                  contact memory"
             ));
             return;
@@ -159,6 +160,7 @@ mod tests {
             trace_norm_squared: Some(2.24),
             slip_pressure_bound: None,
             explicit_step_bound: Some(0.12),
+            explicit_bound_is_least: false,
             flowing_step_bound: Some(0.08),
             not_covered: Vec::new(),
         }
@@ -204,6 +206,13 @@ mod tests {
         let known = Certificates { theta: Some(1.5), ..paper() };
         let verdict = known.verdict(1.0 / 64.0, None, Accepted::default());
         assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
+    }
+
+    #[test]
+    fn a_bound_that_is_only_the_least_is_said_to_be_that() {
+        let known = Certificates { explicit_bound_is_least: true, ..paper() };
+        let words = known.verdict(0.01, None, Accepted::default()).words;
+        assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 1.2000e-1 s")));
     }
 
     #[test]

@@ -79,7 +79,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
         Some(Form::Elasticity)
     }
 
-    fn elasticity(&self, material: usize) -> Option<Isotropic> {
+    fn tensor(&self, material: usize) -> Option<Isotropic> {
         self.law.get(material).map(|law| law.tensor)
     }
 

@@ -76,6 +76,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
         Some(Form::Mass)
     }
 
+    fn density(&self, material: usize) -> Option<f64> {
+        self.density.get(material).copied()
+    }
+
     fn add_form(&self, batch: &mut Batch<D, S>) {
         self.add_mass(1.0, batch);
     }

@@ -174,8 +174,13 @@ pub trait Effect<const D: usize, const S: usize> {
     /// Adds the force of its form to the batch: nodal force, or minus the stress; given velocity and strain rate.
     fn add_form(&self, _batch: &mut Batch<D, S>) {}
 
-    /// The elastic tensor in Pa of a material, if it is elasticity and the material has some.
-    fn elasticity(&self, _material: usize) -> Option<Isotropic> {
+    /// The tensor of a material in its form, if the material has one: of elasticity in Pa, of viscosity in Pa s.
+    fn tensor(&self, _material: usize) -> Option<Isotropic> {
+        None
+    }
+
+    /// The density of a material in kg/m^d, if it is inertia and the material has some.
+    fn density(&self, _material: usize) -> Option<f64> {
         None
     }
 

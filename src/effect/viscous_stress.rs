@@ -43,6 +43,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         Some(Form::Viscosity)
     }
 
+    fn tensor(&self, material: usize) -> Option<Viscosity> {
+        self.tensor.get(material).copied()
+    }
+
     fn add_form(&self, batch: &mut Batch<D, S>) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {

@@ -14,7 +14,7 @@ pub enum Hypothesis {
 }
 
 /// `T(e) = volumetric tr(e) I + shear e`, where `tr` and `I` run over the stored normal components.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Isotropic {
     /// Factor of the trace, in Pa or Pa s.
     pub volumetric: f64,

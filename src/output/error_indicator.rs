@@ -12,6 +12,7 @@
 
 use crate::{
     body::Body,
+    effect::Form,
     error::Result,
     material::Isotropic,
     petsc::DistributedVector,
@@ -44,7 +45,7 @@ impl<const S: usize> ErrorIndicator<S> {
     pub fn new<const D: usize>(session: &Session, body: &Body<D, S>) -> Result<Self> {
         let mine = body.geometry.runs.iter().map(|run| run.material + 1).max().unwrap_or(0);
         let count = session.largest([mine as f64])[0] as usize;
-        let of = |material| body.effects.iter().find_map(|effect| effect.elasticity(material));
+        let of = |material| body.tensor(Form::Elasticity, material);
         let means = DistributedVector::ghosted(S + 1, body.mesh.owned, &body.mesh.ghosts);
         Ok(Self { elasticity: (0..count).map(of).collect(), means: session.agree(means)? })
     }

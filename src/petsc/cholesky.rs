@@ -22,7 +22,6 @@ pub struct Cholesky {
     given: *mut sys::cholmod_dense,
     halfway: *mut sys::cholmod_dense,
     work: [*mut sys::cholmod_dense; 2],
-    block: usize,
     /// The unknown at each place of the order of elimination.
     order: Vec<u32>,
     last: usize,
@@ -33,7 +32,7 @@ pub struct Cholesky {
 const DISSECTED: usize = 2_000;
 
 impl Cholesky {
-    /// Analyses the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
+    /// Factors the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
     /// can't be: the rest does not tie them together.
     pub fn new(
         block: usize,
@@ -59,7 +58,6 @@ impl Cholesky {
             given: ptr::null_mut(),
             halfway: ptr::null_mut(),
             work: [ptr::null_mut(); 2],
-            block,
             order: Vec::new(),
             last: last.len(),
             not_send: PhantomData,
@@ -94,7 +92,19 @@ impl Cholesky {
         }
         cholesky.check()?;
         let tail = &cholesky.order[size - last.len()..];
-        Ok(tail.iter().all(|&unknown| is_last[unknown as usize]).then_some(cholesky))
+        if !tail.iter().all(|&unknown| is_last[unknown as usize]) {
+            return Ok(None);
+        }
+        // SAFETY: the view lives for the call; the handle owns a factor of its pattern.
+        unsafe { sys::cholmod_factorize(&mut matrix, cholesky.factor, &mut *cholesky.common) };
+        if cholesky.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
+            return Err(Error::Failed(
+                "the matrix of the step is not positive definite: check densities, viscosities and moduli"
+                    .into(),
+            ));
+        }
+        cholesky.check()?;
+        Ok(Some(cholesky))
     }
 
     /// Nodes in an order that leaves little to factor.
@@ -119,21 +129,6 @@ impl Cholesky {
         }
         self.check()?;
         Ok(order)
-    }
-
-    /// Factors a matrix of the pattern that was analysed.
-    pub fn factor(&mut self, rows: &BlockRows) -> Result<()> {
-        let mut lower = Lower::of(self.block, rows)?;
-        let mut matrix = lower.view();
-        // SAFETY: a live factor of this pattern; the view lives for the call.
-        unsafe { sys::cholmod_factorize(&mut matrix, self.factor, &mut *self.common) };
-        if self.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
-            return Err(Error::Failed(
-                "the matrix of the step is not positive definite: check densities, viscosities and moduli"
-                    .into(),
-            ));
-        }
-        self.check()
     }
 
     /// Takes a right-hand side half through: `L y = b`.
@@ -290,7 +285,6 @@ mod tests {
     fn both_halves_together_solve() {
         let rows = chain(5);
         let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
-        cholesky.factor(&rows).unwrap();
         // A parabola has the second difference 2.
         let x = solve(&mut cholesky, &[2.0; 5]);
         for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
@@ -301,8 +295,7 @@ mod tests {
     #[test]
     fn the_last_block_is_the_factor_of_the_schur_complement() {
         let rows = chain(3);
-        let mut cholesky = Cholesky::new(1, &rows, &[0, 2], None).unwrap().unwrap();
-        cholesky.factor(&rows).unwrap();
+        let cholesky = Cholesky::new(1, &rows, &[0, 2], None).unwrap().unwrap();
         // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
         let l = cholesky.last_factor();
         let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
@@ -315,7 +308,6 @@ mod tests {
     fn a_value_set_halfway_is_that_of_the_last_unknown() {
         let rows = chain(3);
         let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
-        cholesky.factor(&rows).unwrap();
         cholesky.forward(&[0.0; 3]).unwrap();
         let along = cholesky.last_factor()[0];
         cholesky.last_mut()[0] = 3.0 * along;
@@ -341,7 +333,7 @@ mod tests {
     fn an_indefinite_matrix_is_an_error_in_words() {
         let mut rows = chain(3);
         rows.values[0] = -2.0;
-        let mut cholesky = Cholesky::new(1, &rows, &[1], None).unwrap().unwrap();
-        assert!(cholesky.factor(&rows).unwrap_err().to_string().contains("not positive definite"));
+        let error = Cholesky::new(1, &rows, &[1], None).unwrap_err();
+        assert!(error.to_string().contains("not positive definite"));
     }
 }

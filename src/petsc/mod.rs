@@ -9,6 +9,7 @@ mod callback;
 mod cholesky;
 mod dense;
 mod ksp;
+mod large_pages;
 mod library;
 mod lower_half;
 mod matrix;

@@ -58,7 +58,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
         other => other,
     });
     session.agree(prepared)?;
-    let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme))?;
+    let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme, longest))?;
     let unique_step = if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
     } else {

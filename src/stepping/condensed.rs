@@ -167,10 +167,9 @@ impl Condensed {
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
         self.factored = None;
-        let analysed = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref());
-        let Some(mut cholesky) = session.agree(analysed)? else { return Ok(false) };
+        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref());
+        let Some(cholesky) = session.agree(factored)? else { return Ok(false) };
         self.order.get_or_insert_with(|| cholesky.order().to_vec());
-        session.agree(cholesky.factor(&rows))?;
         drop(rows);
         let mut place = vec![0; body.mesh.total_nodes * D];
         cholesky.last_unknowns().iter().enumerate().for_each(|(at, &unknown)| place[unknown as usize] = at);

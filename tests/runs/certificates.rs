@@ -157,6 +157,28 @@ fn kinetic_energy_after(step: f64) -> f64 {
     case.run(1).table("history.csv").last("kinetic_energy")
 }
 
+/// Of a large mesh, where short steps don't ask for more.
+#[test]
+fn the_bound_of_the_cells_is_below_the_sharp_one_and_near_it() {
+    let square = || Case::square(72).without("material.viscoplasticity");
+    let thin = "{ volumetric = 0.0, shear = 1e-3 }";
+    let kinds: [(&dyn Fn() -> Case, f64); 3] = [
+        (&square, 0.998),
+        (&|| square().set("material.viscosity", thin).set("mesh.rectangle.grading", "[1.0, 1.02]"), 0.5),
+        (&|| square().without("material.viscosity"), 0.5),
+    ];
+    for (case, nearest) in kinds {
+        let bound = |step: &str, ranks| {
+            let case = case().set("solver.accept", "['explicit_stability', 'uniqueness']");
+            certificate(&check(&case.set("time.step", step), ranks), "explicit_step_bound")
+        };
+        let (least, sharp) = (bound("1e-6", 1), bound("1.0", 1));
+        println!("at least {least}, sharp {sharp}");
+        assert!(least <= sharp && least > nearest * sharp, "{least} and {sharp}");
+        assert!((bound("1e-6", 3) - least).abs() <= 1e-12 * least);
+    }
+}
+
 #[test]
 fn steps_grow_without_bound_exactly_beyond_the_certified_one() {
     let bound = certificate(&check(&Case::square(8), 1), "explicit_step_bound");

@@ -168,7 +168,7 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
     let found = indicated(session, &run, &stress);
 
     let (field, elastic) = (motion::<2>(), elasticity("plane_stress"));
-    let compliance = run.body.effects.iter().find_map(|e| e.elasticity(0)).expect("elasticity");
+    let compliance = run.body.tensor(clarke::effect::Form::Elasticity, 0).expect("elasticity");
     let exact = |x: &[f64; 2]| -> Mandel<3> {
         let gradient: [[f64; 2]; 2] =
             std::array::from_fn(|i| std::array::from_fn(|j| field.value(i, &[j], x)));
