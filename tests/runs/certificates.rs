@@ -164,7 +164,7 @@ fn the_bound_of_the_cells_is_below_the_sharp_one_and_near_it() {
     let thin = "{ volumetric = 0.0, shear = 1e-3 }";
     let kinds: [(&dyn Fn() -> Case, f64); 3] = [
         (&square, 0.998),
-        (&|| square().set("material.viscosity", thin).set("mesh.rectangle.grading", "[1.0, 1.02]"), 0.5),
+        (&|| square().set("material.viscosity", thin).set("mesh.rectangle.grading", "{ y = 1.02 }"), 0.5),
         (&|| square().without("material.viscosity"), 0.5),
     ];
     for (case, nearest) in kinds {
