@@ -33,7 +33,7 @@ const FUNCTIONS: &[&str] = &[
     "SNESSetDivergenceTolerance",
     "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
     "MatDense(Get|Restore)Array(Read)?",
-    "(malloc|posix_memalign|madvise)",
+    "(malloc|posix_memalign|madvise|dlsym)",
     "cholmod_(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
 ];
 

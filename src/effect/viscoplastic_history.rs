@@ -29,7 +29,8 @@ impl<const S: usize> ViscoplasticHistory<S> {
         Self { laws, stress, accumulated }
     }
 
-    /// Advances a batch by the strain rate that `flow` gives for a cell of the batch and its stress.
+    /// Advances a batch by the strain rates that `flow` gives for some cells of the batch from the first one on and their
+    /// stresses.
     #[inline(always)]
     fn advance<const D: usize>(
         stress: &mut CellHistory<S>,
@@ -37,24 +38,45 @@ impl<const S: usize> ViscoplasticHistory<S> {
         step: Step,
         batch: &mut Batch<D, S>,
         energy: &mut Energy,
-        mut flow: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
+        mut flow: impl FnMut(usize, &[Mandel<S>]) -> [Mandel<S>; TOGETHER],
     ) {
         let (converged, trial) = stress.both(batch.number);
-        for (at, (converged, trial)) in converged.iter().zip(trial).enumerate() {
-            let lag = elasticity.apply(&batch.strain_rate[at]);
-            let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, converged);
-            let lagged = add_scaled(&upper, -step.previous_length, &lag);
-            let flow = flow(at, &lagged);
-            let release = elasticity.apply(&flow);
-            *trial = add_scaled(converged, -step.length, &release);
-            let share = batch.integrity.of(at);
-            batch.stress[at] = add_scaled(&batch.stress[at], share, trial);
-            let weight = share * batch.cells[at].volume * step.length;
-            energy.viscoplastic += weight * dot(&lagged, &flow);
-            energy.numerical +=
-                weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
+        for first in (0..converged.len()).step_by(TOGETHER) {
+            let cells = first..converged.len().min(first + TOGETHER);
+            let [mut lag, mut lagged] = [[[0.0; S]; TOGETHER]; 2];
+            for (i, at) in cells.clone().enumerate() {
+                lag[i] = elasticity.apply(&batch.strain_rate[at]);
+                let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, &converged[at]);
+                lagged[i] = add_scaled(&upper, -step.previous_length, &lag[i]);
+            }
+            let flow = flow(first, &lagged[..cells.len()]);
+            for (i, at) in cells.enumerate() {
+                let release = elasticity.apply(&flow[i]);
+                trial[at] = add_scaled(&converged[at], -step.length, &release);
+                let share = batch.integrity.of(at);
+                batch.stress[at] = add_scaled(&batch.stress[at], share, &trial[at]);
+                let weight = share * batch.cells[at].volume * step.length;
+                energy.viscoplastic += weight * dot(&lagged[i], &flow[i]);
+                energy.numerical += weight
+                    * (0.5 * step.length * dot(&release, &flow[i])
+                        - step.previous_length * dot(&lag[i], &flow[i]));
+            }
         }
     }
+}
+
+/// Cells whose flow is computed together.
+const TOGETHER: usize = 8;
+
+/// Strain rates of a law that knows one cell at a time, given its position among the stresses.
+#[inline(always)]
+fn one_by_one<const S: usize>(
+    stresses: &[Mandel<S>],
+    mut rate: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
+) -> [Mandel<S>; TOGETHER] {
+    let mut rates = [[0.0; S]; TOGETHER];
+    stresses.iter().enumerate().for_each(|(i, stress)| rates[i] = rate(i, stress));
+    rates
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
@@ -88,21 +110,25 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         let (stress, elasticity) = (&mut self.stress, law.elasticity());
         match law {
             Viscoplasticity::Perzyna(law) => {
-                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+                Self::advance(stress, elasticity, step, batch, energy, |_, all| law.strain_rates(all));
             }
             Viscoplasticity::Maxwell(law) => {
-                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
+                Self::advance(stress, elasticity, step, batch, energy, flow);
             }
             Viscoplasticity::DruckerPrager(law) => {
-                Self::advance(stress, elasticity, step, batch, energy, |_, s| law.strain_rate(s));
+                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
+                Self::advance(stress, elasticity, step, batch, energy, flow);
             }
             Viscoplasticity::Hardening(law) => {
                 let Some(accumulated) = &mut self.accumulated else { return };
                 let (converged, trial) = accumulated.both(batch.number);
-                Self::advance(stress, elasticity, step, batch, energy, |at, s| {
-                    let (rate, growth) = law.strain_rate(s, converged[at][0]);
-                    trial[at][0] = converged[at][0] + step.length * growth;
-                    rate
+                Self::advance(stress, elasticity, step, batch, energy, |first, all| {
+                    one_by_one(all, |i, s| {
+                        let (rate, growth) = law.strain_rate(s, converged[first + i][0]);
+                        trial[first + i][0] = converged[first + i][0] + step.length * growth;
+                        rate
+                    })
                 });
             }
         }

@@ -7,6 +7,7 @@ mod hardening;
 mod isotropic;
 mod maxwell;
 mod perzyna;
+mod plane_projection;
 mod return_mapping;
 mod viscoplasticity;
 

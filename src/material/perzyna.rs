@@ -15,9 +15,9 @@
 //! Applied Mechanics 9 (1966), 243-377; E. de Souza Neto, D. Peric, D. Owen, Computational Methods for Plasticity, 2008,
 //! chapter 11), with a viscosity that does not depend on `n` at `f = yield stress`.
 
-use super::Isotropic;
+use super::{Isotropic, plane_projection::Surface};
 use crate::tensor::{Mandel, dot, normal_components, trace, von_mises};
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::{array, f64::consts::FRAC_1_SQRT_2};
 
 /// The norm in which the projection is orthogonal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,32 +98,56 @@ impl Perzyna {
         out
     }
 
+    /// The strain rates of at most `N` stresses, as [`strain_rate`](Self::strain_rate) gives them one by one.
+    #[inline]
+    pub fn strain_rates<const S: usize, const N: usize>(&self, stresses: &[Mandel<S>]) -> [Mandel<S>; N] {
+        let mut rates = [[0.0; S]; N];
+        let norms: [f64; N] = array::from_fn(|i| stresses.get(i).map_or(0.0, von_mises));
+        let largest = norms.iter().fold(0.0, |most: f64, norm| if *norm > most { *norm } else { most });
+        if S != 3 || self.exponent != 1.0 || self.yield_stress <= NO_YIELD_STRESS * largest {
+            rates.iter_mut().zip(stresses).for_each(|(rate, stress)| *rate = self.strain_rate(stress));
+        } else if largest > self.yield_stress {
+            let all: [Mandel<S>; N] = array::from_fn(|i| stresses.get(i).copied().unwrap_or([0.0; S]));
+            let projected = self.project_plane_stresses(&all, &norms);
+            let factor = 0.5 / self.relaxation;
+            for i in (0..N).filter(|&i| norms[i] > self.yield_stress) {
+                rates[i] = array::from_fn(|c| factor * (all[i][c] - projected[i][c]));
+            }
+        }
+        rates
+    }
+
     fn project_plane_stress<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
         if self.yield_stress <= NO_YIELD_STRESS * norm {
             return [0.0; S];
         }
-        let p = (s[0] + s[1]) * FRAC_1_SQRT_2;
-        let q = (s[0] - s[1]) * FRAC_1_SQRT_2;
+        let [projected] = self.project_plane_stresses(&[*s], &[norm]);
+        projected
+    }
+
+    #[inline(always)]
+    fn project_plane_stresses<const S: usize, const N: usize>(
+        &self,
+        stresses: &[Mandel<S>; N],
+        norms: &[f64; N],
+    ) -> [Mandel<S>; N] {
         let (along, across) = self.inverse_metric();
-        let across = 3.0 * across;
-        let (volumetric, deviatoric) = (0.5 * p * p, 1.5 * (q * q + s[2] * s[2]));
-        let mut multiplier = (norm / self.yield_stress - 1.0) / along.max(across);
-        for _ in 0..60 {
-            let (a, b) = (1.0 / (1.0 + along * multiplier), 1.0 / (1.0 + across * multiplier));
-            let square = volumetric * a * a + deviatoric * b * b;
-            let fall = along * volumetric * a * a * a + across * deviatoric * b * b * b;
-            let step = (square.sqrt() / self.yield_stress - 1.0) * square / fall;
-            multiplier += step;
-            if step.abs() <= 1e-15 * multiplier {
-                break;
-            }
+        let surface = Surface { along, across: 3.0 * across, yield_stress: self.yield_stress };
+        let [mut p, mut q] = [[0.0; N]; 2];
+        let [mut volumetric, mut deviatoric] = [[0.0; N]; 2];
+        for (i, s) in stresses.iter().enumerate() {
+            (p[i], q[i]) = ((s[0] + s[1]) * FRAC_1_SQRT_2, (s[0] - s[1]) * FRAC_1_SQRT_2);
+            (volumetric[i], deviatoric[i]) = (0.5 * p[i] * p[i], 1.5 * (q[i] * q[i] + s[2] * s[2]));
         }
-        let p = p / (1.0 + along * multiplier) * FRAC_1_SQRT_2;
-        let b = 1.0 / (1.0 + across * multiplier);
-        let q = q * b * FRAC_1_SQRT_2;
-        let mut out = [0.0; S];
-        (out[0], out[1], out[2]) = (p + q, p - q, s[2] * b);
-        out
+        let multipliers = surface.multipliers(&volumetric, &deviatoric, norms);
+        array::from_fn(|i| {
+            let p = p[i] / (1.0 + surface.along * multipliers[i]) * FRAC_1_SQRT_2;
+            let b = 1.0 / (1.0 + surface.across * multipliers[i]);
+            let q = q[i] * b * FRAC_1_SQRT_2;
+            let mut out = [0.0; S];
+            (out[0], out[1], out[2]) = (p + q, p - q, stresses[i][2] * b);
+            out
+        })
     }
 
     /// Inverse eigenvalues of the metric in plane stress: on `p`, and on `q` and `r`.
@@ -178,6 +202,19 @@ mod tests {
         let law = law(Metric::Elasticity, Hypothesis::PlaneStress);
         assert_eq!(law.strain_rate(&[18.9, 0.0, 0.0]), [0.0; 3]);
         assert_eq!(law.project(&[18.9, 0.0, 0.0]), [18.9, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn stresses_flow_together_as_they_do_one_by_one() {
+        let stresses = [[40.0, -3.0, 7.0], [0.0; 3], [1e6, 1e6, 0.0], [12.0, 3.0, 1.0], [-25.0, 20.0, 30.0]];
+        for (metric, exponent) in [(METRICS[0], 1.0), (METRICS[1], 1.0), (METRICS[2], 2.5)] {
+            let law = Perzyna { exponent, ..law(metric, Hypothesis::PlaneStress) };
+            let rates: [Mandel<3>; 8] = law.strain_rates(&stresses);
+            for (rate, stress) in rates.iter().zip(&stresses) {
+                assert_eq!(*rate, law.strain_rate(stress));
+            }
+            assert!(rates[5..].iter().all(|rate| *rate == [0.0; 3]));
+        }
     }
 
     #[test]

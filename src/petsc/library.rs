@@ -1,4 +1,4 @@
-use super::{c_string, check, keep_fault, large_pages, sys};
+use super::{c_string, check, keep_fault, large_pages, sys, threads};
 use crate::error::Result;
 use mpi::{environment::Universe, topology::Communicator, traits::AsRaw};
 use std::{
@@ -24,6 +24,7 @@ impl<'u> Petsc<'u> {
         let mut pointers: Vec<*mut c_char> = arguments.iter().map(|a| a.as_ptr().cast_mut()).collect();
         pointers.push(ptr::null_mut());
         large_pages::allow();
+        threads::one_unless_chosen();
         // PETSc keeps the argument vector for its whole life.
         let pointers = Box::leak(pointers.into_boxed_slice());
         // SAFETY: MPI is initialised (the universe is alive), the communicator is set before PETSc starts, and the

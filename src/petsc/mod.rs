@@ -18,6 +18,7 @@ mod projected_operator;
 mod reduced;
 mod snes;
 pub mod sys;
+mod threads;
 mod variational_inequality;
 mod vector;
 
