@@ -22,6 +22,7 @@ mod mpirun;
 mod obstacles;
 mod one_cell;
 mod orders;
+mod taken_back;
 mod patch;
 mod petsc_boundary;
 mod random_laws;
@@ -70,6 +71,7 @@ fn scenario() {
         "random_laws" => random_laws::solve(&session),
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
+        "taken_back" => taken_back::in_the_plane(&session),
         "orders_space" => orders::space(&session),
         "ladder_plane" => ladder::plane(&session),
         "ladder_space" => ladder::space(&session),

@@ -13,21 +13,21 @@ use clarke::{
     session::Session,
 };
 
-const END: f64 = 0.4;
+pub const END: f64 = 0.4;
 const ALL: &[(&str, f64)] = &[("lagged_euler", 1.0), ("implicit_euler", 1.0), ("bdf2", 2.0)];
 /// Effects that take the state before a step.
 const LAGGED: &[(&str, f64)] = &[("lagged_euler", 1.0)];
 
 /// An effect: its tables, and what tells that it acted.
-struct Acting {
-    name: &'static str,
+pub struct Acting {
+    pub name: &'static str,
     material: &'static str,
     contact: &'static str,
-    schemes: &'static [(&'static str, f64)],
-    sign: fn(&Totals) -> f64,
+    pub schemes: &'static [(&'static str, f64)],
+    pub sign: fn(&Totals) -> f64,
 }
 
-const EFFECTS: [Acting; 6] = [
+pub const EFFECTS: [Acting; 6] = [
     Acting {
         name: "linear flow",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5 }",
@@ -72,6 +72,17 @@ const EFFECTS: [Acting; 6] = [
     },
 ];
 
+impl Acting {
+    /// The job under a scheme with steps of this length in s.
+    pub fn job<const D: usize>(&self, scheme: &str, step: f64) -> String {
+        let hypothesis = if D == 2 { "plane_strain" } else { "" };
+        let (quadrature, extra, end) = ("nodal", self.material, END);
+        let case =
+            Case { hypothesis, scheme, quadrature, extra, relaxation: None, touch: Touch::Damper, end, step };
+        job_of::<D>(&case).replacen("[initial]", &format!("{}[initial]", self.contact), 1)
+    }
+}
+
 /// The orders of velocity and displacement at the end.
 fn orders<const D: usize, const S: usize>(
     session: &Session,
@@ -79,13 +90,8 @@ fn orders<const D: usize, const S: usize>(
     effect: &Acting,
     scheme: &str,
 ) -> [f64; 2] {
-    let hypothesis = if D == 2 { "plane_strain" } else { "" };
     let fields = [16, 32, 64].map(|steps: u32| {
-        let step = END / f64::from(steps);
-        let (quadrature, extra, end) = ("nodal", effect.material, END);
-        let case =
-            Case { hypothesis, scheme, quadrature, extra, relaxation: None, touch: Touch::Damper, end, step };
-        let text = job_of::<D>(&case).replacen("[initial]", &format!("{}[initial]", effect.contact), 1);
+        let text = effect.job::<D>(scheme, END / f64::from(steps));
         let mut run = simulation::<D, S>(session, &text, mesh);
         while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
         assert!((effect.sign)(&run.totals) > 1e-3, "{}, {scheme}: {:?}", effect.name, run.totals);
