@@ -1,6 +1,6 @@
 //! The page that `solver report` makes of a run.
 
-use crate::{case::Case, launch};
+use crate::{browser::assert_fits, case::Case, launch};
 use resvg::usvg::roxmltree::{Document, Node, ParsingOptions};
 use std::path::{Path, PathBuf};
 
@@ -92,6 +92,13 @@ fn check_page(page: &Path) -> Vec<String> {
 /// The square whose numbers an independent program gave.
 pub fn square() -> Case {
     Case::square(8)
+}
+
+#[test]
+fn the_page_fits_wide_and_narrow_screens() {
+    let case = square();
+    case.run(1);
+    assert_fits(&report(&case.folder().join("out")), case.folder());
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Studies: refusals of the study file, and whole studies under `mpirun`.
 
+#[path = "../runs/browser.rs"]
+mod browser;
 mod corners;
 #[path = "../runs/launch.rs"]
 #[allow(dead_code)]

@@ -1,6 +1,10 @@
 //! Errors of the steps apart from those of the mesh, and what reaching an error takes.
 
-use crate::scene::{Scene, number};
+use crate::{
+    browser::assert_fits,
+    launch::run_alone,
+    scene::{Scene, number},
+};
 use std::path::Path;
 
 fn paper() -> Scene {
@@ -14,6 +18,15 @@ fn paper() -> Scene {
     let scene = Scene::new("", "");
     scene.write("study.toml", &study);
     scene
+}
+
+#[test]
+fn the_page_of_a_study_fits_wide_and_narrow_screens() {
+    let scene = paper();
+    scene.study(1, &[]).expect(0);
+    let folder = scene.path("out/study");
+    run_alone(&["report".as_ref(), folder.as_os_str()]).expect(0);
+    assert_fits(&folder.join("report/index.html"), &scene.path("out"));
 }
 
 #[test]
