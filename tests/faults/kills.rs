@@ -55,8 +55,10 @@ fn run_and_kill(case: &Case, whole: Duration, random: &mut Random, counts: &mut 
     let saved = || out.exists() && !case.results().checkpoints().is_empty();
     let mut running = case.start_with(RANKS, if saved() { &["--restart"] } else { &[] });
     let killed = kill(case, &mut running, moment, whole, random);
+    let launcher_hung = running.end_launcher_without_ranks();
     let outcome = running.wait();
     if killed {
+        *counts.entry("launchers that hung").or_default() += usize::from(launcher_hung);
         assert!(outcome.code != 0 || case.results().summary()["status"] == "completed");
         *counts.entry("kills").or_default() += 1;
         *counts.entry("while a checkpoint was written").or_default() += usize::from(half_written(&out));

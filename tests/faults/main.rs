@@ -32,6 +32,10 @@ mod undisturbed;
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
     let name = std::env::var(mpirun::SCENARIO).expect("a scenario");
+    if name.starts_with("restart_") {
+        let folder = std::env::var(mpirun::FOLDER).expect("a folder");
+        return matrix::scenario(&name, folder.as_ref());
+    }
     let exit = one_rank::fail(name.trim_start_matches("one_rank "));
     std::process::exit(i32::from(exit as u8));
 }

@@ -17,6 +17,9 @@ use std::{
 fn guard() -> Duration {
     Duration::from_secs(if std::env::var_os("CLARKE_HARD").is_some() { 3000 } else { 120 })
 }
+/// Time after which an `mpirun` without ranks is ended.
+#[allow(dead_code)]
+const DESERTED: Duration = Duration::from_secs(20);
 /// How long processes may outlive their `mpirun`.
 const FAREWELL: Duration = Duration::from_secs(5);
 /// Every process of a run carries the number of the run under this name.
@@ -164,6 +167,23 @@ impl Running {
     #[allow(dead_code)]
     pub fn goes_on(&mut self) -> bool {
         self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
+    }
+
+    /// Waits for the end, but ends an `mpirun` that stays although its ranks are gone, and says whether it had to: after a kill
+    /// Open MPI 4.1 now and then locks itself up when it shuts down.
+    #[allow(dead_code)]
+    pub fn end_launcher_without_ranks(&mut self) -> bool {
+        let mut deserted = Instant::now();
+        while self.goes_on() {
+            if self.processes().into_iter().any(runs_solver) {
+                deserted = Instant::now();
+            }
+            if deserted.elapsed() > DESERTED {
+                return send("KILL", self.launcher.id());
+            }
+            self.sleep();
+        }
+        false
     }
 
     /// Waits for the end; none of its processes may be left then.

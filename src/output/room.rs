@@ -1,0 +1,42 @@
+//! Room for a file that is to grow. HDF5 leaves ranks waiting for ever for one that could not write its part of a file's own
+//! tables; so ranks ask before they write.
+
+use rustix::{
+    fs::statvfs,
+    process::{Resource, getrlimit},
+};
+use std::path::Path;
+
+/// Bytes for the tables of HDF5 between two flushes.
+pub(super) const TABLES: u64 = 1 << 18;
+
+/// Why a file can't grow by these bytes: the limit of file sizes of this process, or, if it is to look there too, the disk.
+pub(super) fn lacks(path: &Path, more: u64, look_at_disk: bool) -> Result<(), String> {
+    let length = std::fs::metadata(path).map_or(0, |data| data.len());
+    if let Some(limit) =
+        getrlimit(Resource::Fsize).current.filter(|limit| length.saturating_add(more) > *limit)
+    {
+        return Err(format!("File too large: no file of this process may have more than {limit} bytes"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match statvfs(folder) {
+        Ok(disk) if look_at_disk && disk.f_bavail.saturating_mul(disk.f_frsize) < more => {
+            Err(format!("No space left on device: {} bytes free", disk.f_bavail * disk.f_frsize))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_may_grow_as_far_as_the_disk_has_room() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        assert_eq!(lacks(&file, 1, true), Ok(()));
+        assert!(lacks(&file, 1 << 60, true).unwrap_err().starts_with("No space left on device"));
+        assert_eq!(lacks(&file, 1 << 60, false), Ok(()));
+    }
+}
