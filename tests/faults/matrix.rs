@@ -30,6 +30,7 @@ const EFFECTS: [Choice; 14] = [
         "cone",
         &[
             ("material.hypothesis", "'plane_strain'"),
+            ("material.elasticity.poisson_ratio", "0.2"),
             (
                 "material.viscoplasticity",
                 "{ drucker_prager = { relaxation = 100.0, friction_coefficient = 0.3, cohesion = 3.0 } }",
