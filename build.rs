@@ -33,7 +33,7 @@ const FUNCTIONS: &[&str] = &[
     "SNESSetDivergenceTolerance",
     "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
     "MatDense(Get|Restore)Array(Read)?",
-    "(malloc|posix_memalign|madvise|dlsym)",
+    "(madvise|dlsym)",
     "cholmod_(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
 ];
 
@@ -47,9 +47,7 @@ fn main() {
 
     let petsc = find_petsc();
     check_configuration(&petsc.include_paths);
-    for library in ["cholmod", "suitesparseconfig"] {
-        println!("cargo::rustc-link-lib={library}");
-    }
+    println!("cargo::rustc-link-lib=cholmod");
     let mpi = build_probe_mpi::probe()
         .unwrap_or_else(|e| panic!("no MPI found (Debian: apt-get install libopenmpi-dev): {e:?}"));
     let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
@@ -62,7 +60,7 @@ fn main() {
         .generate_cstr(true)
         .allowlist_function(format!("({})", FUNCTIONS.join("|")))
         .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*|MatDuplicateOption|MatStructure|PetscBool)")
-        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|SuiteSparse_config|MADV_HUGEPAGE)")
+        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|MADV_HUGEPAGE)")
         .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
         .raw_line("pub use mpi_sys::{MPI_Comm, RSMPI_COMM_SELF};")
         .layout_tests(false)

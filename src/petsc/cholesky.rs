@@ -1,5 +1,5 @@
 use super::{
-    BlockRows,
+    BlockRows, large_pages,
     lower_half::{Lower, view},
     sys,
 };
@@ -104,6 +104,11 @@ impl Cholesky {
             ));
         }
         cholesky.check()?;
+        // SAFETY: CHOLMOD has just written so many numbers there.
+        unsafe {
+            let factor = &*cholesky.factor;
+            large_pages::put(std::slice::from_raw_parts(factor.x.cast::<f64>(), factor.xsize));
+        }
         Ok(Some(cholesky))
     }
 

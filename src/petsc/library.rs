@@ -1,4 +1,4 @@
-use super::{c_string, check, keep_fault, large_pages, sys, threads};
+use super::{c_string, check, keep_fault, sys, threads};
 use crate::error::Result;
 use mpi::{environment::Universe, topology::Communicator, traits::AsRaw};
 use std::{
@@ -23,7 +23,6 @@ impl<'u> Petsc<'u> {
         let arguments = [c"solver", c"-skip_petscrc", c"-no_signal_handler"];
         let mut pointers: Vec<*mut c_char> = arguments.iter().map(|a| a.as_ptr().cast_mut()).collect();
         pointers.push(ptr::null_mut());
-        large_pages::allow();
         threads::one_unless_chosen();
         // PETSc keeps the argument vector for its whole life.
         let pointers = Box::leak(pointers.into_boxed_slice());
