@@ -34,7 +34,7 @@ help:
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
 	@echo 'make bench     kernels of a step against the memory bandwidth'
-	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (hours; docs/stability.md)'
+	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
 	@echo 'make clean     remove everything that was compiled'

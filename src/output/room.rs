@@ -19,11 +19,12 @@ pub(super) fn lacks(path: &Path, more: u64, look_at_disk: bool) -> Result<(), St
         return Err(format!("File too large: no file of this process may have more than {limit} bytes"));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match statvfs(folder) {
-        Ok(disk) if look_at_disk && disk.f_bavail.saturating_mul(disk.f_frsize) < more => {
-            Err(format!("No space left on device: {} bytes free", disk.f_bavail * disk.f_frsize))
-        }
-        _ => Ok(()),
+    // Some file systems don't know how large they are.
+    let disk = statvfs(folder).ok().filter(|disk| look_at_disk && disk.f_blocks > 0);
+    let free = disk.map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
+    match free.filter(|free| *free < more) {
+        Some(free) => Err(format!("No space left on device: {free} bytes free")),
+        None => Ok(()),
     }
 }
 
