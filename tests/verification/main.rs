@@ -22,13 +22,13 @@ mod mpirun;
 mod obstacles;
 mod one_cell;
 mod orders;
-mod taken_back;
 mod patch;
 mod petsc_boundary;
 mod random_laws;
 mod scenes;
 mod schemes;
 mod subspace;
+mod taken_back;
 mod wave;
 
 use clarke::session::Mpi;

@@ -4,6 +4,7 @@
 use crate::manufactured::{Case, Touch, job_of};
 use crate::run_on;
 use crate::scenes::simulation;
+use crate::schemes::observed;
 use clarke::{
     mesh::{
         GlobalMesh,
@@ -97,13 +98,7 @@ fn orders<const D: usize, const S: usize>(
         assert!((effect.sign)(&run.totals) > 1e-3, "{}, {scheme}: {:?}", effect.name, run.totals);
         [&run.state.velocity, &run.state.displacement].map(|f| f.owned().expect("values").to_vec())
     });
-    std::array::from_fn(|field| {
-        let distance = |a: usize, b: usize| {
-            let pairs = fields[a][field].iter().zip(&fields[b][field]);
-            session.sum([pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>()])[0].sqrt()
-        };
-        (distance(0, 1) / distance(1, 2)).log2()
-    })
+    observed(session, &fields)
 }
 
 fn all<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {

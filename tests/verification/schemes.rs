@@ -40,6 +40,11 @@ fn order(session: &Session, job: &str, ratio: f64, end: f64) -> [f64; 2] {
         advance(session, &mut run, steps, ratio, end);
         [&run.state.velocity, &run.state.displacement].map(|f| f.owned().expect("values").to_vec())
     });
+    observed(session, &fields)
+}
+
+/// The orders of two fields, given those of runs whose steps are halved twice.
+pub fn observed(session: &Session, fields: &[[Vec<f64>; 2]; 3]) -> [f64; 2] {
     std::array::from_fn(|field| {
         let distance = |a: usize, b: usize| {
             let pairs = fields[a][field].iter().zip(&fields[b][field]);
