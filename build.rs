@@ -13,19 +13,23 @@ const FUNCTIONS: &[&str] = &[
     "PetscLog(DefaultBegin|StageGetId|StageRegister|StagePush|StagePop)",
     "Vec(CreateGhostBlock|Duplicate|Destroy|GetLocalSize|GetArray|RestoreArray|GetArrayRead|RestoreArrayRead)",
     "VecGhost(GetLocalForm|RestoreLocalForm|UpdateBegin|UpdateEnd)",
-    "Vec(Copy|Scale|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize)",
+    "Vec(Copy|Scale|Set|AXPY|AXPBY|Norm|Dot|SetBlockSize|CreateSeq)",
+    "VecScatter(Create|Begin|End|Destroy)",
+    "IS(CreateGeneral|Destroy)",
     "VecCreateMPIWithArray",
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
     "Mat(Norm|Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
-    "(VecEqual|PetscObjectReference)",
+    "(VecEqual|PetscObject(Reference|GetComm|TypeCompare))",
+    "Mat(GetBlockSize|GetLocalSize|MultAdd|GetRowIJ|RestoreRowIJ|MPIAIJGetSeqAIJ|SeqAIJGetArrayRead|SeqAIJRestoreArrayRead)",
+    "PCMG(GetLevels|GetSmoother|SetResidual|ResidualDefault)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",
     "MatNullSpace(Create|CreateRigidBody|SetFunction|Destroy)",
-    "KSP(Create|Destroy|SetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
+    "KSP(Create|Destroy|SetOperators|GetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
     "KSP(SetOptionsPrefix|GetType|SetPC|ConvergedDefaultSetUIRNorm)",
     "PCShell(SetApply|SetContext|GetContext)",
-    "PC(Apply|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
+    "PC(Apply|SetUp|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetLinearSolveIterations|GetFunctionNorm|SetOptionsPrefix)",
     "SNESLineSearchSetType",
@@ -60,7 +64,7 @@ fn main() {
         .generate_cstr(true)
         .allowlist_function(format!("({})", FUNCTIONS.join("|")))
         .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*|MatDuplicateOption|MatStructure|PetscBool)")
-        .allowlist_var("(PETSC_(COMM_WORLD|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|MADV_HUGEPAGE)")
+        .allowlist_var("(PETSC_(COMM_WORLD|COPY_VALUES|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|MADV_HUGEPAGE)")
         .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
         .raw_line("pub use mpi_sys::{MPI_Comm, RSMPI_COMM_SELF};")
         .layout_tests(false)

@@ -1,4 +1,9 @@
-use super::{DistributedVector, Matrix, c_string, check, index, library::communicator, sys};
+use super::{
+    DistributedVector, Matrix, c_string, check, index,
+    levels::{self, Level},
+    library::communicator,
+    sys,
+};
 use crate::error::Result;
 use std::{marker::PhantomData, ptr};
 
@@ -8,6 +13,8 @@ use std::{marker::PhantomData, ptr};
 #[derive(Debug)]
 pub struct Ksp {
     pub(super) raw: sys::KSP,
+    /// What the smoothers of multigrid multiply with.
+    levels: Vec<Level>,
     not_send: PhantomData<*mut ()>,
 }
 
@@ -63,7 +70,7 @@ impl Ksp {
         // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
         unsafe {
             check(sys::KSPCreate(communicator(), &mut raw))?;
-            let ksp = Self { raw, not_send: PhantomData };
+            let ksp = Self { raw, levels: Vec::new(), not_send: PhantomData };
             check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
             Ok(ksp)
         }
@@ -149,8 +156,14 @@ impl Ksp {
 
     /// Sets up the preconditioner now. Collective.
     pub fn set_up(&mut self) -> Result<()> {
-        // SAFETY: live object.
-        check(unsafe { sys::KSPSetUp(self.raw) })
+        let mut pc = ptr::null_mut();
+        // SAFETY: live object, which owns its preconditioner.
+        unsafe {
+            check(sys::KSPSetUp(self.raw))?;
+            check(sys::KSPGetPC(self.raw, &mut pc))?;
+        }
+        self.levels = levels::in_single_precision(pc)?;
+        Ok(())
     }
 
     /// Solves for `solution`. Collective. Non-convergence is an outcome, not an error.

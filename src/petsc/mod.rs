@@ -5,11 +5,13 @@
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
+mod block_product;
 mod callback;
 mod cholesky;
 mod dense;
 mod ksp;
 mod large_pages;
+mod levels;
 mod library;
 mod lower_half;
 mod matrix;
@@ -17,6 +19,7 @@ mod projected;
 mod projected_operator;
 mod reduced;
 mod snes;
+mod symmetric_blocks;
 pub mod sys;
 mod threads;
 mod variational_inequality;

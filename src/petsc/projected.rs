@@ -143,8 +143,9 @@ impl ProjectedKsp {
         unsafe {
             check(sys::KSPSetOperators(self.ksp.raw, self.shell, matrix))?;
             check(sys::KSPGetPC(self.ksp.raw, &mut pc))?;
-            check(sys::PCSetUseAmat(pc, 0))
+            check(sys::PCSetUseAmat(pc, 0))?;
         }
+        self.ksp.set_up()
     }
 
     /// Takes in the subspace in use; says whether the preconditioner is that of another, and whether it was made anew for

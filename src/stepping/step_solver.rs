@@ -192,7 +192,6 @@ impl StepSolver {
             }
             Solver::Newton(newton) => {
                 session.agree(newton.linear_solver.set_constant(&matrix))?;
-                session.agree(newton.linear_solver.linear_solver().set_up())?;
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
             Solver::Condensed(_) => {}
