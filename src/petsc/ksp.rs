@@ -98,7 +98,7 @@ impl Ksp {
     /// Solves with the first matrix; the second makes the preconditioner, anew if it is another one than before.
     pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.
-        check(unsafe { sys::KSPSetOperators(self.raw, matrix.raw, preconditioned.raw) })
+        check(unsafe { sys::KSPSetOperators(self.raw, matrix.operator(), preconditioned.raw) })
     }
 
     /// Krylov method by PETSc's name, such as `cg`; its norm is that of the residual itself.
@@ -154,13 +154,14 @@ impl Ksp {
         check(unsafe { sys::KSPSetFromOptions(self.raw) })
     }
 
-    /// Sets up the preconditioner now. Collective.
+    /// Sets up the preconditioner now; to be called after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
         let mut pc = ptr::null_mut();
         // SAFETY: live object, which owns its preconditioner.
         unsafe {
-            check(sys::KSPSetUp(self.raw))?;
             check(sys::KSPGetPC(self.raw, &mut pc))?;
+            levels::give_back(pc, &self.levels)?;
+            check(sys::KSPSetUp(self.raw))?;
         }
         self.levels = levels::in_single_precision(pc)?;
         Ok(())

@@ -1,91 +1,90 @@
-//! The levels of PETSc's multigrid multiply with copies of their matrices in single precision: smoothers need no more, and are
-//! bound by the memory that they read.
+//! The levels of PETSc's multigrid multiply with copies of their matrices in single precision: smoothers and interpolations need
+//! no more, and are bound by the memory that they read.
 
-use super::{block_product::BlockProduct, callback::USER_ERROR, check, library::communicator, sys};
+use super::{block_product::BlockProduct, block_transfer::BlockTransfer, check, shell::Shell, sys};
 use crate::error::Result;
-use std::{ffi::CStr, ffi::c_void, fmt, ptr};
+use std::{ffi::CStr, ptr};
 
-/// What the smoother of a level multiplies with.
+/// A level's matrices.
+#[derive(Debug, Default)]
 pub(super) struct Level {
-    shell: sys::Mat,
-    product: Box<BlockProduct>,
+    smoother: Option<Shell>,
+    transfer: Option<(Shell, Reference)>,
 }
 
-impl fmt::Debug for Level {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "level of {} bytes", self.product.bytes())
+/// One reference to a matrix of PETSc's.
+#[derive(Debug)]
+struct Reference(sys::Mat);
+
+impl Drop for Reference {
+    fn drop(&mut self) {
+        // SAFETY: this handle owns one reference.
+        unsafe { sys::MatDestroy(&mut self.0) };
     }
 }
 
-/// Sets the preconditioner up and gives each smoother of algebraic multigrid such a copy; nothing for other preconditioners. The
-/// preconditioner must not be applied once the levels are dropped. Collective.
-pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
-    let (mut kind, mut count, mut levels) = (ptr::null(), 0, Vec::new());
-    // SAFETY: live objects, which own what they show; PETSc keeps its own references to the shells.
+/// Whether a preconditioner is algebraic multigrid of PETSc's that is set up or is to be.
+fn is_multigrid(pc: sys::PC) -> Result<bool> {
+    let mut kind = ptr::null();
+    // SAFETY: live object, which owns its name.
     unsafe {
         check(sys::PCGetType(pc, &mut kind))?;
-        if kind.is_null() || CStr::from_ptr(kind) != c"gamg" {
-            return Ok(levels);
-        }
-        check(sys::PCSetUp(pc))?;
+        Ok(!kind.is_null() && CStr::from_ptr(kind) == c"gamg")
+    }
+}
+
+/// Gives each level of a preconditioner that was set up such copies; nothing for other preconditioners than algebraic multigrid.
+/// The preconditioner must not be applied once the levels are dropped. Collective.
+pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
+    let mut levels = Vec::new();
+    if !is_multigrid(pc)? {
+        return Ok(levels);
+    }
+    let mut count = 0;
+    // SAFETY: live objects, which own what they show; PETSc keeps its own references to the shells.
+    unsafe {
         check(sys::PCMGGetLevels(pc, &mut count))?;
-        for level in 1..count {
+        for number in 1..count {
+            let mut level = Level::default();
             let (mut smoother, mut matrix) = (ptr::null_mut(), ptr::null_mut());
-            check(sys::PCMGGetSmoother(pc, level, &mut smoother))?;
+            check(sys::PCMGGetSmoother(pc, number, &mut smoother))?;
             check(sys::KSPGetOperators(smoother, ptr::null_mut(), &mut matrix))?;
-            if let Some(product) = BlockProduct::new::<f32>(matrix)? {
-                let made = Level::new(matrix, product)?;
-                check(sys::KSPSetOperators(smoother, made.shell, matrix))?;
-                check(sys::PCMGSetResidual(pc, level, Some(sys::PCMGResidualDefault), made.shell))?;
-                levels.push(made);
+            if let Some(shell) = BlockProduct::shell::<f32>(matrix)? {
+                check(sys::KSPSetOperators(smoother, shell.raw, matrix))?;
+                check(sys::PCMGSetResidual(pc, number, Some(sys::PCMGResidualDefault), shell.raw))?;
+                level.smoother = Some(shell);
             }
+            let mut interpolation = ptr::null_mut();
+            check(sys::PCMGGetInterpolation(pc, number, &mut interpolation))?;
+            if let Some(shell) = BlockTransfer::shell(interpolation)? {
+                check(sys::PetscObjectReference(interpolation.cast()))?;
+                let original = Reference(interpolation);
+                put_transfer(pc, number, shell.raw)?;
+                level.transfer = Some((shell, original));
+            }
+            levels.push(level);
         }
     }
     Ok(levels)
 }
 
-impl Level {
-    fn new(matrix: sys::Mat, product: BlockProduct) -> Result<Self> {
-        let mut level = Self { shell: ptr::null_mut(), product: Box::new(product) };
-        let (mut rows, mut columns, mut block, mut comm) = (0, 0, 0, communicator());
-        // SAFETY: live matrix. The handle owns one reference to the shell, whose context stays in its box for as long as the
-        // handle.
-        unsafe {
-            check(sys::PetscObjectGetComm(matrix.cast(), &mut comm))?;
-            check(sys::MatGetLocalSize(matrix, &mut rows, &mut columns))?;
-            check(sys::MatGetBlockSize(matrix, &mut block))?;
-            let (context, all) = (ptr::from_ref(&*level.product).cast_mut(), sys::PETSC_DETERMINE);
-            check(sys::MatCreateShell(comm, rows, columns, all, all, context.cast(), &mut level.shell))?;
-            check(sys::MatSetBlockSize(level.shell, block))?;
-            let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
-                multiply;
-            let multiply: unsafe extern "C" fn() = std::mem::transmute(multiply);
-            check(sys::MatShellSetOperation(level.shell, sys::MATOP_MULT, Some(multiply)))?;
-            check(sys::MatSetOption(level.shell, sys::MAT_SYMMETRIC, 1))?;
+/// Gives PETSc its own interpolations back, from which it makes coarse matrices.
+pub(super) fn give_back(pc: sys::PC, levels: &[Level]) -> Result<()> {
+    for (level, number) in levels.iter().zip(1..) {
+        if let Some((_, original)) = &level.transfer {
+            // SAFETY: live objects of this preconditioner.
+            unsafe { put_transfer(pc, number, original.0)? };
         }
-        Ok(level)
     }
+    Ok(())
 }
 
-impl Drop for Level {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::MatDestroy(&mut self.shell) };
-    }
-}
-
-unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: a live shell matrix; PETSc writes its context pointer, which its level keeps alive.
-    let product = unsafe {
-        if sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) != 0 || context.is_null() {
-            return USER_ERROR;
-        }
-        &*context.cast::<BlockProduct>()
-    };
-    // SAFETY: PETSc's vectors live for the call and differ.
-    match unsafe { product.multiply(x, y) } {
-        Ok(()) => 0,
-        Err(_) => USER_ERROR,
+/// # Safety
+/// A live multigrid preconditioner with this level, a live matrix of the right layout.
+unsafe fn put_transfer(pc: sys::PC, level: sys::PetscInt, matrix: sys::Mat) -> Result<()> {
+    // SAFETY: the caller's; PETSc keeps its own references.
+    unsafe {
+        check(sys::PCMGSetInterpolation(pc, level, matrix))?;
+        check(sys::PCMGSetRestriction(pc, level, matrix))
     }
 }

@@ -6,8 +6,10 @@
 #![allow(unsafe_code)]
 
 mod block_product;
+mod block_transfer;
 mod callback;
 mod cholesky;
+mod compressed_rows;
 mod dense;
 mod ksp;
 mod large_pages;
@@ -17,7 +19,9 @@ mod lower_half;
 mod matrix;
 mod projected;
 mod projected_operator;
+mod rectangular_blocks;
 mod reduced;
+mod shell;
 mod snes;
 mod symmetric_blocks;
 pub mod sys;

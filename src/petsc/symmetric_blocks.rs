@@ -30,7 +30,7 @@ pub(super) struct ScalarRows<'a> {
 }
 
 impl<'a> ScalarRows<'a> {
-    fn row(self, row: usize) -> impl Iterator<Item = (usize, f64)> + 'a {
+    pub fn row(self, row: usize) -> impl Iterator<Item = (usize, f64)> + 'a {
         let range = self.starts[row] as usize..self.starts[row + 1] as usize;
         self.columns[range.clone()].iter().map(|&column| column as usize).zip(self.values[range].iter().copied())
     }
@@ -40,9 +40,6 @@ impl<'a> ScalarRows<'a> {
 pub(super) trait Product {
     /// `y = A x`.
     fn multiply(&self, x: &[f64], y: &mut [f64]);
-
-    /// Bytes of the matrix.
-    fn bytes(&self) -> usize;
 }
 
 /// The matrix whose lower half these rows have, in blocks of this size, numbers stored as `T`. `None` for blocks of a size that
@@ -66,14 +63,19 @@ struct SymmetricBlocks<const B: usize, T> {
     columns: Vec<u32>,
     /// Column after column.
     blocks: Vec<[[T; B]; B]>,
-    /// What the stored numbers are multiples of: a power of two near the largest, so that small formats don't overflow.
+    /// What the stored numbers are multiples of.
     unit: f64,
+}
+
+/// A power of two near the largest of these numbers: multiples of it don't overflow in a small format.
+pub(super) fn unit_of(values: &[f64]) -> f64 {
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    if largest > 0.0 && largest.is_finite() { largest.log2().round().exp2() } else { 1.0 }
 }
 
 impl<const B: usize, T: Stored> SymmetricBlocks<B, T> {
     fn new(rows: ScalarRows<'_>) -> Self {
-        let largest = rows.values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-        let unit = if largest > 0.0 && largest.is_finite() { largest.log2().round().exp2() } else { 1.0 };
+        let unit = unit_of(rows.values);
         let count = (rows.starts.len() - 1) / B;
         let mut matrix = Self { starts: vec![0], columns: Vec::new(), blocks: Vec::new(), unit };
         let half = rows.columns.len() / (2 * B * B) + count;
@@ -140,10 +142,6 @@ impl<const B: usize, T: Stored> Product for SymmetricBlocks<B, T> {
         if self.unit != 1.0 {
             y.as_flattened_mut().iter_mut().for_each(|value| *value *= self.unit);
         }
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.columns[..]) + size_of_val(&self.blocks[..])
     }
 }
 

@@ -185,6 +185,9 @@ impl StepSolver {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             matrix.attach_rigid_motions(D, coordinates)?;
         }
+        if chosen != Preconditioner::Cholesky {
+            matrix.multiply_often()?;
+        }
         match &mut self.solver {
             Solver::Linear(ksp) => {
                 ksp.set_matrices(&matrix, &matrix)?;

@@ -1,0 +1,48 @@
+use super::{
+    DistributedVector, check,
+    compressed_rows::{Others, Parts, own_rows},
+    rectangular_blocks::{Transfer, transfer},
+    shell::{Action, Shell},
+    sys,
+};
+use crate::error::Result;
+
+/// Interpolation and restriction between two levels, from a copy in single precision of the rows and columns of this rank.
+pub(super) struct BlockTransfer {
+    own: Box<dyn Transfer>,
+    others: Option<Others>,
+}
+
+/// The sizes of blocks that have code.
+const SIZES: [[sys::PetscInt; 2]; 4] = [[2, 3], [3, 3], [3, 6], [6, 6]];
+
+impl BlockTransfer {
+    /// A shell that multiplies as this matrix in compressed rows and its transpose do; `None` on all ranks alike for other
+    /// formats and for blocks of a size that has no code. Collective.
+    pub fn shell(matrix: sys::Mat) -> Result<Option<Shell>> {
+        let mut blocks = [0; 2];
+        let [rows, columns] = &mut blocks;
+        // SAFETY: live matrix; PETSc writes numbers.
+        unsafe { check(sys::MatGetBlockSizes(matrix, rows, columns))? };
+        let Some(parts) = Parts::of(matrix)?.filter(|_| SIZES.contains(&blocks)) else { return Ok(None) };
+        let sizes = blocks.map(|size| size as usize);
+        let Some(own) = own_rows(parts.own, |rows| transfer(sizes, rows))? else { return Ok(None) };
+        let action = Self { own, others: parts.others(matrix)? };
+        Shell::new(matrix, Box::new(action)).map(Some)
+    }
+}
+
+impl Action for BlockTransfer {
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        if let Some(others) = &self.others {
+            others.begin(x)?;
+        }
+        self.own.multiply(&x.owned()?, &mut y.owned_mut()?);
+        self.others.as_ref().map_or(Ok(()), |others| others.end_adding(x, y))
+    }
+
+    fn multiply_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.own.multiply_transposed(&x.owned()?, &mut y.owned_mut()?);
+        self.others.as_ref().map_or(Ok(()), |others| others.add_transposed(x, y))
+    }
+}
