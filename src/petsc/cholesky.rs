@@ -67,7 +67,7 @@ impl Cholesky {
         let mut order: Vec<c_int> = match known {
             Some(order) => order.iter().map(|&unknown| unknown as c_int).collect(),
             None => {
-                let nodes = cholesky.node_order(rows)?.into_iter().map(|node| node as usize);
+                let nodes = cholesky.node_order(block, rows)?.into_iter().map(|node| node as usize);
                 let unknowns = nodes.flat_map(|node| (0..block).map(move |i| node * block + i));
                 let first = unknowns.filter(|&unknown| !is_last[unknown]);
                 first.chain(last.iter().copied()).map(|unknown| unknown as c_int).collect()
@@ -113,12 +113,17 @@ impl Cholesky {
     }
 
     /// Nodes in an order that leaves little to factor.
-    fn node_order(&mut self, rows: &BlockRows) -> Result<Vec<c_int>> {
+    fn node_order(&mut self, block: usize, rows: &BlockRows) -> Result<Vec<c_int>> {
         let nodes = rows.offsets.len() - 1;
         let (mut starts, mut indices) = (vec![0 as c_int], Vec::new());
         for (row, range) in rows.offsets.windows(2).enumerate() {
-            let below = rows.columns[range[0]..range[1]].iter().filter(|&&column| column as usize >= row);
-            indices.extend(below.map(|&column| column as c_int));
+            let entries = rows.columns[range[0]..range[1]].iter();
+            let blocks = rows.values[range[0] * block * block..].chunks_exact(block * block);
+            for (&column, block) in entries.zip(blocks).filter(|(column, _)| **column as usize >= row) {
+                if column as usize == row || block.iter().any(|&value| value != 0.0) {
+                    indices.push(column as c_int);
+                }
+            }
             starts.push(indices.len() as c_int);
         }
         let mut order = vec![0 as c_int; nodes];

@@ -10,7 +10,8 @@ pub(super) struct Lower {
 }
 
 impl Lower {
-    /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on.
+    /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on. Zeros are left out: held
+    /// components are coupled to nothing.
     pub fn of(block: usize, rows: &BlockRows) -> Result<Self> {
         let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
         let too_many = |_| {
@@ -31,8 +32,11 @@ impl Lower {
                 for at in range[0]..range[1] {
                     let first = rows.columns[at] as usize * block;
                     for j in (0..block).filter(|j| first + j >= row) {
-                        lower.indices.push((first + j) as c_int);
-                        lower.values.push(rows.values[(at * block + i) * block + j]);
+                        let value = rows.values[(at * block + i) * block + j];
+                        if value != 0.0 || first + j == row {
+                            lower.indices.push((first + j) as c_int);
+                            lower.values.push(value);
+                        }
                     }
                 }
                 lower.starts.push(lower.indices.len() as c_int);
@@ -75,6 +79,14 @@ pub(super) fn view(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn zeros_are_left_out_but_on_the_diagonal() {
+        let rows = BlockRows { offsets: vec![0, 1], columns: vec![0], values: vec![0.0, 0.0, 0.0, 4.0] };
+        let lower = Lower::of(2, &rows).unwrap();
+        assert_eq!((&lower.starts[..], &lower.indices[..]), (&[0, 1, 2][..], &[0, 1][..]));
+        assert_eq!(lower.values, [0.0, 4.0]);
+    }
 
     #[test]
     fn columns_go_from_the_diagonal_down() {

@@ -16,7 +16,6 @@ use crate::{
     mesh::check::Quality,
     session::Session,
     state::State,
-    stepping::Service,
 };
 use serde::Serialize;
 
@@ -101,7 +100,6 @@ fn report<const D: usize, const S: usize>(
     let steps = steps_between(0.0, job.time.end, longest);
     let inventory = Inventory::of(session, body, scheme);
     let preconditioner = scheme.preconditioner();
-    let asked = build::settings(job).preconditioner;
     let quality = quality.unwrap_or(Quality { smallest: 1.0, worst_cell: 0, poor: 0 });
     Ok(Report {
         version: super::VERSION,
@@ -124,12 +122,7 @@ fn report<const D: usize, const S: usize>(
         adaptive: job.time.adaptive.is_some(),
         newton: inventory.newton,
         preconditioner: preconditioner.name(),
-        preconditioner_reason: asked.reason(Service {
-            dimension: D,
-            unknowns: mesh.total_nodes * D,
-            ranks: session.ranks(),
-            steps: build::steps_a_matrix(job),
-        }),
+        preconditioner_reason: scheme.preconditioner_reason().to_owned(),
         certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: CellQuality {
@@ -171,7 +164,6 @@ impl Report {
         }
         let least = if self.adaptive { "at least " } else { "" };
         lines.push(format!("steps      {least}{}", self.steps));
-        lines.push(format!("solver     {}: {}", self.preconditioner, self.preconditioner_reason));
         let memory = &self.estimate.memory_bytes;
         let parts = [
             ("program", memory.program),

@@ -6,7 +6,11 @@
 //! Expect a factor of two either way, and more where ranks share memory bandwidth.
 
 use super::Inventory;
-use crate::{body::Body, session::Session, stepping::Preconditioner};
+use crate::{
+    body::Body,
+    session::Session,
+    stepping::{Preconditioner, Service},
+};
 use serde::Serialize;
 
 /// What a run will cost; an estimate.
@@ -50,20 +54,6 @@ pub struct TimeEstimate {
     pub run: f64,
 }
 
-/// What a preconditioner costs in some dimension.
-struct Cost {
-    /// Bytes.
-    memory: f64,
-    /// Seconds of assembly and set-up.
-    set_up: f64,
-    /// Seconds of a Krylov iteration.
-    iteration: f64,
-    /// Krylov iterations of a step with contact.
-    with_contact: f64,
-    /// Krylov iterations of a step without.
-    without: f64,
-}
-
 /// Bytes of a process before it has a mesh.
 const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
@@ -89,14 +79,14 @@ impl Estimate {
         ];
         let [mesh_bytes, facets, vectors] = session.sum(own);
         let matrix = matrix_bytes(D, nodes, cells, facets);
-        let cost = cost(preconditioner, D, nodes * D as f64, matrix);
+        let service = Service::of(session, body, steps);
+        let cost = service.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
         let redundant = preconditioner.is_redundant(session.ranks(), mesh.total_nodes * D);
         let (copies, sharers) = if redundant { (ranks, 1.0) } else { (1.0, ranks) };
         let program = PROGRAM * ranks;
-        let iterations = if inventory.newton { cost.with_contact } else { cost.without };
-        let step = cells * CELL[usize::from(D == 3)] / ranks + iterations * cost.iteration / sharers;
+        let step = cells * CELL[usize::from(D == 3)] / ranks + cost.step / sharers;
         let set_up = cost.set_up / sharers;
         let preconditioner = copies * cost.memory;
         let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
@@ -125,40 +115,6 @@ fn matrix_bytes(dimension: usize, nodes: f64, cells: f64, facets: f64) -> f64 {
     12.0 * entries + 4.0 * nodes * dimension as f64
 }
 
-/// The model: nested dissection's `n log n` and `n^(4/3)` entries of a factor, and work proportional to the unknowns for
-/// multigrid.
-fn cost(preconditioner: Preconditioner, dimension: usize, unknowns: f64, matrix: f64) -> Cost {
-    let plane = dimension == 2;
-    let pick = |in_plane: f64, in_space: f64| if plane { in_plane } else { in_space };
-    match preconditioner {
-        Preconditioner::Auto | Preconditioner::Cholesky => {
-            let entries =
-                if plane { 7.0 * unknowns * unknowns.log2() } else { 28.0 * unknowns.powf(4.0 / 3.0) };
-            Cost {
-                memory: 8.0 * entries,
-                set_up: if plane { 3.5e-6 * unknowns } else { 1.2e-9 * unknowns * unknowns },
-                iteration: entries * pick(2.4e-9, 1.2e-9),
-                with_contact: 1.0,
-                without: 1.0,
-            }
-        }
-        Preconditioner::Gamg => Cost {
-            memory: 2.0 * matrix,
-            set_up: unknowns * pick(2e-6, 10e-6),
-            iteration: unknowns * pick(50e-9, 150e-9),
-            with_contact: 30.0,
-            without: 20.0,
-        },
-        Preconditioner::Boomeramg => Cost {
-            memory: 3.5 * matrix,
-            set_up: unknowns * pick(1.5e-6, 5e-6),
-            iteration: unknowns * pick(120e-9, 300e-9),
-            with_contact: 20.0,
-            without: 14.0,
-        },
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,14 +125,5 @@ mod tests {
         assert_eq!(matrix_bytes(2, 4.0, 2.0, 4.0), 12.0 * 56.0 + 32.0);
         // One tetrahedron: 4 nodes, 6 edges.
         assert_eq!(matrix_bytes(3, 4.0, 1.0, 4.0), 12.0 * 144.0 + 48.0);
-    }
-
-    #[test]
-    fn a_factor_in_space_soon_outgrows_multigrid() {
-        let large = 1e6;
-        let matrix = 500.0 * large;
-        let factor = cost(Preconditioner::Cholesky, 3, large, matrix);
-        let multigrid = cost(Preconditioner::Gamg, 3, large, matrix);
-        assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
         None => format!("{} s", job.time.step),
     };
     lines.push(format!(
-        "scheme     {}, steps of {} to {} s; {}, preconditioner {}, tolerance {:.0e}",
+        "scheme     {}, steps of {} to {} s; {}, tolerance {:.0e}",
         scheme.scheme().name(),
         lengths,
         job.time.end,
@@ -45,9 +45,9 @@ pub(super) fn lines<const D: usize, const S: usize>(
             Method::Newton if scheme.is_nonlinear() => "Newton with line search",
             Method::Newton => "one linear solve a step",
         },
-        scheme.preconditioner().name(),
         job.solver.tolerance
     ));
+    lines.push(format!("solver     {}: {}", scheme.preconditioner().name(), scheme.preconditioner_reason()));
     lines.extend(verdict.words.iter().map(|words| format!("certified  {words}")));
     lines.push(format!("output     {}", job.output_folder().display()));
     lines

@@ -66,53 +66,42 @@ pub struct Service {
     pub ranks: usize,
     /// Steps that one matrix is for, as far as is known.
     pub steps: u64,
+    /// Whether there is contact.
+    pub contact: bool,
+    /// Whether there is friction.
+    pub friction: bool,
 }
 
-/// Steps that pay for a factorisation of a large matrix.
-const MANY_STEPS: u64 = 10;
-/// Most unknowns for which a factorisation is faster than multigrid, for few and for many steps.
-const DIRECT_2D: [usize; 2] = [20_000, 600_000];
-const DIRECT_3D: [usize; 2] = [6_000, 110_000];
+/// Bytes of a factor beyond which it is made on request only.
+const LARGEST_FACTOR: f64 = 4e9;
 /// Most unknowns whose matrix every rank factors for itself.
 const REDUNDANT: usize = 50_000;
 /// Krylov iterations after which a linear solve has failed.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
-impl Service {
-    fn largest_factored(self) -> usize {
-        let [few, many] = if self.dimension == 2 { DIRECT_2D } else { DIRECT_3D };
-        let most = if self.steps >= MANY_STEPS { many } else { few };
-        if self.ranks > 1 { most.min(REDUNDANT) } else { most }
-    }
-}
-
 impl Preconditioner {
-    /// Replaces `Auto` by the choice for this service.
-    pub fn resolve(self, service: Service) -> Self {
-        match self {
-            Self::Auto if service.unknowns <= service.largest_factored() => Self::Cholesky,
-            Self::Auto => Self::Gamg,
-            chosen => chosen,
-        }
-    }
-
-    /// Why [`resolve`](Self::resolve) chooses what it does, in words.
-    pub fn reason(self, service: Service) -> String {
+    /// Replaces `Auto` by what takes less time for this service, and says why.
+    pub fn resolve(self, service: Service) -> (Self, String) {
         if self != Self::Auto {
-            return "[solver] preconditioner asks for it".into();
+            return (self, "[solver] preconditioner asks for it".into());
         }
-        let Service { dimension, ranks, steps, .. } = service;
-        let most = service.largest_factored();
-        let steps = if steps >= MANY_STEPS {
-            format!("{MANY_STEPS} steps or more")
-        } else {
-            format!("fewer than {MANY_STEPS} steps")
-        };
-        let ranks = if ranks > 1 { "several ranks, each of which factors all of it" } else { "one rank" };
-        let which = if service.unknowns <= most { "up to" } else { "multigrid is; up to" };
-        format!(
-            "{which} {most} velocity components in {dimension}D a factorisation is faster, with {steps} a matrix on {ranks}"
-        )
+        let memory = service.cost(Self::Cholesky).memory;
+        if service.ranks > 1 && service.unknowns > REDUNDANT {
+            let why = format!("above {REDUNDANT} velocity components several ranks don't factor all of the matrix each");
+            return (Self::Gamg, why);
+        }
+        if memory > LARGEST_FACTOR {
+            return (Self::Gamg, format!("a factor would take some {:.0} GB", memory / 1e9));
+        }
+        let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| service.seconds(which));
+        let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
+        let why = format!(
+            "{} steps a matrix take some {} by a factorisation, {} by multigrid",
+            service.steps,
+            seconds(factored),
+            seconds(multigrid)
+        );
+        (chosen, why)
     }
 
     /// Whether every rank factors the whole matrix for itself.
@@ -180,20 +169,42 @@ impl Preconditioner {
     }
 }
 
+fn seconds(time: f64) -> String {
+    let digits = if time < 0.1 { 3 } else { usize::from(time < 10.0) };
+    format!("{time:.digits$} s")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn service(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> Service {
+        Service { dimension, unknowns, ranks, steps, contact: true, friction: false }
+    }
+
+    fn chosen(service: Service) -> Preconditioner {
+        Preconditioner::Auto.resolve(service).0
+    }
+
     #[test]
-    fn many_steps_on_one_rank_pay_for_larger_factors() {
-        let chosen = |unknowns, ranks, steps| {
-            Preconditioner::Auto.resolve(Service { dimension: 2, unknowns, ranks, steps })
-        };
-        assert_eq!(chosen(500_000, 1, 64), Preconditioner::Cholesky);
-        assert_eq!(chosen(500_000, 1, 2), Preconditioner::Gamg);
-        assert_eq!(chosen(500_000, 2, 64), Preconditioner::Gamg);
-        assert_eq!(chosen(40_000, 2, 64), Preconditioner::Cholesky);
-        let asked = Service { dimension: 3, unknowns: 9, ranks: 1, steps: 1 };
-        assert_eq!(Preconditioner::Gamg.resolve(asked), Preconditioner::Gamg);
+    fn many_steps_pay_for_larger_factors() {
+        assert_eq!(chosen(service(2, 500_000, 1, 64)), Preconditioner::Cholesky);
+        assert_eq!(chosen(service(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
+        assert_eq!(chosen(service(3, 100_000, 1, 4)), Preconditioner::Gamg);
+        assert_eq!(chosen(service(3, 1_000_000, 1, 1_000_000)), Preconditioner::Gamg);
+    }
+
+    #[test]
+    fn friction_is_dear_for_multigrid() {
+        let gliding = service(3, 100_000, 1, 4);
+        assert_eq!(chosen(Service { friction: true, ..gliding }), Preconditioner::Cholesky);
+    }
+
+    #[test]
+    fn ranks_factor_small_matrices_each_for_itself() {
+        assert_eq!(chosen(service(2, 500_000, 2, 64)), Preconditioner::Gamg);
+        assert_eq!(chosen(service(2, 40_000, 2, 64)), Preconditioner::Cholesky);
+        let (asked, why) = Preconditioner::Gamg.resolve(service(3, 9, 1, 1));
+        assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
     }
 }

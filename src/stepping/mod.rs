@@ -8,6 +8,7 @@ mod choice;
 mod condensed;
 mod condensed_matrix;
 mod contacts;
+mod cost;
 mod equations;
 mod flow;
 mod guesses;
@@ -23,6 +24,7 @@ mod step_solver;
 mod stepper;
 
 pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
+pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use linear_solver::{FrictionIteration, Method, Preconditioner, Service, SolverSettings};
 pub use scheme::Scheme;

@@ -161,8 +161,8 @@ mod tests {
     #[test]
     fn small_problems_keep_a_ladder_and_large_ones_what_they_use() {
         let kept = |unknowns: usize, ranks| {
-            let service = Service { dimension: 3, unknowns, ranks, steps: 2 };
-            Preconditioner::Auto.resolve(service).kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+            let service = Service { dimension: 3, unknowns, ranks, steps: 2, contact: true, friction: false };
+            Preconditioner::Auto.resolve(service).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
         };
         assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
         assert_eq!(kept(1_000_000, 8), 2);

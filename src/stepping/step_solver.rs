@@ -46,6 +46,8 @@ pub(super) struct Lengths {
 /// The matrix for steps of one length, and what solves with it.
 pub(super) struct StepSolver {
     settings: SolverSettings,
+    /// Why the preconditioner is what it is.
+    reason: String,
     /// The matrix that the preconditioner in use is of.
     rung: Option<(f64, Matrix)>,
     /// The matrix of steps that are of no rung's length.
@@ -66,12 +68,8 @@ impl StepSolver {
         settings: SolverSettings,
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
-        let preconditioner = settings.preconditioner.resolve(Service {
-            dimension: D,
-            unknowns,
-            ranks: session.ranks(),
-            steps: settings.steps,
-        });
+        let service = Service::of(session, body, settings.steps);
+        let (preconditioner, reason) = settings.preconditioner.resolve(service);
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
             Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
@@ -80,6 +78,7 @@ impl StepSolver {
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
+            reason,
             rung: None,
             between: None,
             matrix_norm: 0.0,
@@ -96,6 +95,11 @@ impl StepSolver {
     /// The preconditioner in use.
     pub fn preconditioner(&self) -> Preconditioner {
         self.settings.preconditioner
+    }
+
+    /// Why it is that one.
+    pub fn reason(&self) -> &str {
+        &self.reason
     }
 
     /// Whether the matrices are those of these lengths.

@@ -142,6 +142,11 @@ impl Stepper {
         self.solver.preconditioner()
     }
 
+    /// Why it is that one.
+    pub fn preconditioner_reason(&self) -> &str {
+        self.solver.reason()
+    }
+
     /// Assembles the matrix for a first step of this length. Preconditioners will stand at this length and at powers of two
     /// times it. Collective.
     pub fn prepare_length<const D: usize, const S: usize>(

@@ -1,0 +1,109 @@
+//! What a preconditioner costs, roughly.
+//!
+//! Nested dissection leaves `n log n` entries of a factor in the plane and `n^(4/3)` in space, and takes `n^(3/2)` and `n^2`
+//! operations; multigrid works in proportion to the unknowns. The constants were measured on one core of a common server with
+//! 10^4 to 10^6 unknowns (docs/speed.md); expect a factor of two either way.
+
+use super::linear_solver::{Preconditioner, Service};
+use crate::{body::Body, session::Session};
+
+/// Costs of a preconditioner with the solves of a step, on one rank and over all ranks together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Bytes of a factor or a hierarchy.
+    pub memory: f64,
+    /// Seconds of assembly and set-up.
+    pub set_up: f64,
+    /// Seconds of a step.
+    pub step: f64,
+}
+
+/// Iterations of a step without contact, with it, and with friction, which may hold nodes that the preconditioner sees free.
+struct Iterations {
+    without: f64,
+    contact: f64,
+    friction: f64,
+}
+
+impl Service {
+    /// What a preconditioner has to serve in so many steps of this body.
+    pub fn of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, steps: u64) -> Self {
+        Self {
+            dimension: D,
+            unknowns: body.mesh.total_nodes * D,
+            ranks: session.ranks(),
+            steps,
+            contact: !body.contacts.is_empty(),
+            friction: body.contacts.iter().any(|contact| contact.friction().is_some()),
+        }
+    }
+
+    fn pick(self, in_plane: f64, in_space: f64) -> f64 {
+        if self.dimension == 2 { in_plane } else { in_space }
+    }
+
+    /// Bytes of the matrix in compressed rows, where a node has 7 neighbours with itself in the plane, 15 in space.
+    pub fn matrix(self) -> f64 {
+        12.0 * self.unknowns as f64 * self.pick(7.0 * 2.0, 15.0 * 3.0)
+    }
+
+    fn iterations(self, Iterations { without, contact, friction }: Iterations) -> f64 {
+        match (self.contact, self.friction) {
+            (false, _) => without,
+            (true, false) => contact,
+            (true, true) => friction,
+        }
+    }
+
+    /// The cost of this preconditioner.
+    pub fn cost(self, preconditioner: Preconditioner) -> Cost {
+        let n = self.unknowns as f64;
+        match preconditioner {
+            Preconditioner::Auto | Preconditioner::Cholesky => {
+                let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
+                Cost {
+                    memory: 8.0 * entries,
+                    set_up: self.pick(2e-6 * n + 2.5e-9 * n.powf(1.5), 5e-6 * n + 0.65e-9 * n * n),
+                    step: entries * self.pick(2.4e-9, 1.2e-9),
+                }
+            }
+            Preconditioner::Gamg => {
+                let iterations = Iterations { without: 20.0, contact: 30.0, friction: 300.0 };
+                Cost {
+                    memory: 2.2 * self.matrix(),
+                    set_up: n * self.pick(2.5e-6, 10e-6),
+                    step: self.iterations(iterations) * n * self.pick(90e-9, 110e-9),
+                }
+            }
+            Preconditioner::Boomeramg => {
+                let iterations = Iterations { without: 14.0, contact: 20.0, friction: 200.0 };
+                Cost {
+                    memory: 3.5 * self.matrix(),
+                    set_up: n * self.pick(1.5e-6, 5e-6),
+                    step: self.iterations(iterations) * n * self.pick(120e-9, 300e-9),
+                }
+            }
+        }
+    }
+
+    /// Seconds of set-up and of the steps that one matrix is for, of the work that is shared by the ranks or done by each.
+    pub(super) fn seconds(self, preconditioner: Preconditioner) -> f64 {
+        let cost = self.cost(preconditioner);
+        let seconds = cost.set_up + self.steps as f64 * cost.step;
+        let every_rank_does_it_all = preconditioner.is_redundant(self.ranks, self.unknowns);
+        if every_rank_does_it_all { seconds } else { seconds / self.ranks as f64 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_in_space_soon_outgrows_multigrid() {
+        let service =
+            Service { dimension: 3, unknowns: 1_000_000, ranks: 1, steps: 1, contact: true, friction: false };
+        let [factor, multigrid] = [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| service.cost(which));
+        assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
+    }
+}
