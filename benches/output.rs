@@ -15,7 +15,7 @@ use clarke::{
         checksum::table_checksum,
         fields::{Field, FieldFile, FieldMesh, Place, Shape},
         parallel_file::ParallelFile,
-        redistribution::Redistribution,
+        redistribution::are_whole,
         seal,
     },
     session::{Mpi, Session},
@@ -29,12 +29,16 @@ use std::{
 
 /// Squares along a side, two triangles each.
 const SQUARES: u64 = 707;
-const NODES: u64 = (SQUARES + 1) * (SQUARES + 1);
-const CELLS: u64 = 2 * SQUARES * SQUARES;
+/// The same of a mesh so small that its numbers cost nothing.
+const FEW_SQUARES: u64 = 8;
 const REPETITIONS: usize = 7;
+/// Times in the file of the small mesh.
+const MANY_TIMES: usize = 2000;
 
 /// Nodes and cells of one rank with their numbers.
 struct Part {
+    nodes: u64,
+    triangles: u64,
     points: Vec<[f64; 2]>,
     point_ids: Vec<u64>,
     cells: Vec<u64>,
@@ -44,21 +48,22 @@ struct Part {
 }
 
 impl Part {
-    fn new(session: &Session) -> Self {
+    fn new(session: &Session, squares: u64) -> Self {
+        let (nodes, triangles) = ((squares + 1) * (squares + 1), 2 * squares * squares);
         let share = |total: u64| {
             let (rank, ranks) = (session.rank() as u64, session.ranks() as u64);
             (total * rank / ranks..total * (rank + 1) / ranks).collect::<Vec<_>>()
         };
-        let (point_ids, cell_ids) = (share(NODES), share(CELLS));
+        let (point_ids, cell_ids) = (share(nodes), share(triangles));
         let point =
-            |id: u64| [id % (SQUARES + 1), id / (SQUARES + 1)].map(|place| place as f64 / SQUARES as f64);
+            |id: u64| [id % (squares + 1), id / (squares + 1)].map(|place| place as f64 / squares as f64);
         let corners = |cell: u64| {
             let square = cell / 2;
-            let low = square / SQUARES * (SQUARES + 1) + square % SQUARES;
+            let low = square / squares * (squares + 1) + square % squares;
             if cell.is_multiple_of(2) {
-                [low, low + 1, low + SQUARES + 2]
+                [low, low + 1, low + squares + 2]
             } else {
-                [low, low + SQUARES + 2, low + SQUARES + 1]
+                [low, low + squares + 2, low + squares + 1]
             }
         };
         let points: Vec<[f64; 2]> = point_ids.iter().map(|id| point(*id)).collect();
@@ -70,13 +75,13 @@ impl Part {
         };
         let history = cell_ids.iter().flat_map(stress).collect();
         let cells = cell_ids.iter().flat_map(|cell| corners(*cell)).collect();
-        Self { points, point_ids, cells, cell_ids, nodal, history }
+        Self { nodes, triangles, points, point_ids, cells, cell_ids, nodal, history }
     }
 
     fn sets(&self) -> [RowSet<'_>; 2] {
         [
-            RowSet { name: "nodes", total: NODES, ids: &self.point_ids },
-            RowSet { name: "cells", total: CELLS, ids: &self.cell_ids },
+            RowSet { name: "nodes", total: self.nodes, ids: &self.point_ids },
+            RowSet { name: "cells", total: self.triangles, ids: &self.cell_ids },
         ]
     }
 
@@ -162,9 +167,9 @@ fn checkpoints(session: &Session, folder: &Path, part: &Part) {
         let _ = std::fs::remove_file(&own);
         File::create(&own).and_then(|mut file| file.write_all(&raw)).expect("plain");
     });
-    measure(session, "  ids held against each other", bytes, |_| {
+    measure(session, "  ids held once each", bytes, |_| {
         for set in part.sets() {
-            Redistribution::new(world, set.total, set.ids, &[]).expect("plan");
+            assert!(are_whole(world, set.total, set.ids));
         }
     });
     measure(session, "  checksums of the tables", bytes, |_| {
@@ -188,7 +193,14 @@ fn checkpoints(session: &Session, folder: &Path, part: &Part) {
     });
 }
 
-fn fields(session: &Session, folder: &Path, part: &Part) {
+/// Writes the fields of a run with them.
+fn with_fields(
+    session: &Session,
+    folder: &Path,
+    part: &Part,
+    compression: u8,
+    run: impl FnOnce(&mut FieldFile<2>, &[Field]),
+) {
     let mesh = FieldMesh::<2> {
         points: &part.points,
         point_ids: &part.point_ids,
@@ -206,17 +218,46 @@ fn fields(session: &Session, folder: &Path, part: &Part) {
         cell("von_mises", Shape::Scalar, &von_mises),
         cell("viscoplastic_history", Shape::Tensor, &part.history),
     ];
+    let mut file = FieldFile::create(folder, session.world(), mesh, compression).expect("create");
+    run(&mut file, &fields);
+    file.close().expect("close");
+}
+
+fn fields(session: &Session, folder: &Path, part: &Part) {
     let bytes = 8 * (3 * 3 * part.point_ids.len() + (6 + 1 + 6) * part.cell_ids.len());
     for compression in [0, 1, 4, 9] {
         let name = format!("fields of a time, compression {compression}");
-        let mut file = FieldFile::create(folder, session.world(), mesh, compression).expect("create");
-        measure(session, &name, bytes, |n| file.write_step(n as f64, &fields).expect("step"));
-        file.close().expect("close");
+        with_fields(session, folder, part, compression, |file, fields| {
+            measure(session, &name, bytes, |n| file.write_step(n as f64, fields).expect("step"));
+        });
         on_first(session, || {
             let size = std::fs::metadata(folder.join("fields.vtkhdf")).expect("size").len();
             println!("  file of {REPETITIONS} times, {:.1} MB", size as f64 / 1e6);
         });
     }
+}
+
+/// What a time costs by itself, and whether that grows with the times before.
+fn many_times(session: &Session, folder: &Path) {
+    let part = Part::new(session, FEW_SQUARES);
+    with_fields(session, folder, &part, 0, |file, fields| {
+        let start = Instant::now();
+        let mut tenths = vec![0.0];
+        for time in 1..=MANY_TIMES {
+            file.write_step(time as f64, fields).expect("step");
+            if time.is_multiple_of(MANY_TIMES / 10) {
+                tenths.push(start.elapsed().as_secs_f64());
+            }
+        }
+        let each = |n: usize| 1e4 * (tenths[n] - tenths[n - 1]) / MANY_TIMES as f64;
+        on_first(session, || {
+            println!(
+                "a time of {MANY_TIMES}, small mesh: {:.2} ms at first, {:.2} ms at last",
+                each(1),
+                each(10)
+            );
+        });
+    });
 }
 
 fn main() {
@@ -225,11 +266,12 @@ fn main() {
     let root = std::env::var_os("CLARKE_BENCH_FOLDER").map_or_else(std::env::temp_dir, PathBuf::from);
     let folder = root.join("clarke-bench-output");
     on_first(&session, || std::fs::create_dir_all(&folder).expect("folder"));
-    let part = Part::new(&session);
+    let part = Part::new(&session, SQUARES);
     if session.is_first() {
-        println!("{} velocity components, {} ranks, {}", 2 * NODES, session.ranks(), folder.display());
+        println!("{} velocity components, {} ranks, {}", 2 * part.nodes, session.ranks(), folder.display());
     }
     checkpoints(&session, &folder, &part);
     fields(&session, &folder, &part);
+    many_times(&session, &folder);
     on_first(&session, || std::fs::remove_dir_all(&folder).expect("removed"));
 }

@@ -114,7 +114,7 @@ impl<const D: usize> FieldFile<D> {
         }
         let xdmf = folder.join("fields.xdmf");
         let resumed = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
-        resumed.write_xdmf()?;
+        resumed.write_xdmf(false)?;
         Ok(resumed)
     }
 
@@ -156,7 +156,7 @@ impl<const D: usize> FieldFile<D> {
         self.file.set_number("VTKHDF/Steps", "NSteps", step as i64 + 1)?;
         self.file.flush()?;
         self.times.push(time);
-        self.write_xdmf()
+        self.write_xdmf(true)
     }
 
     /// Closes the files.
@@ -242,12 +242,15 @@ impl<const D: usize> FieldFile<D> {
         series.write(step as u64, if self.communicator.rank() == 0 { &own } else { &[] })
     }
 
-    fn write_xdmf(&self) -> Result<()> {
+    /// Writes the file anew, or adds the last step to it if it has `grown` by that.
+    fn write_xdmf(&self, grown: bool) -> Result<()> {
         let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
-        let written = if self.communicator.rank() == 0 {
-            xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times)
-        } else {
-            Ok(())
+        let written = match self.times.split_last() {
+            _ if self.communicator.rank() != 0 => Ok(()),
+            Some((time, before)) if grown && !before.is_empty() && self.xdmf.exists() => {
+                xdmf::append(&self.xdmf, mesh, &self.kinds, before.len(), *time)
+            }
+            _ => xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times),
         };
         agree(&self.communicator, written)
     }
