@@ -5,6 +5,8 @@ JOB ?= jobs/papers/wang_cheng_2022.toml
 RANKS ?= 2
 ARGS ?=
 DEPS ?= yes
+# A PETSc with 64-bit indices, where Debian and Ubuntu put it.
+PETSC64_DIR ?= /usr/lib/petscdir/petsc64-real
 
 binary := $(or $(CARGO_TARGET_DIR),target)/release/solver
 share := $(DESTDIR)$(PREFIX)/share/clarke
@@ -24,7 +26,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps build run test hard bench lint install clean
+.PHONY: help deps deps64 build run test test64 check64 hard bench lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -33,7 +35,9 @@ help:
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
-	@echo 'make bench     kernels of a step against the memory bandwidth'
+	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
+	@echo 'make check64   only whether it compiles there'
+	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -43,6 +47,11 @@ help:
 deps:
 ifneq ($(DEPS),no)
 	@scripts/install-deps.sh --test
+endif
+
+deps64:
+ifneq ($(DEPS),no)
+	@scripts/install-deps.sh --test64
 endif
 
 build:
@@ -55,6 +64,14 @@ run: deps
 test: deps
 	cargo test --release --locked
 
+# Everything compiled for these indices stays in a folder of its own.
+test64: deps64
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir target/petsc64 --lib
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir target/petsc64 --test jobs on_two_ranks
+
+check64: deps64
+	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings
+
 # Random contact laws; families of hard cases; kills, full disks, damaged files, restarts; bytes for the readers; Slurm, where root has one to start.
 hard: deps
 	CLARKE_RANDOM_LAWS=1000 cargo test --release --locked --test verification random_laws
@@ -64,9 +81,11 @@ hard: deps
 	cargo build --release --locked
 	tests/slurm/run.sh $(binary)
 
-# Kernels against the memory bandwidth of this machine.
+# Kernels against the memory bandwidth of this machine; checkpoints and field files by parts, on one rank and on two.
 bench: deps
 	cargo bench --locked --bench kernels
+	cargo bench --locked --bench output
+	cargo --config "target.'cfg(all())'.runner='mpirun -n 2'" bench --locked --bench output
 
 lint: deps
 	cargo fmt --all --check

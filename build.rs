@@ -1,5 +1,6 @@
 //! Finds the system's PETSc through pkg-config, with the CHOLMOD that it uses, and generates the raw bindings of what `src/petsc` calls.
 
+use bindgen::callbacks::{IntKind, ParseCallbacks};
 use std::{
     env,
     path::{Path, PathBuf},
@@ -38,8 +39,25 @@ const FUNCTIONS: &[&str] = &[
     "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
     "MatDense(Get|Restore)Array(Read)?",
     "(madvise|dlsym)",
-    "cholmod_(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
+    "cholmod_(l_)?(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
 ];
+
+/// What a build of PETSc may have or not, by its macro, and the cfg that says so.
+const PARTS: [(&str, &str); 3] = [
+    ("PETSC_USE_64BIT_INDICES", "petsc_64bit"),
+    ("PETSC_HAVE_HYPRE", "petsc_hypre"),
+    ("PETSC_HAVE_MUMPS", "petsc_mumps"),
+];
+
+/// Gives macros that stand for counts the type of counts.
+#[derive(Debug)]
+struct Counts;
+
+impl ParseCallbacks for Counts {
+    fn int_macro(&self, name: &str, _value: i64) -> Option<IntKind> {
+        (name == "PETSC_DETERMINE").then_some(IntKind::Custom { name: "PetscInt", is_signed: true })
+    }
+}
 
 fn main() {
     println!("cargo::rerun-if-changed=src/petsc/wrapper.h");
@@ -57,6 +75,7 @@ fn main() {
     let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
     bindgen::builder()
         .header("src/petsc/wrapper.h")
+        .parse_callbacks(Box::new(Counts))
         .clang_args(includes.map(|d| format!("-I{}", d.display())))
         .rust_edition(bindgen::RustEdition::Edition2024)
         .default_enum_style(bindgen::EnumVariation::Consts)
@@ -93,6 +112,7 @@ fn find_petsc() -> pkg_config::Library {
     })
 }
 
+/// Refuses a PETSc that can't be used and tells the crate what the others have.
 fn check_configuration(include_paths: &[PathBuf]) {
     let file = include_paths
         .iter()
@@ -102,11 +122,16 @@ fn check_configuration(include_paths: &[PathBuf]) {
     let text = std::fs::read_to_string(&file).expect("petscconf.h is readable");
     let has = |name: &str| text.lines().any(|l| l.starts_with(&format!("#define {name} ")));
     assert!(
-        !has("PETSC_USE_COMPLEX") && has("PETSC_USE_REAL_DOUBLE") && !has("PETSC_USE_64BIT_INDICES"),
-        "{}: this PETSc is complex, not double precision, or has 64-bit indices; \
-         a real, double, 32-bit-index build is needed (Debian: libpetsc-real-dev)",
+        !has("PETSC_USE_COMPLEX") && has("PETSC_USE_REAL_DOUBLE"),
+        "{}: this PETSc is complex or not double precision; a real, double build is needed (Debian: libpetsc-real-dev)",
         file.display()
     );
+    for (name, cfg) in PARTS {
+        println!("cargo::rustc-check-cfg=cfg({cfg})");
+        if has(name) {
+            println!("cargo::rustc-cfg={cfg}");
+        }
+    }
 }
 
 fn git_id() -> String {

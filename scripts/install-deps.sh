@@ -1,10 +1,11 @@
 #!/bin/sh
 # Installs what Clarke needs from the distribution: Debian 12 or later, Ubuntu 24.04 or later.
 #
-#   scripts/install-deps.sh [--build | --test | --runtime]
+#   scripts/install-deps.sh [--build | --test | --test64 | --runtime]
 #
 #   --build     to compile the solver and run it from the source tree (default)
 #   --test      to run the tests and the checks as well: Python for the readers of result files
+#   --test64    as --test, and a PETSc with 64-bit indices beside the other
 #   --runtime   to run a compiled solver: libraries and mpirun, no compiler, no headers
 #
 # Nothing is touched, and no network asked, when everything is already there.
@@ -15,6 +16,7 @@ build_packages="libpetsc-real-dev libhdf5-openmpi-dev libopenmpi-dev openmpi-bin
 libclang-dev pkg-config gcc libc6-dev make git ca-certificates"
 # The tests read result files with VTK and meshio, which pip puts into a virtual environment.
 test_packages="python3 python3-venv"
+wide_packages="libpetsc64-real-dev"
 # The runtime libraries carry their version in their name, so they are named by pattern.
 runtime_libraries="libpetsc-real[0-9.]+(t64)? libhdf5-openmpi-[0-9]+(-[0-9]+)?(t64)? libmetis[0-9]+(t64)?"
 runtime_packages="openmpi-bin libopenblas0-pthread"
@@ -125,20 +127,20 @@ require_rust() {
 }
 
 what=${1---build}
-[ $# -le 1 ] || { say "one option at most: --build, --test or --runtime" >&2; exit 2; }
+[ $# -le 1 ] || { say "one option at most: --build, --test, --test64 or --runtime" >&2; exit 2; }
 case $what in
-    --build | --test | --runtime) ;;
+    --build | --test | --test64 | --runtime) ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0"; exit 0 ;;
-    *) say "unknown option $what: --build, --test or --runtime" >&2; exit 2 ;;
+    *) say "unknown option $what: --build, --test, --test64 or --runtime" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null 2>&1 || ! command -v dpkg-query >/dev/null 2>&1; then
     if [ "$what" = --runtime ]; then
-        fail "this is not Debian or Ubuntu. Install by hand: PETSc $oldest_petsc or later (real, double precision, 32-bit indices)," \
+        fail "this is not Debian or Ubuntu. Install by hand: PETSc $oldest_petsc or later (real, double precision)," \
             "its MPI, HDF5 built for that MPI, METIS 5"
     fi
-    fail "this is not Debian or Ubuntu. Install by hand, with headers: PETSc $oldest_petsc or later (real, double precision, 32-bit" \
-        "indices), its MPI with mpicc and mpirun, HDF5 built for that MPI, METIS 5, libclang, pkg-config, a C compiler;" \
+    fail "this is not Debian or Ubuntu. Install by hand, with headers: PETSc $oldest_petsc or later (real, double" \
+        "precision), its MPI with mpicc and mpirun, HDF5 built for that MPI, METIS 5, libclang, pkg-config, a C compiler;" \
         "make pkg-config find PETSc and HDF5; then 'make build'"
 fi
 
@@ -146,7 +148,8 @@ if [ "$what" = --runtime ]; then
     install_runtime
 else
     [ "$what" = --build ] && test_packages=
+    [ "$what" = --test64 ] || wide_packages=
     # shellcheck disable=SC2086 # lists of package names
-    install_development $build_packages $test_packages
+    install_development $build_packages $test_packages $wide_packages
     require_rust
 fi

@@ -118,6 +118,7 @@ fn the_effective_job_loads_from_the_output_folder_as_the_same_job() {
         "scheme = \"lagged_euler\"",
         "slope_before = 0.0",
         "keep = 2",
+        "compression = 0",
         "folder = \".\"",
         "/anywhere/meshes/block.msh",
     ] {

@@ -9,10 +9,12 @@ use crate::{
     body::Body,
     effect::History,
     error::{Error, Result},
+    job::Output,
     session::Session,
     state::State,
     tensor::{Mandel, von_mises},
 };
+use hdf5::filters::deflate_available;
 use std::path::Path;
 
 /// Name of the field that the job asks for.
@@ -24,16 +26,20 @@ pub struct FieldOutput<const D: usize>(FieldFile<D>);
 impl<const D: usize> FieldOutput<D> {
     /// Creates the files with the mesh, or goes on with them behind this time; files that
     /// can't be read are put aside. Refused where they hold the error indicator and it is not wanted, or the other way
-    /// round. Collective.
+    /// round, and where HDF5 can't compress though it is to. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         folder: &Path,
         body: &Body<D, S>,
         goes_on_after: Option<f64>,
-        wants_indicator: bool,
+        output: &Output,
         log: &mut Log,
     ) -> Result<Self> {
-        let mesh = &body.mesh;
+        let (mesh, compression) = (&body.mesh, output.compression);
+        if compression > 0 && !deflate_available() {
+            let words = "output.compression: the HDF5 library here was built without zlib; leave the key out";
+            return Err(Error::Refused(words.into()));
+        }
         let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
         let (point_ids, cell_ids) = (wide(&mesh.node_ids[..mesh.owned]), wide(&mesh.cell_ids));
         let cells: Vec<u64> = mesh.cells.iter().map(|&node| u64::from(mesh.global_node(node))).collect();
@@ -46,19 +52,19 @@ impl<const D: usize> FieldOutput<D> {
         let file = folder.join("fields.vtkhdf");
         let exists = session.largest([f64::from(u8::from(session.is_first() && file.exists()))])[0] > 0.0;
         let (Some(time), true) = (goes_on_after, exists) else {
-            return Ok(Self(FieldFile::create(folder, session.world(), parts)?));
+            return Ok(Self(FieldFile::create(folder, session.world(), parts, compression)?));
         };
         let holds = if session.is_first() { has_field(&file, ERROR_INDICATOR) } else { None };
-        let fits = holds.is_none_or(|holds| holds == wants_indicator);
-        session.agree(fits.then_some(()).ok_or_else(|| other_fields(&file, wants_indicator)))?;
-        match FieldFile::resume(folder, session.world(), parts, time) {
+        let fits = holds.is_none_or(|holds| holds == output.error_indicator);
+        session.agree(fits.then_some(()).ok_or_else(|| other_fields(&file, output.error_indicator)))?;
+        match FieldFile::resume(folder, session.world(), parts, time, compression) {
             Ok(resumed) => Ok(Self(resumed)),
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
                 log.line(format!("warning: {error}; it is kept as {}, a new one is begun", aside.display()));
                 let moved = if session.is_first() { std::fs::rename(&file, &aside) } else { Ok(()) };
                 session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
-                Ok(Self(FieldFile::create(folder, session.world(), parts)?))
+                Ok(Self(FieldFile::create(folder, session.world(), parts, compression)?))
             }
         }
     }

@@ -60,12 +60,19 @@ pub struct FieldFile<const D: usize> {
     cells: Slab,
     kinds: Vec<FieldKind>,
     times: Vec<f64>,
+    compression: u8,
 }
 
 impl<const D: usize> FieldFile<D> {
-    /// Creates `fields.vtkhdf` in the folder, with the mesh and no steps, replacing older ones. Collective, as all
-    /// functions of this type, with the same outcome on all ranks.
-    pub fn create(folder: &Path, communicator: &impl Communicator, mesh: FieldMesh<D>) -> Result<Self> {
+    /// Creates `fields.vtkhdf` in the folder, with the mesh and no steps, replacing older ones. Its large tables are
+    /// compressed at a level from 1 to 9, or not at all (0). Collective, as all functions of this type, with the same
+    /// outcome on all ranks.
+    pub fn create(
+        folder: &Path,
+        communicator: &impl Communicator,
+        mesh: FieldMesh<D>,
+        compression: u8,
+    ) -> Result<Self> {
         let communicator = communicator.duplicate();
         let sound =
             mesh.points.len() == mesh.point_ids.len() && mesh.cells.len() == (D + 1) * mesh.cell_ids.len();
@@ -74,22 +81,24 @@ impl<const D: usize> FieldFile<D> {
         let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
         let points = Slab::new(&file, &communicator, mesh.points.len());
         let cells = Slab::new(&file, &communicator, mesh.cell_ids.len());
-        write_mesh(&file, &communicator, &mesh, &points, &cells)?;
+        write_mesh(&file, &communicator, &mesh, [&points, &cells], compression)?;
         file.flush()?;
         let xdmf = folder.join("fields.xdmf");
         let stale = communicator.rank() == 0 && xdmf.exists();
         let removed = if stale { std::fs::remove_file(&xdmf) } else { Ok(()) };
         agree(&communicator, removed.map_err(|error| Error::unwritable(&xdmf, error)))?;
-        Ok(Self { file, communicator, xdmf, points, cells, kinds: Vec::new(), times: Vec::new() })
+        let (kinds, times) = (Vec::new(), Vec::new());
+        Ok(Self { file, communicator, xdmf, points, cells, kinds, times, compression })
     }
 
     /// Opens the files of an earlier run to go on, keeping the steps up to `time` (s). The mesh must be the same, its
-    /// distribution over ranks may differ.
+    /// distribution over ranks and the compression of new steps may differ.
     pub fn resume(
         folder: &Path,
         communicator: &impl Communicator,
         mesh: FieldMesh<D>,
         time: f64,
+        compression: u8,
     ) -> Result<Self> {
         let communicator = communicator.duplicate();
         let file = ParallelFile::open_append(&folder.join("fields.vtkhdf"), &communicator)?;
@@ -104,8 +113,8 @@ impl<const D: usize> FieldFile<D> {
             cut(&file, &kinds, times.len())?;
         }
         let xdmf = folder.join("fields.xdmf");
-        let resumed = Self { file, communicator, xdmf, points, cells, kinds, times };
-        resumed.write_xdmf()?;
+        let resumed = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
+        resumed.write_xdmf(false)?;
         Ok(resumed)
     }
 
@@ -134,7 +143,8 @@ impl<const D: usize> FieldFile<D> {
                 values = reorder.apply(width, &values)?;
             }
             let name = format!("Fields/{}/{step}", field.name);
-            self.file.create_rows::<f64>(&name, slab.total, width)?.write(slab.first, &values)?;
+            let rows = self.file.create_packed_rows::<f64>(&name, slab.total, width, self.compression)?;
+            rows.write(slab.first, &values)?;
             self.append(&offsets_name(field.place, field.name), step, step as i64 * slab.total as i64)?;
         }
         for name in STATIC_OFFSETS {
@@ -146,7 +156,7 @@ impl<const D: usize> FieldFile<D> {
         self.file.set_number("VTKHDF/Steps", "NSteps", step as i64 + 1)?;
         self.file.flush()?;
         self.times.push(time);
-        self.write_xdmf()
+        self.write_xdmf(true)
     }
 
     /// Closes the files.
@@ -232,12 +242,15 @@ impl<const D: usize> FieldFile<D> {
         series.write(step as u64, if self.communicator.rank() == 0 { &own } else { &[] })
     }
 
-    fn write_xdmf(&self) -> Result<()> {
+    /// Writes the file anew, or adds the last step to it if it has `grown` by that.
+    fn write_xdmf(&self, grown: bool) -> Result<()> {
         let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
-        let written = if self.communicator.rank() == 0 {
-            xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times)
-        } else {
-            Ok(())
+        let written = match self.times.split_last() {
+            _ if self.communicator.rank() != 0 => Ok(()),
+            Some((time, before)) if grown && !before.is_empty() && self.xdmf.exists() => {
+                xdmf::append(&self.xdmf, mesh, &self.kinds, before.len(), *time)
+            }
+            _ => xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times),
         };
         agree(&self.communicator, written)
     }
@@ -247,8 +260,8 @@ fn write_mesh<const D: usize>(
     file: &ParallelFile,
     communicator: &impl Communicator,
     mesh: &FieldMesh<D>,
-    points: &Slab,
-    cells: &Slab,
+    [points, cells]: [&Slab; 2],
+    level: u8,
 ) -> Result<()> {
     for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
         file.create_group(group)?;
@@ -267,22 +280,25 @@ fn write_mesh<const D: usize>(
     }
     let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
     let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
-    file.create_rows::<f64>("VTKHDF/Points", points.total, 3)?.write(points.first, &coordinates)?;
-    file.create_rows::<i64>("Mesh/cells", cells.total, corners)?.write(cells.first, &whole(mesh.cells))?;
+    file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, level)?
+        .write(points.first, &coordinates)?;
+    file.create_packed_rows::<i64>("Mesh/cells", cells.total, corners, level)?
+        .write(cells.first, &whole(mesh.cells))?;
     file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
 
     let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
     let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
     let start = if first { 0 } else { cells.first + 1 };
-    file.create_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1)?.write(start, &offsets)?;
+    file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, level)?.write(start, &offsets)?;
     let kind: u8 = if D == 2 { 5 } else { 10 };
-    file.create_rows::<u8>("VTKHDF/Types", cells.total, 1)?.write(cells.first, &vec![kind; cells.owned])?;
+    file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, level)?
+        .write(cells.first, &vec![kind; cells.owned])?;
 
-    let node_ids = file.create_rows::<i64>("VTKHDF/PointData/node", points.total, 1)?;
+    let node_ids = file.create_packed_rows::<i64>("VTKHDF/PointData/node", points.total, 1, level)?;
     node_ids.write(points.first, &whole(mesh.point_ids))?;
-    let cell_ids = file.create_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1)?;
+    let cell_ids = file.create_packed_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1, level)?;
     cell_ids.write(cells.first, &whole(mesh.cell_ids))?;
-    let ranks = file.create_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1)?;
+    let ranks = file.create_packed_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1, level)?;
     ranks.write(cells.first, &vec![communicator.rank(); cells.owned])
 }
 

@@ -39,6 +39,9 @@ pub fn given_up() -> bool {
     GIVEN_UP.load(Ordering::Relaxed)
 }
 
+/// Bytes of a chunk of a compressed dataset before it is compressed.
+const CHUNK_BYTES: usize = 1 << 20;
+
 /// The longest text an attribute holds, in bytes.
 const LONGEST_TEXT: usize = 256;
 
@@ -182,6 +185,31 @@ impl ParallelFile {
         let empty = self.new_dataset::<T>().no_chunk();
         let made =
             if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// As [`Self::create_rows`], compressed (bytes shuffled, then deflated) at a level from 1 to 9, in chunks of some
+    /// [`CHUNK_BYTES`]; level 0 is `create_rows`.
+    pub fn create_packed_rows<T: Element>(
+        &self,
+        name: &str,
+        rows: u64,
+        width: usize,
+        level: u8,
+    ) -> Result<Rows<'_, T>> {
+        if level == 0 {
+            return self.create_rows(name, rows, width);
+        }
+        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
+        let rows = rows as usize;
+        let chunk = (CHUNK_BYTES / (width * size_of::<T>())).clamp(1, rows.max(1));
+        let empty = self.new_dataset::<T>().shuffle().deflate(level);
+        let made = if width == 1 {
+            empty.chunk(chunk).shape(rows).create(name)
+        } else {
+            empty.chunk((chunk, width)).shape((rows, width)).create(name)
+        };
         let dataset = self.written(&format!("make dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
     }

@@ -5,8 +5,10 @@
 use crate::agreement::agree;
 use crate::error::{Error, Result};
 use crate::exchange::{exchange, offsets};
+use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::Communicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// A plan that moves rows; made once for a pair of row orders, applied to any number of tables.
 pub struct Redistribution {
@@ -55,6 +57,20 @@ impl Redistribution {
         }
         Ok(wanted)
     }
+}
+
+/// Whether over all ranks each id below `total` is held exactly once, without telling the ranks each other's ids: ids that are
+/// held and ids that should be have the same sum of hashes, others with a probability of 2^-64. Collective.
+pub fn are_whole(communicator: &impl Communicator, total: u64, held: &[u64]) -> bool {
+    let hashes = |ids: &mut dyn Iterator<Item = u64>| {
+        ids.fold(0_u64, |sum, id| sum.wrapping_add(xxh3_64(&id.to_le_bytes())))
+    };
+    let (part, parts) = (communicator.rank() as usize, communicator.size() as usize);
+    let mut share = first_of_part(total, part, parts)..first_of_part(total, part + 1, parts);
+    let own = hashes(&mut held.iter().copied()).wrapping_sub(hashes(&mut share));
+    let mut sum = 0_u64;
+    communicator.all_reduce_into(&own, &mut sum, SystemOperation::sum());
+    sum == 0
 }
 
 /// The first of the rows that part `part` of `parts` owns of `total` rows; part `parts` starts at the end.

@@ -3,7 +3,12 @@
 use super::field::{FieldKind, Place, Shape, data_group, file_width};
 use crate::error::{Error, Result};
 use std::fmt::Write;
+use std::fs::OpenOptions;
+use std::io::{self, Seek, SeekFrom, Write as _};
 use std::path::Path;
+
+/// What stands behind the last step.
+const END: &str = "</Grid>\n</Domain>\n</Xdmf>\n";
 
 /// The size of the mesh.
 #[derive(Debug, Clone, Copy)]
@@ -21,6 +26,23 @@ pub(super) fn write(path: &Path, mesh: Mesh, kinds: &[FieldKind], times: &[f64])
         .map_err(|error| Error::unwritable(path, error))
 }
 
+/// Adds a step to a file with all those before, so that the cost of a step does not grow with their number. A reader sees the
+/// old or the new file; so it is where the disk is full. On one rank.
+pub(super) fn append(path: &Path, mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> Result<()> {
+    let add = || -> io::Result<()> {
+        let mut file = OpenOptions::new().write(true).open(path)?;
+        let end = file.seek(SeekFrom::End(-(END.len() as i64)))?;
+        let text = grid(mesh, kinds, step, time) + END;
+        file.write_all(text.as_bytes()).or_else(|error| {
+            file.seek(SeekFrom::Start(end))?;
+            file.write_all(END.as_bytes())?;
+            file.set_len(end + END.len() as u64)?;
+            Err(error)
+        })
+    };
+    add().map_err(|error| Error::unwritable(path, error))
+}
+
 fn document(mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n\
@@ -29,7 +51,7 @@ fn document(mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> String {
     for (step, time) in times.iter().enumerate() {
         text.push_str(&grid(mesh, kinds, step, *time));
     }
-    text.push_str("</Grid>\n</Domain>\n</Xdmf>\n");
+    text.push_str(END);
     text
 }
 
@@ -95,6 +117,20 @@ mod tests {
             .map(|rest| rest.split('"').next().unwrap_or_default().parse().expect("number"))
             .collect();
         assert_eq!(read, [time, 1e-9]);
+    }
+
+    #[test]
+    fn a_file_that_grew_is_the_file_written_at_once() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("fields.xdmf");
+        let kinds = [FieldKind { name: "velocity".into(), place: Place::Node, shape: Shape::Vector }];
+        let mesh = Mesh { dimension: 2, points: 3, cells: 1 };
+        write(&path, mesh, &kinds, &[0.0]).expect("written");
+        for (step, time) in [(1, 0.5), (2, 0.75)] {
+            append(&path, mesh, &kinds, step, time).expect("added");
+        }
+        let grown = std::fs::read_to_string(&path).expect("text");
+        assert_eq!(grown, document(mesh, &kinds, &[0.0, 0.5, 0.75]));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use super::{
-    BlockRows, large_pages,
+    BlockRows, cholmod, large_pages,
     lower_half::{Lower, view},
     sys,
 };
@@ -44,7 +44,7 @@ impl Cholesky {
         let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
         // SAFETY: CHOLMOD fills the struct, which stays in its box.
         let common = unsafe {
-            sys::cholmod_start(common.as_mut_ptr());
+            cholmod::cholmod_start(common.as_mut_ptr());
             let mut common = Box::from_raw(Box::into_raw(common).cast::<sys::cholmod_common>());
             common.print = 0;
             common.supernodal = sys::CHOLMOD_SUPERNODAL as c_int;
@@ -64,20 +64,20 @@ impl Cholesky {
         };
         let mut is_last = vec![false; size];
         last.iter().for_each(|&unknown| is_last[unknown] = true);
-        let mut order: Vec<c_int> = match known {
-            Some(order) => order.iter().map(|&unknown| unknown as c_int).collect(),
+        let mut order: Vec<sys::PetscInt> = match known {
+            Some(order) => order.iter().map(|&unknown| unknown as sys::PetscInt).collect(),
             None => {
                 let nodes = cholesky.node_order(block, rows)?.into_iter().map(|node| node as usize);
                 let unknowns = nodes.flat_map(|node| (0..block).map(move |i| node * block + i));
                 let first = unknowns.filter(|&unknown| !is_last[unknown]);
-                first.chain(last.iter().copied()).map(|unknown| unknown as c_int).collect()
+                first.chain(last.iter().copied()).map(|unknown| unknown as sys::PetscInt).collect()
             }
         };
         let mut lower = Lower::of(block, rows)?;
         let mut matrix = lower.view();
         // SAFETY: the view lives for the call, the order has as many entries as the matrix rows; the handle owns the factor.
         unsafe {
-            cholesky.factor = sys::cholmod_analyze_p(
+            cholesky.factor = cholmod::cholmod_analyze_p(
                 &mut matrix,
                 order.as_mut_ptr(),
                 ptr::null_mut(),
@@ -85,10 +85,15 @@ impl Cholesky {
                 &mut *cholesky.common,
             );
             cholesky.check()?;
-            let found = std::slice::from_raw_parts((*cholesky.factor).Perm.cast::<c_int>(), size);
+            let found = std::slice::from_raw_parts((*cholesky.factor).Perm.cast::<sys::PetscInt>(), size);
             cholesky.order = found.iter().map(|&unknown| unknown as u32).collect();
-            cholesky.given =
-                sys::cholmod_allocate_dense(size, 1, size, sys::CHOLMOD_REAL as c_int, &mut *cholesky.common);
+            cholesky.given = cholmod::cholmod_allocate_dense(
+                size,
+                1,
+                size,
+                sys::CHOLMOD_REAL as c_int,
+                &mut *cholesky.common,
+            );
         }
         cholesky.check()?;
         let tail = &cholesky.order[size - last.len()..];
@@ -96,7 +101,7 @@ impl Cholesky {
             return Ok(None);
         }
         // SAFETY: the view lives for the call; the handle owns a factor of its pattern.
-        unsafe { sys::cholmod_factorize(&mut matrix, cholesky.factor, &mut *cholesky.common) };
+        unsafe { cholmod::cholmod_factorize(&mut matrix, cholesky.factor, &mut *cholesky.common) };
         if cholesky.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
             return Err(Error::Failed(
                 "the matrix of the step is not positive definite: check densities, viscosities and moduli"
@@ -113,28 +118,28 @@ impl Cholesky {
     }
 
     /// Nodes in an order that leaves little to factor.
-    fn node_order(&mut self, block: usize, rows: &BlockRows) -> Result<Vec<c_int>> {
+    fn node_order(&mut self, block: usize, rows: &BlockRows) -> Result<Vec<sys::PetscInt>> {
         let nodes = rows.offsets.len() - 1;
-        let (mut starts, mut indices) = (vec![0 as c_int], Vec::new());
+        let (mut starts, mut indices) = (vec![0], Vec::new());
         for (row, range) in rows.offsets.windows(2).enumerate() {
             let entries = rows.columns[range[0]..range[1]].iter();
             let blocks = rows.values[range[0] * block * block..].chunks_exact(block * block);
             for (&column, block) in entries.zip(blocks).filter(|(column, _)| **column as usize >= row) {
                 if column as usize == row || block.iter().any(|&value| value != 0.0) {
-                    indices.push(column as c_int);
+                    indices.push(column as sys::PetscInt);
                 }
             }
-            starts.push(indices.len() as c_int);
+            starts.push(indices.len() as sys::PetscInt);
         }
-        let mut order = vec![0 as c_int; nodes];
+        let mut order = vec![0; nodes];
         let mut pattern = view(nodes, &mut starts, &mut indices, None);
         let common = &mut *self.common;
         // SAFETY: the view lives for the call; the order has one entry a node.
         unsafe {
             if nodes < DISSECTED {
-                sys::cholmod_amd(&mut pattern, ptr::null_mut(), 0, order.as_mut_ptr(), common);
+                cholmod::cholmod_amd(&mut pattern, ptr::null_mut(), 0, order.as_mut_ptr(), common);
             } else {
-                sys::cholmod_metis(&mut pattern, ptr::null_mut(), 0, 1, order.as_mut_ptr(), common);
+                cholmod::cholmod_metis(&mut pattern, ptr::null_mut(), 0, 1, order.as_mut_ptr(), common);
             }
         }
         self.check()?;
@@ -185,7 +190,7 @@ impl Cholesky {
             if forward { (self.given, &mut self.halfway) } else { (self.halfway, &mut self.given) };
         // SAFETY: live factor and vectors of its size; CHOLMOD allocates what is missing, the handle owns it.
         unsafe {
-            sys::cholmod_solve2(
+            cholmod::cholmod_solve2(
                 system,
                 self.factor,
                 from,
@@ -211,7 +216,7 @@ impl Cholesky {
         unsafe {
             let factor = &*self.factor;
             let list = |pointer: *mut c_void, length: usize| {
-                std::slice::from_raw_parts(pointer.cast::<c_int>(), length)
+                std::slice::from_raw_parts(pointer.cast::<sys::PetscInt>(), length)
             };
             let nodes = list(factor.super_, factor.nsuper + 1);
             let (rows_at, values_at) =
@@ -259,10 +264,10 @@ impl Drop for Cholesky {
         // SAFETY: the handle owns all of these; CHOLMOD takes null pointers.
         unsafe {
             for dense in self.work.iter_mut().chain([&mut self.given, &mut self.halfway]) {
-                sys::cholmod_free_dense(dense, common);
+                cholmod::cholmod_free_dense(dense, common);
             }
-            sys::cholmod_free_factor(&mut self.factor, common);
-            sys::cholmod_finish(common);
+            cholmod::cholmod_free_factor(&mut self.factor, common);
+            cholmod::cholmod_finish(common);
         }
     }
 }

@@ -1,11 +1,11 @@
-use super::{BlockRows, sys};
+use super::{BlockRows, cholmod::INDEX_KIND, sys};
 use crate::error::{Error, Result};
 use std::{ffi::c_int, ptr};
 
 /// The lower half of a matrix by columns.
 pub(super) struct Lower {
-    starts: Vec<c_int>,
-    indices: Vec<c_int>,
+    starts: Vec<sys::PetscInt>,
+    indices: Vec<sys::PetscInt>,
     values: Vec<f64>,
 }
 
@@ -19,7 +19,8 @@ impl Lower {
                 "{entries} matrix entries are more than CHOLMOD can count: use [solver] preconditioner = \"gamg\""
             ))
         };
-        c_int::try_from(entries).map_err(too_many)?;
+        sys::PetscInt::try_from(entries).map_err(too_many)?;
+        u32::try_from((rows.offsets.len() - 1) * block).map_err(too_many)?;
         let mut lower = Self {
             starts: Vec::with_capacity((rows.offsets.len() - 1) * block + 1),
             indices: Vec::with_capacity(entries),
@@ -34,12 +35,12 @@ impl Lower {
                     for j in (0..block).filter(|j| first + j >= row) {
                         let value = rows.values[(at * block + i) * block + j];
                         if value != 0.0 || first + j == row {
-                            lower.indices.push((first + j) as c_int);
+                            lower.indices.push((first + j) as sys::PetscInt);
                             lower.values.push(value);
                         }
                     }
                 }
-                lower.starts.push(lower.indices.len() as c_int);
+                lower.starts.push(lower.indices.len() as sys::PetscInt);
             }
         }
         Ok(lower)
@@ -53,8 +54,8 @@ impl Lower {
 /// CHOLMOD's view of the lower half of a symmetric matrix; it must not outlive the arrays.
 pub(super) fn view(
     size: usize,
-    starts: &mut [c_int],
-    indices: &mut [c_int],
+    starts: &mut [sys::PetscInt],
+    indices: &mut [sys::PetscInt],
     values: Option<&mut [f64]>,
 ) -> sys::cholmod_sparse {
     let kind = if values.is_some() { sys::CHOLMOD_REAL } else { sys::CHOLMOD_PATTERN };
@@ -68,7 +69,7 @@ pub(super) fn view(
         x: values.map_or(ptr::null_mut(), |values| values.as_mut_ptr().cast()),
         z: ptr::null_mut(),
         stype: -1,
-        itype: sys::CHOLMOD_INT as c_int,
+        itype: INDEX_KIND,
         xtype: kind as c_int,
         dtype: sys::CHOLMOD_DOUBLE as c_int,
         sorted: 1,

@@ -172,8 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn columns_beyond_32_bit_indices_are_refused() {
-        let rows = BlockRows { offsets: vec![0, 1], columns: vec![u32::MAX], values: vec![1.0] };
-        assert!(scalar_rows(1, &rows).unwrap_err().to_string().contains("32-bit"));
+    fn columns_beyond_32_bits_need_64_bit_indices() {
+        let rows = BlockRows { offsets: vec![0, 1], columns: vec![u32::MAX], values: vec![1.0; 4] };
+        match scalar_rows(2, &rows) {
+            Ok((_, columns, _)) => {
+                let columns: Vec<u64> = columns.into_iter().map(|c| u64::try_from(c).unwrap()).collect();
+                assert_eq!(columns[..2], [8_589_934_590, 8_589_934_591]);
+            }
+            Err(error) => assert!(super::super::INDEX_BITS == 32 && error.to_string().contains("32-bit")),
+        }
     }
 }

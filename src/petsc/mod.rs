@@ -9,6 +9,7 @@ mod block_product;
 mod block_transfer;
 mod callback;
 mod cholesky;
+mod cholmod;
 mod compressed_rows;
 mod dense;
 mod ksp;
@@ -98,11 +99,26 @@ fn c_string(words: &str) -> Result<CString> {
     CString::new(words).map_err(|_| Error::Refused(format!("PETSc option {words:?} has a NUL character")))
 }
 
-/// A count as PETSc's 32-bit index, or an error that says which count is too large.
+/// Bits of PETSc's indices: 32 or 64, as it was built.
+pub const INDEX_BITS: u32 = sys::PetscInt::BITS;
+/// Whether PETSc was built with hypre.
+pub const HAS_HYPRE: bool = cfg!(petsc_hypre);
+/// Whether PETSc was built with MUMPS.
+pub const HAS_MUMPS: bool = cfg!(petsc_mumps);
+
+/// Refuses what needs a part that PETSc was built without.
+pub fn require(there: bool, what: &str, part: &str, remedy: &str) -> Result<()> {
+    let words =
+        || Error::Refused(format!("{what} needs {part}, which this PETSc was built without: {remedy}"));
+    if there { Ok(()) } else { Err(words()) }
+}
+
+/// A count as PETSc's index, or an error that says which count is too large.
 fn index(count: usize, what: &str) -> Result<sys::PetscInt> {
     sys::PetscInt::try_from(count).map_err(|_| {
         Error::Refused(format!(
-            "{what}: {count} exceeds the 32-bit indices of this PETSc; use a coarser mesh or a PETSc with 64-bit indices"
+            "{what}: {count} exceeds the {INDEX_BITS}-bit indices of this PETSc; use more ranks, a coarser mesh or a PETSc with \
+             64-bit indices"
         ))
     })
 }

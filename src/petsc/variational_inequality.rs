@@ -1,7 +1,7 @@
 use super::{
-    DistributedVector, Matrix, NonlinearOutcome, c_string,
+    DistributedVector, HAS_MUMPS, Matrix, NonlinearOutcome, c_string,
     callback::{Callback, spoil},
-    check, index, set_default_option, sys,
+    check, index, require, set_default_option, sys,
 };
 use crate::error::Result;
 use std::{ffi::c_void, marker::PhantomData, ptr};
@@ -30,6 +30,7 @@ impl BoundedSnes {
     /// A solver for vectors laid out like `like`, whose options carry this prefix; it factors the rows without active
     /// bound anew whenever the active set changes.
     pub fn new(prefix: &str, like: &DistributedVector) -> Result<Self> {
+        require(HAS_MUMPS, "[solver] method = \"vinewtonrsls\"", "MUMPS", "use \"newton\"")?;
         let name = c_string(prefix)?;
         let mut raw = ptr::null_mut();
         // The default is an absolute distance, whatever the unit of `x`; the method puts entries on their bounds exactly.

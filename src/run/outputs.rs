@@ -65,9 +65,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let folder = job.output_folder().to_owned();
         let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
-        let wants_indicator = job.output.error_indicator;
-        let fields = FieldOutput::open(session, &folder, body, time, wants_indicator, log)?;
-        let indicator = wants_indicator.then(|| ErrorIndicator::new(session, body)).transpose()?;
+        let fields = FieldOutput::open(session, &folder, body, time, &job.output, log)?;
+        let indicator = job.output.error_indicator.then(|| ErrorIndicator::new(session, body)).transpose()?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
         let every = job.output.fields;
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);

@@ -2,7 +2,7 @@
 
 use crate::{
     error::Result,
-    petsc::{Ksp, set_default_option},
+    petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, require, set_default_option},
 };
 
 /// The preconditioner a job asks for.
@@ -143,7 +143,15 @@ impl Preconditioner {
                 set_default_option("redundant_pc_type", "cholesky")?;
                 set_default_option("redundant_pc_factor_mat_solver_type", "cholmod")
             }
-            Self::Auto | Self::Cholesky => ksp.set_preconditioner("cholesky", Some("mumps")),
+            Self::Auto | Self::Cholesky => {
+                require(
+                    HAS_MUMPS,
+                    "[solver] preconditioner = \"cholesky\" of so many unknowns on several ranks",
+                    "MUMPS",
+                    "use \"gamg\", or one rank",
+                )?;
+                ksp.set_preconditioner("cholesky", Some("mumps"))
+            }
             Self::Gamg => {
                 ksp.set_preconditioner("gamg", None)?;
                 if ranks > 2 {
@@ -157,6 +165,7 @@ impl Preconditioner {
                 set_default_option("mg_levels_pc_type", "jacobi")
             }
             Self::Boomeramg => {
+                require(HAS_HYPRE, "[solver] preconditioner = \"boomeramg\"", "hypre", "use \"gamg\"")?;
                 ksp.set_preconditioner("hypre", None)?;
                 set_default_option("pc_hypre_type", "boomeramg")?;
                 set_default_option("pc_hypre_boomeramg_strong_threshold", "0.5")?;

@@ -74,9 +74,9 @@ impl Part {
     }
 }
 
-pub fn write(world: &impl Communicator, folder: &Path) {
+pub fn write(world: &impl Communicator, folder: &Path, compression: u8) {
     let part = Part::new(world);
-    let mut file = FieldFile::create(folder, world, part.mesh()).expect("create");
+    let mut file = FieldFile::create(folder, world, part.mesh(), compression).expect("create");
     for time in [0.0, 0.25, 0.5, 0.75] {
         part.write_step(&mut file, time);
     }
@@ -87,7 +87,7 @@ pub fn write(world: &impl Communicator, folder: &Path) {
 
 pub fn die(world: &impl Communicator, folder: &Path) {
     let part = Part::new(world);
-    let mut file = FieldFile::create(folder, world, part.mesh()).expect("create");
+    let mut file = FieldFile::create(folder, world, part.mesh(), 1).expect("create");
     part.write_step(&mut file, 0.0);
     part.write_step(&mut file, 0.25);
     world.barrier();
@@ -96,7 +96,7 @@ pub fn die(world: &impl Communicator, folder: &Path) {
 
 pub fn resume(world: &impl Communicator, folder: &Path) {
     let part = Part::new(world);
-    let mut file = FieldFile::resume(folder, world, part.mesh(), 0.25).expect("resume");
+    let mut file = FieldFile::resume(folder, world, part.mesh(), 0.25, 4).expect("resume");
     assert_eq!(file.times(), [0.0, 0.25]);
     part.write_step(&mut file, 0.375);
     part.write_step(&mut file, 0.5);
@@ -106,7 +106,7 @@ pub fn resume(world: &impl Communicator, folder: &Path) {
     if world.rank() == 0 {
         shorter.cell_ids = &[];
     }
-    let error = FieldFile::resume(folder, world, shorter, 1.0).err().expect("refused").to_string();
+    let error = FieldFile::resume(folder, world, shorter, 1.0, 0).err().expect("refused").to_string();
     assert!(error.contains("another mesh"), "{error}");
 }
 
@@ -123,7 +123,7 @@ pub fn write_solid(world: &impl Communicator, folder: &Path) {
         cells: &cells[4 * owned.start..4 * owned.end],
         cell_ids: &[0, 1][owned.clone()],
     };
-    let mut file = FieldFile::create(folder, world, mesh).expect("create");
+    let mut file = FieldFile::create(folder, world, mesh, 1).expect("create");
     for step in 0..2 {
         let values: Vec<f64> = nodes.clone().flat_map(|node| [node as f64, step as f64, 7.0]).collect();
         let mandel = [11.0, 22.0, 33.0, 23.0 * SQRT_2, 13.0 * SQRT_2, 12.0 * SQRT_2];
@@ -189,6 +189,8 @@ fn check(folder: &Path, times: &[f64]) {
 fn fields_of_all_steps_stand_in_the_file_whatever_the_number_of_ranks() {
     for ranks in 1..=4 {
         let folder = tempfile::tempdir().expect("folder");
+        mpirun::run(ranks, "fields_write_packed", folder.path());
+        check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
         mpirun::run(ranks, "fields_write", folder.path());
         check(folder.path(), &[0.0, 0.25, 0.5, 0.75]);
         let words = inspect(&folder.path().join("fields.vtkhdf")).expect("inspect");

@@ -4,6 +4,7 @@ mod adaptive;
 mod browser;
 mod case;
 mod certificates;
+mod compression;
 mod check_values;
 mod contact;
 mod effects;

@@ -124,8 +124,8 @@ fn other_programs_read_the_fields_of_a_square() {
 }
 
 #[test]
-fn other_programs_read_the_fields_of_a_cube_that_was_restarted() {
-    let case = Case::cube(4).set("checkpoint.every", "4");
+fn other_programs_read_the_compressed_fields_of_a_cube_that_was_restarted() {
+    let case = Case::cube(4).set("checkpoint.every", "4").set("output.compression", "4");
     case.run_with(2, &["--set", "time.end=0.5"]).expect(0);
     case.run_with(3, &["--restart"]).expect(0);
     assert_all_readers_agree(&case.results(), 10);

@@ -21,6 +21,9 @@ pub struct Output {
     /// in its stress, in the norm of the elastic energy, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu,
     /// 1987). summary.json gets its total and the share of that in the norm of the stress. Every material needs elasticity.
     pub error_indicator: bool,
+    /// How hard the numbers of fields.vtkhdf are compressed without loss, by HDF5's shuffle and deflate filters; 0: not at all.
+    #[schemars(range(max = 9), example = 1)]
+    pub compression: u8,
     /// Points that are followed in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub probe: Vec<Probe>,

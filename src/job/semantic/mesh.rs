@@ -65,7 +65,13 @@ fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, 
     }
 }
 
-/// The unknowns of a generated mesh must be countable by PETSc's 32-bit indices.
+/// Most unknowns in so many dimensions: PETSc must count them, and ids of nodes have 31 bits.
+fn most_unknowns(dimension: u64) -> u64 {
+    let nodes = i32::MAX as u64;
+    if cfg!(petsc_64bit) { dimension * nodes } else { nodes }
+}
+
+/// The unknowns of a generated mesh must be countable.
 fn check_count(findings: &mut Findings<'_>) {
     for path in ["mesh.rectangle", "mesh.box"] {
         let key = format!("{path}.cells");
@@ -76,8 +82,9 @@ fn check_count(findings: &mut Findings<'_>) {
         let crossed = findings.root.read(&format!("{path}.diagonal")) == Some(Diagonal::Crossed);
         let centres = if crossed { product(0) } else { Some(0) };
         let unknowns = product(1).zip(centres).and_then(|(corners, centres)| corners.checked_add(centres));
-        if unknowns.is_none_or(|unknowns| unknowns > i32::MAX as u64) {
-            findings.fault(&key, "this mesh has too many unknowns", "there can be at most 2147483647");
+        let most = most_unknowns(cells.len() as u64);
+        if unknowns.is_none_or(|unknowns| unknowns > most) {
+            findings.fault(&key, "this mesh has too many unknowns", format!("there can be at most {most}"));
         }
     }
 }
