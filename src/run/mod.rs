@@ -12,6 +12,7 @@ mod restored;
 mod scene;
 mod setup;
 mod simulation;
+mod step_line;
 mod summary;
 mod time_loop;
 

@@ -87,6 +87,8 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
+    /// Room for the error of a step: two changes of the velocity, and forces.
+    room: [Vec<f64>; 3],
     /// Length in s through which the ladder of preconditioners goes.
     ladder: f64,
     /// Other starts from which steps with contact are solved, to look for other solutions.
@@ -115,6 +117,7 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
+            room: Default::default(),
             ladder: 1.0,
             guesses: 0,
             set_ups: 0,
@@ -293,7 +296,7 @@ impl Stepper {
 
     /// The error of the step that was attempted last, and the sizes that it has to be compared with. Collective.
     pub fn error<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
@@ -306,27 +309,26 @@ impl Stepper {
         let ratio = if is_second { step.length / step.previous_length } else { 0.0 };
         let share = if is_second { ratio / (1.0 + ratio) } else { 0.5 };
         let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let curved: Vec<f64> = values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))).collect();
+        let [curved, strained, forces] = &mut self.room;
+        write(curved, values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))));
         // Displacements, and stresses with them, are one order better in the formula of second order.
-        let (strained, length) = if self.scheme.is_two_step() && is_second {
-            (curved.clone(), self.method.matrix_length(step))
+        let length = if self.scheme.is_two_step() && is_second {
+            strained.clone_from(curved);
+            self.method.matrix_length(step)
         } else {
-            (values.map(|(t, (v, _))| 0.5 * (t - v)).collect(), step.length)
+            write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
+            step.length
         };
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
-        let square = |form: Option<Form>, x: &[f64]| {
+        let mut square = |form: Option<Form>, x: &[f64]| {
             let Some(form) = form else { return 0.0 };
-            let mut forces = vec![0.0; x.len()];
-            body.add_form(form, x, &mut forces);
+            write(forces, x.iter().map(|_| 0.0));
+            body.add_form(form, x, forces);
             forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
-        let mine = [
-            square(form, &curved),
-            square(elastic, &strained),
-            square(form, &trial),
-            square(elastic, &trial),
-        ];
+        let mine =
+            [square(form, curved), square(elastic, strained), square(form, &trial), square(elastic, &trial)];
         let [velocity, stress, all_velocity, all_stress] =
             session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
         // Both are roots of energies where there is mass: a body that flies free of stress has some from rounding.
@@ -387,4 +389,10 @@ impl Stepper {
         }
         Ok(())
     }
+}
+
+/// Writes these values in place of the ones before.
+fn write(room: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
+    room.clear();
+    room.extend(values);
 }
