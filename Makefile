@@ -24,7 +24,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps build run test hard bench lint install clean
+.PHONY: help deps build run test hard bench bench-runs lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -34,6 +34,7 @@ help:
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
 	@echo 'make test      deps, then every test'
 	@echo 'make bench     kernels of a step against the memory bandwidth'
+	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -67,6 +68,10 @@ hard: deps
 # Kernels against the memory bandwidth of this machine.
 bench: deps
 	cargo bench --locked --bench kernels
+
+# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' holds them against another program.
+bench-runs: deps
+	cargo bench --locked --bench whole_runs -- $(ARGS)
 
 lint: deps
 	cargo fmt --all --check

@@ -8,6 +8,7 @@ use std::{marker::PhantomData, ptr};
 #[derive(Debug)]
 pub struct Ksp {
     pub(super) raw: sys::KSP,
+    applications: u64,
     not_send: PhantomData<*mut ()>,
 }
 
@@ -63,7 +64,7 @@ impl Ksp {
         // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
         unsafe {
             check(sys::KSPCreate(communicator(), &mut raw))?;
-            let ksp = Self { raw, not_send: PhantomData };
+            let ksp = Self { raw, applications: 0, not_send: PhantomData };
             check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
             Ok(ksp)
         }
@@ -161,7 +162,19 @@ impl Ksp {
     ) -> Result<LinearOutcome> {
         // SAFETY: live objects of matching layout; the two vectors differ.
         check(unsafe { sys::KSPSolve(self.raw, right_hand_side.raw, solution.raw) })?;
-        self.outcome()
+        let outcome = self.outcome()?;
+        self.applications += outcome.iterations as u64 + 1;
+        Ok(outcome)
+    }
+
+    /// Counts applications of the preconditioner from here on.
+    pub fn restart_applications(&mut self) {
+        self.applications = 0;
+    }
+
+    /// Applications of the preconditioner in all solves since then, as CG and GMRES make them: one in each iteration and one at first.
+    pub fn applications(&self) -> u64 {
+        self.applications
     }
 
     /// `z = P^-1 r` with the preconditioner, which must be set up. Collective.

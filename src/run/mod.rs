@@ -8,6 +8,7 @@ mod folder;
 mod header;
 mod inventory;
 mod outputs;
+mod phases;
 mod restored;
 mod scene;
 mod setup;

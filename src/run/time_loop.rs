@@ -5,6 +5,7 @@ use super::{
     deadline::Deadline,
     folder::{claim_folder, prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
+    phases,
     restored::restore,
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
@@ -340,29 +341,17 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
                 most_solutions: self.totals.most_solutions,
             }),
             certificates: self.certificates.clone(),
-            wall_seconds: self.seconds(),
+            wall_seconds: phases::seconds(
+                self.session,
+                self.clock,
+                self.setup,
+                (&self.scheme.clock, self.outputs.spent),
+            ),
+            traffic_bytes: phases::traffic(self.session, &self.scheme.traffic, self.outputs.written()),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
             inventory: Inventory::of(self.session, &self.body, &self.scheme),
         })
-    }
-
-    /// Seconds by phase of the slowest rank; a phase without an effect in it is absent. Collective.
-    fn seconds(&self) -> serde_json::Map<String, serde_json::Value> {
-        let clock = &self.scheme.clock;
-        let total = self.clock.began.elapsed();
-        let phases = [
-            ("total", total),
-            ("launch", self.clock.launched),
-            ("setup", self.setup.saturating_sub(clock.first_assembly)),
-            ("assembly", clock.assembly),
-            ("history", clock.history),
-            ("solve", clock.solve),
-            ("balance", clock.balance),
-            ("output", self.outputs.spent),
-        ];
-        let seconds = self.session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
-        phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
     }
 }
 

@@ -43,6 +43,8 @@ pub(super) struct Condensed {
     /// The values of all ranks' nodes, and how they come here.
     whole: Vec<f64>,
     gathering: Gathering,
+    /// Halves of solves since traffic is counted.
+    halves: u64,
 }
 
 /// A factored matrix.
@@ -155,6 +157,7 @@ impl Condensed {
             traction: if has_traction { Some(like.like()?) } else { None },
             whole: vec![0.0; body.mesh.total_nodes * D],
             gathering: Gathering::new(world, body.mesh.owned * D)?,
+            halves: 0,
         })
     }
 
@@ -214,13 +217,27 @@ impl Condensed {
         self.backward(solution)
     }
 
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&mut self) {
+        self.halves = 0;
+        self.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
+    }
+
+    /// Bytes that this rank read since then, at the least: the factor for each half of a solve, its last block for each product.
+    pub fn traffic(&self) -> u64 {
+        let of = |factored: &Factored| self.halves * factored.cholesky.bytes() + factored.condensed.traffic();
+        self.factored.as_ref().map_or(0, of)
+    }
+
     fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
         self.gathering.gather(&SimpleCommunicator::world(), &right_hand_side.owned()?, &mut self.whole);
         self.frames.turn(&mut self.whole, false);
+        self.halves += 1;
         factored(&mut self.factored)?.cholesky.forward(&self.whole)
     }
 
     fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
+        self.halves += 1;
         factored(&mut self.factored)?.cholesky.backward(&mut self.whole)?;
         self.frames.turn(&mut self.whole, true);
         let mut solution = solution.owned_mut()?;

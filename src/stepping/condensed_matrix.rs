@@ -51,6 +51,8 @@ pub(super) struct Room {
     blocks: Vec<f64>,
     block_gathering: Gathering,
     images: [Vec<f64>; DIMENSIONS],
+    /// Bytes read since traffic is counted.
+    traffic: u64,
 }
 
 impl Room {
@@ -68,6 +70,7 @@ impl Room {
             blocks: vec![0.0; block_gathering.total()],
             block_gathering,
             images: Default::default(),
+            traffic: 0,
         }))
     }
 }
@@ -92,17 +95,29 @@ impl Subspace {
 impl CondensedMatrix {
     /// Writes a vector of contact nodes that moves by `L x`.
     pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
-        let [product, _] = &mut self.room.borrow_mut().placed;
-        self.times_lower(x, product);
-        self.write(product, vector)
+        let room = &mut *self.room.borrow_mut();
+        room.traffic += self.bytes();
+        self.times_lower(x, &mut room.placed[0]);
+        self.write(&room.placed[0], vector)
     }
 
     /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
     pub fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
         let room = &mut *self.room.borrow_mut();
         self.read(vector, room)?;
+        room.traffic += self.bytes();
         self.times_upper(&room.placed[0], product);
         Ok(())
+    }
+
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&self) {
+        self.room.borrow_mut().traffic = 0;
+    }
+
+    /// Bytes of `L`, or of the factor on a subspace, that products and solves read since then.
+    pub fn traffic(&self) -> u64 {
+        self.room.borrow().traffic
     }
 
     /// Reads the amounts of all motions in a vector of contact nodes into the first place, in the order of the factor. Collective.
@@ -129,6 +144,11 @@ impl CondensedMatrix {
             value.zip(&motion.direction).for_each(|(value, direction)| *value += amount * direction);
         }
         Ok(())
+    }
+
+    /// Bytes of `L`; the factor on a subspace has as many.
+    fn bytes(&self) -> u64 {
+        size_of_val(&self.lower[..]) as u64
     }
 
     /// `L x`.
@@ -236,6 +256,7 @@ impl StepMatrix for CondensedMatrix {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let room = &mut *self.room.borrow_mut();
         self.read(x, room)?;
+        room.traffic += 2 * self.bytes();
         let [amounts, product] = &mut room.placed;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
@@ -245,6 +266,7 @@ impl StepMatrix for CondensedMatrix {
     fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         let room = &mut *self.room.borrow_mut();
         self.read(r, room)?;
+        room.traffic += 2 * self.bytes();
         let [amounts, ordered] = &mut room.placed;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {

@@ -7,17 +7,18 @@ use super::{
     linear_solver::{Preconditioner, SolverSettings},
     rungs::nearest,
     scheme::{Method, Scheme},
+    step_clock::{Stages, StepClock, StepTraffic},
     step_solver::{Known, Lengths, StepSolver},
 };
 use crate::{
-    body::Body,
+    body::{Body, PassBytes},
     effect::{Energy, Form, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Stage},
+    petsc::DistributedVector,
     session::Session,
     state::State,
 };
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Share of the root of the kinetic energy up to which that of the elastic energy does not matter.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -43,40 +44,6 @@ pub struct StepOutcome {
     pub energy: Energy,
 }
 
-/// Seconds spent by phase.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct StepClock {
-    /// Explicit stress, history and forces.
-    pub history: Duration,
-    /// Newton and linear solves.
-    pub solve: Duration,
-    /// Energy balance and certificates of the step.
-    pub balance: Duration,
-    /// Matrix assembly and preconditioner, whenever the step length changes.
-    pub assembly: Duration,
-    /// The part of `assembly` before the first step.
-    pub first_assembly: Duration,
-}
-
-/// Stages of PETSc's `-log_view`.
-struct Stages {
-    assembly: Stage,
-    history: Stage,
-    solve: Stage,
-    balance: Stage,
-}
-
-impl Stages {
-    fn register() -> Result<Self> {
-        Ok(Self {
-            assembly: Stage::register("assembly")?,
-            history: Stage::register("history")?,
-            solve: Stage::register("solve")?,
-            balance: Stage::register("balance")?,
-        })
-    }
-}
-
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
     scheme: Scheme,
@@ -97,6 +64,9 @@ pub struct Stepper {
     pub set_ups: u64,
     /// Seconds by phase.
     pub clock: StepClock,
+    /// Bytes by phase.
+    pub traffic: StepTraffic,
+    passes: PassBytes,
 }
 
 impl Stepper {
@@ -122,6 +92,8 @@ impl Stepper {
             guesses: 0,
             set_ups: 0,
             clock: StepClock::default(),
+            traffic: StepTraffic::default(),
+            passes: body.pass_bytes(),
         })
     }
 
@@ -217,6 +189,8 @@ impl Stepper {
         self.write_right_hand_side(session, body, state, step)?;
         self.start(session, body, state, step)?;
         drop(stage);
+        self.count_history(body, state, step);
+        self.solver.restart_traffic();
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
@@ -236,6 +210,7 @@ impl Stepper {
         let outcome = self.solve(session, body, state, step, others.as_deref());
         drop(stage);
         self.clock.solve += solving.elapsed();
+        self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         outcome
     }
 
@@ -279,6 +254,9 @@ impl Stepper {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
         self.method.finish(body, state, &self.trial, step)?;
+        if self.scheme.is_implicit() {
+            self.traffic.add_solve(Some(self.passes.finish));
+        }
         self.method.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
@@ -287,8 +265,10 @@ impl Stepper {
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
         outcome.energy = self.method.energy(session, body, state, step)?;
+        self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
             outcome.energy.work = step.length * load.dot(&state.velocity)?;
+            self.traffic.balance += 2 * vector_bytes(body);
         }
         self.clock.balance += balancing.elapsed();
         Ok(())
@@ -380,9 +360,21 @@ impl Stepper {
         self.method.prepare_contacts(body, state)
     }
 
+    /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.
+    fn count_history<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) {
+        let load = if self.load.is_some() { 3 } else { 0 };
+        let start = if extrapolates(state, step) { 8 } else { 2 };
+        self.traffic.history += self.passes.explicit + (1 + load + start) * vector_bytes(body);
+    }
+
     fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
         self.trial.copy_from(&state.velocity)?;
-        if step.previous_length > 0.0 && state.step > 1 {
+        if extrapolates(state, step) {
             let ratio = step.length / step.previous_length;
             self.trial.add_scaled(ratio, &state.velocity)?;
             self.trial.add_scaled(-ratio, &state.previous_velocity)?;
@@ -395,4 +387,14 @@ impl Stepper {
 fn write(room: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
     room.clear();
     room.extend(values);
+}
+
+/// Whether there are two velocities to start a step from.
+fn extrapolates(state: &State, step: Step) -> bool {
+    step.previous_length > 0.0 && state.step > 1
+}
+
+/// Bytes of the values that this rank owns of a vector.
+fn vector_bytes<const D: usize, const S: usize>(body: &Body<D, S>) -> u64 {
+    (body.mesh.owned * D * size_of::<f64>()) as u64
 }
