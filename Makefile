@@ -26,7 +26,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run test test64 check64 hard bench lint install clean
+.PHONY: help deps deps64 build run test test64 check64 hard bench bench-runs lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -38,6 +38,7 @@ help:
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make check64   only whether it compiles there'
 	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost'
+	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -86,6 +87,10 @@ bench: deps
 	cargo bench --locked --bench kernels
 	cargo bench --locked --bench output
 	cargo --config "target.'cfg(all())'.runner='mpirun -n 2'" bench --locked --bench output
+
+# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' holds them against another program.
+bench-runs: deps
+	cargo bench --locked --bench whole_runs -- $(ARGS)
 
 lint: deps
 	cargo fmt --all --check

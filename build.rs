@@ -29,6 +29,7 @@ const FUNCTIONS: &[&str] = &[
     "KSP(Create|Destroy|SetOperators|GetOperators|SetType|SetTolerances|SetNormType|GetPC|SetFromOptions|SetUp|Solve)",
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetReusePreconditioner|SetInitialGuessNonzero)",
     "KSP(SetOptionsPrefix|GetType|SetPC|ConvergedDefaultSetUIRNorm)",
+    "(PCMGGet(Levels|Smoother|Interpolation)|KSPGet(Operators|Tolerances)|MatGet(BlockSize|LocalSize))",
     "PCShell(SetApply|SetContext|GetContext)",
     "PC(Apply|SetUp|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix|FactorSetUpMatSolverType)",
     "SNES(Create|Destroy|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",

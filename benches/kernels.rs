@@ -4,6 +4,8 @@
 //! geometry, histories, nodal values. The last lines are ratios to the triad `a = b + s c`, whose traffic is counted
 //! without what the cache fetches before it writes.
 
+mod triad;
+
 use clarke::{
     body::Body,
     effect::{Form, Step},
@@ -17,32 +19,14 @@ use clarke::{
     space::Simplex,
 };
 use criterion::{Criterion, Throughput};
-use std::{
-    hint::black_box,
-    mem::size_of,
-    path::Path,
-    time::{Duration, Instant},
-};
-
-/// Numbers of a triad's array: three of them are far larger than any cache.
-const TRIAD: usize = 1 << 24;
-/// Repetitions of which the fastest counts.
-const REPETITIONS: usize = 9;
+use std::{hint::black_box, mem::size_of, path::Path, time::Duration};
+use triad::{BYTES, Triad, fastest};
 
 /// A kernel with the bytes that it has to move.
 struct Kernel<'a> {
     name: String,
     bytes: usize,
     run: Box<dyn FnMut() + 'a>,
-}
-
-fn fastest(run: &mut dyn FnMut()) -> f64 {
-    let seconds = |_| {
-        let start = Instant::now();
-        run();
-        start.elapsed().as_secs_f64()
-    };
-    (0..REPETITIONS).map(seconds).fold(f64::INFINITY, f64::min)
 }
 
 fn simulation<const D: usize, const S: usize>(
@@ -92,16 +76,8 @@ fn kernels<'a, const D: usize, const S: usize>(name: &str, run: &'a mut Simulati
 }
 
 fn triad() -> Kernel<'static> {
-    let (mut a, b, c) = (vec![0.0; TRIAD], vec![1.0; TRIAD], vec![2.0; TRIAD]);
-    Kernel {
-        name: "triad".into(),
-        bytes: 3 * TRIAD * size_of::<f64>(),
-        run: Box::new(move || {
-            let s = black_box(3.0);
-            a.iter_mut().zip(&b).zip(&c).for_each(|((a, b), c)| *a = b + s * c);
-            black_box(&a);
-        }),
-    }
+    let mut triad = Triad::new();
+    Kernel { name: "triad".into(), bytes: BYTES, run: Box::new(move || triad.run()) }
 }
 
 fn main() {

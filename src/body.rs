@@ -1,8 +1,10 @@
 //! A body on a mesh with all that acts on it: what a run advances in time.
 
 mod implicit;
+mod traffic;
 
 pub use implicit::Cells;
+pub use traffic::PassBytes;
 
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},

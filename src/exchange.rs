@@ -49,14 +49,41 @@ pub fn gather<T: Equivalence + Copy + Default>(
     communicator: &SimpleCommunicator,
     numbers: &[T],
 ) -> Result<Vec<T>> {
-    let mut counts = vec![0_u64; communicator.size() as usize];
-    communicator.all_gather_into(&(numbers.len() as u64), &mut counts[..]);
-    let counts: Vec<usize> = counts.into_iter().map(|count| count as usize).collect();
-    let (narrow, starts) = mpi_counts(&counts)?;
-    let mut all = vec![T::default(); counts.iter().sum()];
-    communicator
-        .all_gather_varcount_into(numbers, &mut PartitionMut::new(&mut all[..], &narrow[..], &starts[..]));
+    let gathering = Gathering::new(communicator, numbers.len())?;
+    let mut all = vec![T::default(); gathering.total()];
+    gathering.gather(communicator, numbers, &mut all);
     Ok(all)
+}
+
+/// Gathers lists whose lengths stay the same, again and again.
+#[derive(Debug)]
+pub struct Gathering {
+    counts: Vec<Count>,
+    starts: Vec<Count>,
+}
+
+impl Gathering {
+    /// For so many numbers from this rank. Collective, with the same outcome on all ranks.
+    pub fn new(communicator: &SimpleCommunicator, count: usize) -> Result<Self> {
+        let mut counts = vec![0_u64; communicator.size() as usize];
+        communicator.all_gather_into(&(count as u64), &mut counts[..]);
+        let counts: Vec<usize> = counts.into_iter().map(|count| count as usize).collect();
+        let (counts, starts) = mpi_counts(&counts)?;
+        Ok(Self { counts, starts })
+    }
+
+    /// How many numbers all ranks have.
+    pub fn total(&self) -> usize {
+        self.counts.iter().map(|&count| count as usize).sum()
+    }
+
+    /// Writes the numbers of all ranks to `all`, in the order of the ranks. Collective.
+    pub fn gather<T: Equivalence>(&self, communicator: &SimpleCommunicator, numbers: &[T], all: &mut [T]) {
+        communicator.all_gather_varcount_into(
+            numbers,
+            &mut PartitionMut::new(all, &self.counts[..], &self.starts[..]),
+        );
+    }
 }
 
 /// Where each of the counted parts starts.

@@ -75,7 +75,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
     }
 
     /// Adds the forces of what flow takes from the stress at this displacement to `forces` (both with ghosts); writes trial
-    /// histories and, where they are wanted, the derivatives.
+    /// histories and, where they are wanted, the derivatives in place of those before.
     pub fn add_flow(
         &mut self,
         displacement: &[f64],
@@ -90,6 +90,9 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         };
         let needs = Needs { strain: true, ..Needs::default() };
         let (mesh, effects) = (self.mesh, &mut self.effects);
+        if let Some(tangents) = &mut tangents {
+            tangents.restart::<S>(mesh.cell_count());
+        }
         Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             let mut any = false;
             for effect in effects.iter_mut().filter(|e| e.flows()) {

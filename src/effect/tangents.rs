@@ -8,10 +8,12 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// Forgets all cells.
-    pub fn clear(&mut self) {
+    /// Forgets all cells; there is room for as many, which takes no memory before it is written.
+    pub fn restart<const S: usize>(&mut self, cells: usize) {
         self.cells.clear();
+        self.cells.reserve(cells);
         self.values.clear();
+        self.values.reserve(cells * S * S);
     }
 
     /// Adds a cell by its local number.

@@ -1,7 +1,7 @@
 use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory};
 use crate::{
     material::{ByMaterial, Returned, Tangent, Viscoplasticity},
-    space::{Batch, CellRun, Needs},
+    space::{Batch, CellRun, Needs, OfCells},
     tensor::{Mandel, add_scaled, dot},
 };
 
@@ -131,7 +131,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         if self.laws.get(batch.material).is_none() {
             return;
         }
-        let converged: Vec<Mandel<S>> = self.stress.converged(batch.number).to_vec();
+        let converged: OfCells<Mandel<S>> = self.stress.converged(batch.number).iter().copied().collect();
         let blend = self.blend;
         self.advance(batch, None, |batch, at, law, trial, found| {
             let elasticity = law.elasticity();

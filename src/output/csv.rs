@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::{
+    fmt::{self, Display, Formatter},
     fs::{File, OpenOptions},
     io::{BufRead, BufReader, BufWriter, Write},
     path::{Path, PathBuf},
@@ -53,7 +54,7 @@ impl CsvFile {
     }
 
     /// Appends a row, its columns joined by commas.
-    pub fn row(&mut self, row: std::fmt::Arguments<'_>) -> Result<()> {
+    pub fn row(&mut self, row: fmt::Arguments<'_>) -> Result<()> {
         writeln!(self.writer, "{row}").map_err(|e| Error::unwritable(&self.path, e))?;
         if self.flushed.elapsed() > FLUSH_EVERY { self.flush() } else { Ok(()) }
     }
@@ -65,22 +66,31 @@ impl CsvFile {
     }
 }
 
-/// Numbers joined by commas, each the shortest text that reads back as the same number.
-pub fn numbers(values: &[f64]) -> String {
-    let mut out = String::new();
-    for (at, value) in values.iter().enumerate() {
-        if at > 0 {
-            out.push(',');
+/// Numbers joined by commas, as [`Number`] writes them.
+pub struct Numbers<'a>(pub &'a [f64]);
+
+impl Display for Numbers<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        for (at, value) in self.0.iter().enumerate() {
+            let comma = if at > 0 { "," } else { "" };
+            write!(f, "{comma}{}", Number(*value))?;
         }
-        out.push_str(&number(*value));
+        Ok(())
     }
-    out
 }
 
 /// The shortest text that reads back as the same number, with an exponent where that is shorter to read.
-pub fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 || (1e-4..1e16).contains(&size) { format!("{value}") } else { format!("{value:e}") }
+pub struct Number(pub f64);
+
+impl Display for Number {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (value, size) = (self.0, self.0.abs());
+        if size == 0.0 || (1e-4..1e16).contains(&size) {
+            write!(f, "{value}")
+        } else {
+            write!(f, "{value:e}")
+        }
+    }
 }
 
 #[cfg(test)]
@@ -110,8 +120,8 @@ mod tests {
     #[test]
     fn numbers_read_back_exactly() {
         for value in [0.0, 0.1, -1.0 / 3.0, 1e-300, 6.02e23, 5e-324, 123456.789] {
-            assert_eq!(number(value).parse::<f64>().unwrap(), value);
+            assert_eq!(Number(value).to_string().parse::<f64>().unwrap(), value);
         }
-        assert_eq!(numbers(&[0.5, 1e-9]), "0.5,1e-9");
+        assert_eq!(Numbers(&[0.5, 1e-9]).to_string(), "0.5,1e-9");
     }
 }

@@ -1,6 +1,6 @@
 //! `history.csv`: a row a step.
 
-use super::csv::{CsvFile, number, numbers};
+use super::csv::{CsvFile, Number, Numbers};
 use crate::{
     effect::Energy,
     error::Result,
@@ -167,13 +167,13 @@ impl History {
     ) -> Result<()> {
         self.0.row(format_args!(
             "{step},{},{},{},{},{},{},{}",
-            number(time),
-            number(length),
+            Number(time),
+            Number(length),
             outcome.newton_iterations,
             outcome.linear_iterations,
             outcome.active_changes,
-            number(outcome.inclusion_residual),
-            numbers(&[
+            Number(outcome.inclusion_residual),
+            Numbers(&[
                 totals.kinetic_energy,
                 totals.elastic_energy,
                 totals.viscous_dissipation,

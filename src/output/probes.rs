@@ -1,6 +1,6 @@
 //! `probes.csv`: displacement and velocity at points of the body, a row a step and probe.
 
-use super::csv::{CsvFile, number, numbers};
+use super::csv::{CsvFile, Number, Numbers};
 use crate::{
     error::{Error, Result},
     mesh::Mesh,
@@ -22,6 +22,8 @@ pub struct Probes<const D: usize> {
     /// Local cell and barycentric coordinates, on the rank that evaluates.
     places: Vec<Option<(usize, [f64; 4])>>,
     file: Option<CsvFile>,
+    /// Values of this rank and of all ranks.
+    room: [Vec<f64>; 2],
 }
 
 impl<const D: usize> Probes<D> {
@@ -39,7 +41,12 @@ impl<const D: usize> Probes<D> {
             }
             places.push(here.filter(|_| owner == mine));
         }
-        Ok(Self { names: points.iter().map(|p| p.0.clone()).collect(), places, file: None })
+        Ok(Self {
+            names: points.iter().map(|p| p.0.clone()).collect(),
+            places,
+            file: None,
+            room: Default::default(),
+        })
     }
 
     /// Whether there is none.
@@ -60,10 +67,13 @@ impl<const D: usize> Probes<D> {
         Ok(())
     }
 
-    /// Values at all probes on all ranks: displacement, then velocity. Collective.
-    pub fn values(&self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<Vec<f64>> {
+    /// Finds the values at all probes on all ranks: displacement, then velocity. Collective.
+    fn values(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
-        let mut mine = vec![0.0; self.names.len() * 2 * D];
+        let [mine, all] = &mut self.room;
+        mine.clear();
+        mine.resize(self.names.len() * 2 * D, 0.0);
+        all.clone_from(mine);
         for (place, values) in self.places.iter().zip(mine.chunks_exact_mut(2 * D)) {
             let Some((cell, shares)) = place else { continue };
             for (&node, share) in mesh.cell(*cell).iter().zip(shares) {
@@ -73,9 +83,8 @@ impl<const D: usize> Probes<D> {
                 }
             }
         }
-        let mut all = vec![0.0; mine.len()];
         session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
-        Ok(all)
+        Ok(())
     }
 
     /// Writes the rows of a step. Collective.
@@ -83,10 +92,10 @@ impl<const D: usize> Probes<D> {
         if self.is_empty() {
             return Ok(());
         }
-        let values = self.values(session, mesh, state)?;
+        self.values(session, mesh, state)?;
         let Some(file) = &mut self.file else { return Ok(()) };
-        for (name, values) in self.names.iter().zip(values.chunks_exact(2 * D)) {
-            file.row(format_args!("{},{},{name},{}", state.step, number(state.time), numbers(values)))?;
+        for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {
+            file.row(format_args!("{},{},{name},{}", state.step, Number(state.time), Numbers(values)))?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! `profiles.csv`: values along boundaries, a row a facet node, output time and profile.
 
-use super::csv::{CsvFile, number, numbers};
+use super::csv::{CsvFile, Number, Numbers};
 use crate::{
     body::Body,
     contact::NodeContext,
@@ -90,7 +90,7 @@ impl<const D: usize> Profiles<D> {
             let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
             rows.sort_by(|a, b| compare(a, b));
             for row in rows {
-                file.row(format_args!("{},{},{}", number(state.time), profile.name, numbers(row)))?;
+                file.row(format_args!("{},{},{}", Number(state.time), profile.name, Numbers(row)))?;
             }
         }
         Ok(())

@@ -43,4 +43,8 @@ impl Action for BlockProduct {
         self.own.multiply(&x.owned()?, &mut y.owned_mut()?);
         self.others.as_ref().map_or(Ok(()), |others| others.end_adding(x, y))
     }
+
+    fn bytes(&self) -> u64 {
+        self.own.bytes()
+    }
 }

@@ -45,4 +45,8 @@ impl Action for BlockTransfer {
         self.own.multiply_transposed(&x.owned()?, &mut y.owned_mut()?);
         self.others.as_ref().map_or(Ok(()), |others| others.add_transposed(x, y))
     }
+
+    fn bytes(&self) -> u64 {
+        self.own.bytes()
+    }
 }

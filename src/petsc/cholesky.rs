@@ -184,6 +184,23 @@ impl Cholesky {
         Ok(())
     }
 
+    /// Bytes that half a solve reads at the least: the entries of the factor, and the rows of each of its supernodes once.
+    pub fn bytes(&self) -> u64 {
+        // SAFETY: as in `last_factor`.
+        let (starts, rows) = unsafe {
+            let factor = &*self.factor;
+            let list =
+                |pointer: *mut c_void| std::slice::from_raw_parts(pointer.cast::<c_int>(), factor.nsuper + 1);
+            (list(factor.super_), list(factor.pi))
+        };
+        let lengths = |starts: &[c_int]| u64::try_from(starts[1] - starts[0]).unwrap_or(0);
+        let nodes = starts.windows(2).map(lengths).zip(rows.windows(2).map(lengths));
+        let (number, index) = (size_of::<f64>() as u64, size_of::<c_int>() as u64);
+        nodes
+            .map(|(columns, rows)| number * (columns * rows - columns * (columns - 1) / 2) + index * rows)
+            .sum()
+    }
+
     fn half(&mut self, system: c_int, forward: bool) -> Result<()> {
         let [work, more] = &mut self.work;
         let (from, to) =
@@ -305,6 +322,15 @@ mod tests {
         for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
             assert!((found - known).abs() < 1e-13, "{x:?}");
         }
+    }
+
+    #[test]
+    fn a_full_matrix_has_the_bytes_of_a_triangle() {
+        let mut rows = chain(3);
+        (rows.offsets, rows.columns) = (vec![0, 3, 6, 9], vec![0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        rows.values = vec![4.0, 1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 4.0];
+        let cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
+        assert_eq!(cholesky.bytes(), 6 * 8 + 3 * 4);
     }
 
     #[test]

@@ -14,7 +14,8 @@ use std::{marker::PhantomData, ptr};
 pub struct Ksp {
     pub(super) raw: sys::KSP,
     /// What the smoothers of multigrid multiply with.
-    levels: Vec<Level>,
+    pub(super) levels: Vec<Level>,
+    applications: u64,
     not_send: PhantomData<*mut ()>,
 }
 
@@ -70,7 +71,7 @@ impl Ksp {
         // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
         unsafe {
             check(sys::KSPCreate(communicator(), &mut raw))?;
-            let ksp = Self { raw, levels: Vec::new(), not_send: PhantomData };
+            let ksp = Self { raw, levels: Vec::new(), applications: 0, not_send: PhantomData };
             check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
             Ok(ksp)
         }
@@ -175,7 +176,19 @@ impl Ksp {
     ) -> Result<LinearOutcome> {
         // SAFETY: live objects of matching layout; the two vectors differ.
         check(unsafe { sys::KSPSolve(self.raw, right_hand_side.raw, solution.raw) })?;
-        self.outcome()
+        let outcome = self.outcome()?;
+        self.applications += outcome.iterations as u64 + 1;
+        Ok(outcome)
+    }
+
+    /// Counts applications of the preconditioner from here on.
+    pub fn restart_applications(&mut self) {
+        self.applications = 0;
+    }
+
+    /// Applications of the preconditioner in all solves since then, as CG and GMRES make them: one in each iteration and one at first.
+    pub fn applications(&self) -> u64 {
+        self.applications
     }
 
     /// `z = P^-1 r` with the preconditioner, which must be set up. Collective.

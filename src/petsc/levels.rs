@@ -12,6 +12,13 @@ pub(super) struct Level {
     transfer: Option<(Shell, Reference)>,
 }
 
+impl Level {
+    /// Bytes of this rank that a product of the smoother and one way between levels move, as far as they are not PETSc's own.
+    pub fn bytes(&self) -> [Option<u64>; 2] {
+        [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
+    }
+}
+
 /// One reference to a matrix of PETSc's.
 #[derive(Debug)]
 struct Reference(sys::Mat);

@@ -2,7 +2,7 @@ use super::{c_string, check, keep_fault, sys, threads};
 use crate::error::Result;
 use mpi::{environment::Universe, topology::Communicator, traits::AsRaw};
 use std::{
-    ffi::{CString, c_char},
+    ffi::{CStr, c_char},
     marker::PhantomData,
     ptr,
 };
@@ -80,7 +80,11 @@ pub fn clear_option(name: &str) -> Result<()> {
 
 /// Whether a PETSc option is set; the name is without the leading dash.
 pub fn has_option(name: &str) -> Result<bool> {
-    let key: CString = c_string(&format!("-{name}"))?;
+    is_set(&c_string(&format!("-{name}"))?)
+}
+
+/// Whether a PETSc option is set; the key is with the leading dash.
+pub(super) fn is_set(key: &CStr) -> Result<bool> {
     let mut set = 0;
     // SAFETY: as above; `set` is a live PetscBool.
     check(unsafe { sys::PetscOptionsHasName(ptr::null_mut(), ptr::null(), key.as_ptr(), &mut set) })?;

@@ -2,7 +2,7 @@ use super::{
     DistributedVector, block_product::BlockProduct, check, index, library::communicator, shell::Shell, sys,
 };
 use crate::error::Result;
-use std::{marker::PhantomData, mem::MaybeUninit, ptr, rc::Rc};
+use std::{cell::Cell, marker::PhantomData, mem::MaybeUninit, ptr, rc::Rc};
 
 /// The rows this rank owns of a sparse matrix of dense blocks.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +20,10 @@ pub struct BlockRows {
 pub struct Matrix {
     pub(super) raw: sys::Mat,
     /// What multiplies faster.
-    products: Option<Rc<Shell>>,
+    blocks: Option<Rc<Shell>>,
+    /// Bytes of this rank that a product moves at the least.
+    bytes: u64,
+    products: Cell<u64>,
     not_send: PhantomData<*mut ()>,
 }
 
@@ -29,13 +32,14 @@ impl Matrix {
     pub fn symmetric(block: usize, rows: &BlockRows) -> Result<Self> {
         let owned = rows.offsets.len() - 1;
         let (starts, columns, values) = scalar_rows(block, rows)?;
+        let bytes = bytes_of_a_product(values.len(), block, [owned * block; 2]);
         let local = index(owned * block, "unknowns of a rank")?;
         let mut raw = ptr::null_mut();
         // SAFETY: `raw` receives one reference that the handle owns from here on; PETSc copies the row arrays, which
         // describe `local` rows with ascending global columns.
         unsafe {
             check(sys::MatCreate(communicator(), &mut raw))?;
-            let matrix = Self { raw, products: None, not_send: PhantomData };
+            let matrix = Self { raw, blocks: None, bytes, products: Cell::new(0), not_send: PhantomData };
             check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
             check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
             check(sys::MatSetType(raw, c"aij".as_ptr()))?;
@@ -61,7 +65,8 @@ impl Matrix {
     pub(super) fn share(&self) -> Result<Self> {
         // SAFETY: live object; the new handle owns the reference that is added.
         check(unsafe { sys::PetscObjectReference(self.raw.cast()) })?;
-        Ok(Self { raw: self.raw, products: self.products.clone(), not_send: PhantomData })
+        let (bytes, blocks) = (self.bytes, self.blocks.clone());
+        Ok(Self { raw: self.raw, blocks, bytes, products: Cell::new(0), not_send: PhantomData })
     }
 
     /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
@@ -88,19 +93,36 @@ impl Matrix {
 
     /// Makes products faster from now on, for as much memory again as half the matrix takes. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
-        self.products = BlockProduct::shell::<f64>(self.raw)?.map(Rc::new);
+        self.blocks = BlockProduct::shell::<f64>(self.raw)?.map(Rc::new);
+        self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
         Ok(())
     }
 
     /// What multiplies with this matrix.
     pub(super) fn operator(&self) -> sys::Mat {
-        self.products.as_ref().map_or(self.raw, |shell| shell.raw)
+        self.blocks.as_ref().map_or(self.raw, |shell| shell.raw)
     }
 
     /// `result = self * x`. Collective.
     pub fn multiply(&self, x: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
+        self.products.set(self.products.get() + 1);
         // SAFETY: live objects of matching layout; `x` and `result` differ.
         check(unsafe { sys::MatMult(self.operator(), x.raw, result.raw) })
+    }
+
+    /// Counts products from here on.
+    pub fn restart_products(&self) {
+        self.products.set(0);
+    }
+
+    /// Bytes that [`Matrix::multiply`] moved on this rank since then, at the least.
+    pub fn product_bytes(&self) -> u64 {
+        self.products.get() * self.bytes
+    }
+
+    /// The same for one product.
+    pub fn bytes_of_a_product(&self) -> u64 {
+        self.bytes
     }
 
     /// The largest sum of a row's entries without signs, over all ranks. Collective.
@@ -127,6 +149,13 @@ impl Drop for Matrix {
         // SAFETY: this handle owns one reference.
         unsafe { sys::MatDestroy(&mut self.raw) };
     }
+}
+
+/// Bytes that a product with a matrix moves at the least: entries, a column index for those of each column of a block (PETSc reads
+/// rows of one pattern together), and the two vectors once.
+pub(super) fn bytes_of_a_product(entries: usize, block: usize, sizes: [usize; 2]) -> u64 {
+    let indices = entries / block.max(1) * size_of::<sys::PetscInt>();
+    (entries * size_of::<f64>() + indices + (sizes[0] + sizes[1]) * size_of::<f64>()) as u64
 }
 
 type ScalarRows = (Vec<sys::PetscInt>, Vec<sys::PetscInt>, Vec<f64>);
@@ -169,6 +198,13 @@ mod tests {
         assert_eq!(starts, [0, 4, 8]);
         assert_eq!(columns, [0, 1, 6, 7, 0, 1, 6, 7]);
         assert_eq!(values, [1.0, 2.0, 5.0, 6.0, 3.0, 4.0, 7.0, 8.0]);
+    }
+
+    #[test]
+    fn a_product_reads_entries_indices_and_vectors() {
+        // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
+        let index = size_of::<sys::PetscInt>() as u64;
+        assert_eq!(bytes_of_a_product(8, 2, [2, 2]), 8 * 8 + 4 * index + 4 * 8);
     }
 
     #[test]

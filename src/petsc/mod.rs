@@ -5,6 +5,7 @@
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
+mod applied;
 mod block_product;
 mod block_transfer;
 mod callback;

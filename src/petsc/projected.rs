@@ -99,6 +99,17 @@ impl ProjectedKsp {
         &mut self.ksp
     }
 
+    /// Counts applications of the preconditioner from here on.
+    pub fn restart_applications(&mut self) {
+        self.ksp.restart_applications();
+        self.fallback.iter_mut().for_each(Ksp::restart_applications);
+    }
+
+    /// Those of all solves since then, by both methods.
+    pub fn applications(&self) -> u64 {
+        self.ksp.applications() + self.fallback.as_ref().map_or(0, Ksp::applications)
+    }
+
     /// Stops at `relative * |r|` or at `absolute`, whichever is larger, or after this many iterations. `r` is the
     /// smallest right-hand side of all solves from here on: what Newton's method gained is not put at risk when the
     /// residual grows for a while.

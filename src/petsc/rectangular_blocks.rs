@@ -1,6 +1,6 @@
 //! Matrices of small dense blocks that need not be square, in single precision: interpolations between levels.
 
-use super::symmetric_blocks::{ScalarRows, unit_of};
+use super::symmetric_blocks::{ScalarRows, bytes_of, unit_of};
 use std::array;
 
 /// Products with a matrix and with its transpose.
@@ -10,6 +10,9 @@ pub(super) trait Transfer {
 
     /// `y = A^T x`.
     fn multiply_transposed(&self, x: &[f64], y: &mut [f64]);
+
+    /// Bytes of the matrix.
+    fn bytes(&self) -> u64;
 }
 
 /// The matrix of these rows in blocks of so many rows and columns; `None` for sizes that have no code.
@@ -99,6 +102,10 @@ impl<const R: usize, const C: usize> Transfer for RectangularBlocks<R, C> {
                 }
             }
         }
+    }
+
+    fn bytes(&self) -> u64 {
+        bytes_of(&self.starts, &self.columns, &self.blocks)
     }
 }
 

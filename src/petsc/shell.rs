@@ -11,6 +11,9 @@ pub(super) trait Action {
     fn multiply_transposed(&self, _x: &DistributedVector, _y: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("a product with a transpose that nothing was made for".into()))
     }
+
+    /// Bytes of this rank that a product moves at the least.
+    fn bytes(&self) -> u64;
 }
 
 /// A matrix of PETSc's that is known by its products.
@@ -50,6 +53,11 @@ impl Shell {
             }
         }
         Ok(shell)
+    }
+
+    /// Bytes of this rank that a product moves at the least.
+    pub fn bytes(&self) -> u64 {
+        self.action.bytes()
     }
 }
 

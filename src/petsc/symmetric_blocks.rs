@@ -40,6 +40,9 @@ impl<'a> ScalarRows<'a> {
 pub(super) trait Product {
     /// `y = A x`.
     fn multiply(&self, x: &[f64], y: &mut [f64]);
+
+    /// Bytes that a product moves at the least: the matrix and both vectors.
+    fn bytes(&self) -> u64;
 }
 
 /// The matrix whose lower half these rows have, in blocks of this size, numbers stored as `T`. `None` for blocks of a size that
@@ -143,6 +146,16 @@ impl<const B: usize, T: Stored> Product for SymmetricBlocks<B, T> {
             y.as_flattened_mut().iter_mut().for_each(|value| *value *= self.unit);
         }
     }
+
+    fn bytes(&self) -> u64 {
+        let vectors = 2 * (self.starts.len() - 1) * B * size_of::<f64>();
+        bytes_of(&self.starts, &self.columns, &self.blocks) + vectors as u64
+    }
+}
+
+/// Bytes of a matrix's arrays.
+pub(super) fn bytes_of<T>(starts: &[usize], columns: &[u32], blocks: &[T]) -> u64 {
+    (size_of_val(starts) + size_of_val(columns) + size_of_val(blocks)) as u64
 }
 
 #[cfg(test)]
@@ -197,6 +210,14 @@ mod tests {
         {
             assert!(found > 1e-12 && found < 1e-6, "{found}");
         }
+    }
+
+    #[test]
+    fn a_product_moves_half_the_matrix_and_two_vectors() {
+        let rows = ScalarRows { starts: &[0, 4, 8, 12, 16], columns: &[0, 1, 2, 3].repeat(4), values: &[1.0; 16] };
+        let bytes = product::<f32>(2, rows).unwrap().bytes();
+        // Three starts, three column numbers, three blocks of four numbers; twice four numbers.
+        assert_eq!(bytes, 3 * 8 + 3 * 4 + 3 * 4 * 4 + 2 * 4 * 8);
     }
 
     #[test]

@@ -151,7 +151,7 @@ pub fn phases(summary: &Value) -> Option<Picture> {
     }
     let row = 1.9 * LETTERS;
     let left = 16.0 + bars.iter().map(|bar| text_width(bar.0)).fold(0.0, f64::max);
-    let room = WIDTH - left - 110.0;
+    let room = WIDTH - left - 190.0;
     let mut svg = open_svg(12.0 + row * bars.len() as f64);
     for (at, (name, value)) in bars.iter().enumerate() {
         let (y, length) = (8.0 + row * at as f64, (room * value / longest).max(1.0));
@@ -162,18 +162,32 @@ pub fn phases(summary: &Value) -> Option<Picture> {
             row - 6.0,
             hex(LINES[0])
         );
-        svg += &text(left + length + 8.0, y + 1.2 * LETTERS, "start", &format!("{} s", size(*value)));
+        let words = format!("{} s{}", size(*value), rate(summary, name, *value));
+        svg += &text(left + length + 8.0, y + 1.2 * LETTERS, "start", &words);
     }
     svg += "</svg>";
     let words: Vec<String> = bars.iter().map(|(name, value)| format!("{name} {} s", size(*value))).collect();
     let total = total.map(|total| format!(" Together {} s.", size(total))).unwrap_or_default();
-    let caption = format!("Wall time of each phase, of the slowest rank.{total}");
+    let caption = format!(
+        "Wall time of each phase, of the slowest rank, with the memory traffic that it needs at the least, where that is counted.{total}"
+    );
     Some(Picture::new(
         "wall_seconds",
         format!("Bars of wall time by phase: {}", words.join(", ")),
         caption,
         svg,
     ))
+}
+
+/// The traffic of a phase over its seconds, if it is known.
+fn rate(summary: &Value, phase: &str, seconds: f64) -> String {
+    let bytes = summary.get("traffic_bytes").and_then(|all| all.get(phase)).and_then(Value::as_f64);
+    match bytes {
+        Some(bytes) if bytes > 0.0 && seconds > 0.0 && phase != "output" => {
+            format!(", {} GB/s", size(bytes / seconds / 1e9))
+        }
+        _ => String::new(),
+    }
 }
 
 fn with_unit(value: &Value, unit: &str) -> String {

@@ -92,13 +92,3 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     ));
     log.line(format!("files      {}", folder.display()));
 }
-
-/// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.
-pub(super) fn clock_time(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
-    }
-}

@@ -8,10 +8,12 @@ mod folder;
 mod header;
 mod inventory;
 mod outputs;
+mod phases;
 mod restored;
 mod scene;
 mod setup;
 mod simulation;
+mod step_line;
 mod summary;
 mod time_loop;
 

@@ -36,6 +36,9 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     indicator: Option<ErrorIndicator<S>>,
     every: Option<Every>,
     keep: usize,
+    /// Bytes of the files that grow when the run began to write, and of checkpoints so far; on rank 0.
+    before: u64,
+    checkpoints: u64,
     /// Time spent writing.
     pub spent: Duration,
 }
@@ -63,6 +66,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let start = Instant::now();
         let Wanted { identity, mut probes, goes_on } = wanted;
         let folder = job.output_folder().to_owned();
+        let before = if goes_on && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
         let fields = FieldOutput::open(session, &folder, body, time, &job.output, log)?;
@@ -82,7 +86,21 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         session.agree(opened)?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let spent = start.elapsed();
-        Ok(Self { folder, identity, history, probes, profiles, fields, indicator, every, keep, spent })
+        let checkpoints = 0;
+        Ok(Self {
+            folder,
+            identity,
+            history,
+            probes,
+            profiles,
+            fields,
+            indicator,
+            every,
+            keep,
+            before,
+            checkpoints,
+            spent,
+        })
     }
 
     /// Writes what is due after a step. Collective.
@@ -166,16 +184,37 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
         checkpoint::save(session, &path, &self.identity, body, state, totals)?;
+        if session.is_first() {
+            self.checkpoints += length(&path);
+        }
         let pruned = if session.is_first() { prune(&self.folder, self.keep) } else { Ok(()) };
         session.agree(pruned)?;
         self.spent += start.elapsed();
         Ok(path)
     }
 
+    /// Bytes that this run brought to files: what tables and fields grew by, and all checkpoints. On rank 0, elsewhere 0.
+    pub fn written(&self) -> u64 {
+        let tables = if self.history.is_some() { length_of_all(&self.folder) } else { 0 };
+        tables.saturating_sub(self.before) + self.checkpoints
+    }
+
     /// Closes the field files. Collective.
     pub fn close(self) -> Result<()> {
         self.fields.close()
     }
+}
+
+/// Files that grow while a run goes on.
+const GROWING: [&str; 5] = ["history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf"];
+
+fn length_of_all(folder: &Path) -> u64 {
+    GROWING.iter().map(|name| length(&folder.join(name))).sum()
+}
+
+/// Bytes of a file; none where there is no such file.
+fn length(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |file| file.len())
 }
 
 /// Whether the fields of this state are to be written: of the initial one always, where fields are wanted along the way.

@@ -72,6 +72,8 @@ pub struct Summary {
     pub certificates: Certificates,
     /// Seconds by phase, of the slowest rank.
     pub wall_seconds: serde_json::Map<String, serde_json::Value>,
+    /// Bytes of memory traffic by phase, at the least, over all ranks; `null` where it is not counted.
+    pub traffic_bytes: serde_json::Map<String, serde_json::Value>,
     /// Largest memory of all ranks together, in bytes.
     pub peak_memory_bytes: u64,
     /// How the mesh was split.

@@ -5,9 +5,11 @@ use super::{
     deadline::Deadline,
     folder::{claim_folder, prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
+    phases,
     restored::restore,
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
+    step_line::StepLine,
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -20,10 +22,16 @@ use crate::{
     state::State,
     stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
 };
-use std::time::{Duration, Instant};
+use std::{
+    fmt::Write,
+    time::{Duration, Instant},
+};
 
 /// Runs of more steps than this log only every so many, to keep logs readable.
 const LOGGED_STEPS: u64 = 1000;
+
+/// Room for the line of a step in the log.
+const LINE: usize = 512;
 
 /// How many times the energy that was put in an explicit scheme may make by itself. In stable steps that dissipate, it makes
 /// `q / (1 - q)` times as much at most, at the share `q` of the bound.
@@ -79,6 +87,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         totals,
         outputs,
         log,
+        words: String::with_capacity(LINE),
         clock,
         deadline,
         setup,
@@ -110,6 +119,8 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     totals: Totals,
     outputs: Outputs<D, S>,
     log: Log,
+    /// The line that the log is given after a step.
+    words: String,
     clock: Clock,
     deadline: Deadline,
     setup: Duration,
@@ -193,22 +204,25 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
         let step = self.state.step;
-        let words = format!(
-            "step {step:>6}/{last}  t = {:.6} s  newton {:>2}  linear {:>4}  branch changes {:>4}  inclusion {:.1e}  \
-             {}energy {:.1e}  {} left",
-            self.state.time,
-            outcome.newton_iterations,
-            outcome.linear_iterations,
-            outcome.active_changes,
-            outcome.inclusion_residual,
-            kinds(outcome),
-            self.totals.energy_imbalance,
-            super::header::clock_time(self.pace() * (last - step) as f64)
-        );
-        self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
-        if step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last {
-            self.log.quiet_line(words);
+        if self.log.has_bar() {
+            self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
         }
+        if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
+            return;
+        }
+        let left = self.pace() * (last - step) as f64;
+        let line = StepLine {
+            step,
+            last,
+            time: self.state.time,
+            outcome,
+            imbalance: self.totals.energy_imbalance,
+            left,
+        };
+        self.words.clear();
+        let written = write!(self.words, "{line}");
+        debug_assert!(written.is_ok(), "text can be written");
+        self.log.quiet_line(&self.words);
     }
 
     /// Seconds a step took so far.
@@ -327,51 +341,18 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
                 most_solutions: self.totals.most_solutions,
             }),
             certificates: self.certificates.clone(),
-            wall_seconds: self.seconds(),
+            wall_seconds: phases::seconds(
+                self.session,
+                self.clock,
+                self.setup,
+                (&self.scheme.clock, self.outputs.spent),
+            ),
+            traffic_bytes: phases::traffic(self.session, &self.scheme.traffic, self.outputs.written()),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
             inventory: Inventory::of(self.session, &self.body, &self.scheme),
         })
     }
-
-    /// Seconds by phase of the slowest rank; a phase without an effect in it is absent. Collective.
-    fn seconds(&self) -> serde_json::Map<String, serde_json::Value> {
-        let clock = &self.scheme.clock;
-        let total = self.clock.began.elapsed();
-        let phases = [
-            ("total", total),
-            ("launch", self.clock.launched),
-            ("setup", self.setup.saturating_sub(clock.first_assembly)),
-            ("assembly", clock.assembly),
-            ("history", clock.history),
-            ("solve", clock.solve),
-            ("balance", clock.balance),
-            ("output", self.outputs.spent),
-        ];
-        let seconds = self.session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
-        phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
-    }
-}
-
-/// What happens at the contact points, where there is any to tell: `branches` counts them by branch of the normal law.
-fn kinds(outcome: &StepOutcome) -> String {
-    let points = &outcome.points;
-    let told = [
-        ("open", points.open),
-        ("held", points.held),
-        ("sticking", points.sticking),
-        ("slipping", points.slipping),
-        ("separated", points.separated),
-        ("indefinite", outcome.indefinite_solves),
-        ("solutions", outcome.solutions),
-    ];
-    let counts = told.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}  "));
-    let last = points.branches.iter().rposition(|count| *count > 0);
-    let branches: Vec<String> =
-        points.branches[..last.map_or(0, |last| last + 1)].iter().map(usize::to_string).collect();
-    let branches =
-        if branches.is_empty() { String::new() } else { format!("branches {}  ", branches.join("/")) };
-    branches + &counts.collect::<String>()
 }
 
 /// What is asked for after a step.

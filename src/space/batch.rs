@@ -7,9 +7,15 @@ use crate::{
     mesh::Mesh,
     tensor::{Mandel, Vector, component, symmetric_part},
 };
+use arrayvec::ArrayVec;
 
 /// Most cells of a batch.
 pub const BATCH: usize = 128;
+
+/// A value for each cell of a batch; nothing where it is not needed.
+pub type OfCells<T> = ArrayVec<T, BATCH>;
+/// A value for each node of each cell of a batch; nothing where it is not needed.
+pub type OfNodes<T> = ArrayVec<T, { 4 * BATCH }>;
 
 /// What a pass gathers for its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,7 +63,7 @@ pub struct Nodal<'a> {
 
 /// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Integrity(Vec<f64>);
+pub struct Integrity(OfCells<f64>);
 
 impl Integrity {
     /// The share of a cell, by its position in the batch.
@@ -76,7 +82,7 @@ impl Integrity {
     }
 }
 
-/// A run of cells with their gathered inputs and the outputs that effects add to.
+/// A run of cells with their gathered inputs and the outputs that effects add to; all on the stack of the pass.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
     /// Position among the runs of the geometry.
@@ -88,23 +94,23 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     /// Geometry of the cells of the batch.
     pub cells: &'g [Simplex<D>],
     /// Strain of the displacement, one a cell, if needed.
-    pub strain: Vec<Mandel<S>>,
+    pub strain: OfCells<Mandel<S>>,
     /// Strain of the displacement before the step, one a cell, if needed.
-    pub strain_before: Vec<Mandel<S>>,
+    pub strain_before: OfCells<Mandel<S>>,
     /// Strain of the velocity in 1/s, one a cell, if needed.
-    pub strain_rate: Vec<Mandel<S>>,
+    pub strain_rate: OfCells<Mandel<S>>,
     /// Velocity, `D + 1` nodes a cell, if needed.
-    pub velocity: Vec<Vector<D>>,
+    pub velocity: OfNodes<Vector<D>>,
     /// Change of the velocity over the last step, `D + 1` nodes a cell, if needed.
-    pub velocity_change: Vec<Vector<D>>,
+    pub velocity_change: OfNodes<Vector<D>>,
     /// Elastic stress `E e(u) + H` in Pa before anything weakens it, one a cell, if needed; effects add to it.
-    pub elastic_stress: Vec<Mandel<S>>,
+    pub elastic_stress: OfCells<Mandel<S>>,
     /// What the cells still bear of it.
     pub integrity: Integrity,
     /// Output: stress in Pa, one a cell.
-    pub stress: Vec<Mandel<S>>,
+    pub stress: OfCells<Mandel<S>>,
     /// Output: force in N on the cell's nodes, `D + 1` a cell.
-    pub force: Vec<Vector<D>>,
+    pub force: OfNodes<Vector<D>>,
 }
 
 impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
@@ -121,15 +127,15 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             material: 0,
             first: 0,
             cells: &[],
-            strain: vec![[0.0; S]; if needs.strain { BATCH } else { 0 }],
-            strain_before: vec![[0.0; S]; if needs.strain_before { BATCH } else { 0 }],
-            strain_rate: vec![[0.0; S]; if needs.strain_rate { BATCH } else { 0 }],
-            velocity: vec![[0.0; D]; if needs.velocity { BATCH * (D + 1) } else { 0 }],
-            velocity_change: vec![[0.0; D]; if needs.velocity_change { BATCH * (D + 1) } else { 0 }],
-            elastic_stress: vec![[0.0; S]; if needs.elastic_stress { BATCH } else { 0 }],
+            strain: zeros(needs.strain, BATCH),
+            strain_before: zeros(needs.strain_before, BATCH),
+            strain_rate: zeros(needs.strain_rate, BATCH),
+            velocity: zeros(needs.velocity, BATCH * (D + 1)),
+            velocity_change: zeros(needs.velocity_change, BATCH * (D + 1)),
+            elastic_stress: zeros(needs.elastic_stress, BATCH),
             integrity: Integrity::default(),
-            stress: vec![[0.0; S]; BATCH],
-            force: vec![[0.0; D]; BATCH * (D + 1)],
+            stress: zeros(true, BATCH),
+            force: zeros(true, BATCH * (D + 1)),
         };
         for (number, run) in geometry.runs.iter().enumerate() {
             (batch.number, batch.material, batch.first) = (number, run.material, run.first);
@@ -206,6 +212,10 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             }
         }
     }
+}
+
+fn zeros<const W: usize, const MOST: usize>(needed: bool, count: usize) -> ArrayVec<[f64; W], MOST> {
+    std::iter::repeat_n([0.0; W], if needed { count } else { 0 }).collect()
 }
 
 #[inline(always)]

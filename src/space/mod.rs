@@ -7,7 +7,7 @@ mod quadrature;
 mod surface;
 
 pub use assembly::{CellMatrix, assemble};
-pub use batch::{BATCH, Batch, Integrity, Needs, Nodal};
+pub use batch::{BATCH, Batch, Integrity, Needs, Nodal, OfCells, OfNodes};
 pub use geometry::{CellRun, Geometry, Simplex};
 pub use quadrature::{CellRule, FacetRule, cell_rule, facet_rule};
 pub use surface::{SurfacePoint, surface_points};

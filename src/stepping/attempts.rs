@@ -63,15 +63,14 @@ pub(super) const ATTEMPTS: [Attempt; 12] = [
 pub(super) type Attempted = std::result::Result<usize, (usize, String)>;
 
 impl Newton {
-    /// Sets the parameters of all graphs, those of friction for these falls.
+    /// Sets the parameters of all graphs, those of friction for its falls.
     pub(super) fn parametrise<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
-        falls: &[f64],
         attempt: Attempt,
     ) {
         let follows = attempt.iteration == FrictionIteration::Newton;
-        for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(falls) {
+        for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
             let [normal, tangential] = scales.map(|scale| attempt.stiffer * scale);
             contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
             contact.set_friction(tangential.max(fall / STEEP), follows);

@@ -7,14 +7,14 @@
 
 use super::{
     StepOutcome,
-    condensed_matrix::{CondensedMatrix, Motion, Subspace},
+    condensed_matrix::{CondensedMatrix, Motion, Room, Subspace},
     newton::{From, Newton, Task},
 };
 use crate::{
     body::Body,
     effect::{Contact, ContactNode, contact_nodes},
     error::{Error, Result},
-    exchange::gather,
+    exchange::{Gathering, gather},
     petsc::{BlockRows, Cholesky, DistributedVector, ProjectedKsp},
     session::Session,
 };
@@ -40,6 +40,11 @@ pub(super) struct Condensed {
     trial: DistributedVector,
     velocity: DistributedVector,
     traction: Option<DistributedVector>,
+    /// The values of all ranks' nodes, and how they come here.
+    whole: Vec<f64>,
+    gathering: Gathering,
+    /// Halves of solves since traffic is counted.
+    halves: u64,
 }
 
 /// A factored matrix.
@@ -74,7 +79,8 @@ impl Frames {
         for (node, value) in values.chunks_exact_mut(d).enumerate() {
             let Some(frame) = self.of(node) else { continue };
             let entry = |i: usize, j: usize| if back { frame[j * d + i] } else { frame[i * d + j] };
-            let before: Vec<f64> = value.to_vec();
+            let mut before = [0.0; 3];
+            before[..d].copy_from_slice(value);
             for (i, value) in value.iter_mut().enumerate() {
                 *value = (0..d).map(|j| entry(i, j) * before[j]).sum();
             }
@@ -149,6 +155,9 @@ impl Condensed {
             trial: like.like()?,
             velocity: like.like()?,
             traction: if has_traction { Some(like.like()?) } else { None },
+            whole: vec![0.0; body.mesh.total_nodes * D],
+            gathering: Gathering::new(world, body.mesh.owned * D)?,
+            halves: 0,
         })
     }
 
@@ -180,6 +189,7 @@ impl Condensed {
             own: self.own.clone(),
             motions: self.motions.clone(),
             subspace: Subspace::whole(&self.trial)?,
+            room: Room::new(&self.motions, self.unknowns.len())?,
         };
         number_nodes(&mut body.contacts, &self.nodes);
         let chosen = self.newton.choose_scales(session, &body.contacts, &self.trial, &condensed);
@@ -207,19 +217,32 @@ impl Condensed {
         self.backward(solution)
     }
 
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&mut self) {
+        self.halves = 0;
+        self.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
+    }
+
+    /// Bytes that this rank read since then, at the least: the factor for each half of a solve, its last block for each product.
+    pub fn traffic(&self) -> u64 {
+        let of = |factored: &Factored| self.halves * factored.cholesky.bytes() + factored.condensed.traffic();
+        self.factored.as_ref().map_or(0, of)
+    }
+
     fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
-        let mut whole = gather(&SimpleCommunicator::world(), &right_hand_side.owned()?)?;
-        self.frames.turn(&mut whole, false);
-        factored(&mut self.factored)?.cholesky.forward(&whole)
+        self.gathering.gather(&SimpleCommunicator::world(), &right_hand_side.owned()?, &mut self.whole);
+        self.frames.turn(&mut self.whole, false);
+        self.halves += 1;
+        factored(&mut self.factored)?.cholesky.forward(&self.whole)
     }
 
     fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
-        let mut whole = vec![0.0; self.frames.at.len() * self.frames.dimension];
-        factored(&mut self.factored)?.cholesky.backward(&mut whole)?;
-        self.frames.turn(&mut whole, true);
+        self.halves += 1;
+        factored(&mut self.factored)?.cholesky.backward(&mut self.whole)?;
+        self.frames.turn(&mut self.whole, true);
         let mut solution = solution.owned_mut()?;
         let count = solution.len();
-        solution.copy_from_slice(&whole[self.first..][..count]);
+        solution.copy_from_slice(&self.whole[self.first..][..count]);
         Ok(())
     }
 
@@ -239,15 +262,14 @@ impl Condensed {
             restrict::<D>(&self.nodes, known, traction)?;
         }
         let Factored { cholesky, condensed, .. } = factored(&mut self.factored)?;
-        condensed.write(&condensed.times_lower(cholesky.last_mut()), &mut self.right_hand_side)?;
+        condensed.write_times_lower(cholesky.last_mut(), &mut self.right_hand_side)?;
         let from = From { velocity: &self.velocity, traction: self.traction.as_ref() };
         let task = Task { matrix: condensed, right_hand_side: &self.right_hand_side, ..task };
         number_nodes(&mut body.contacts, &self.nodes);
         let solved = self.newton.solve(session, body, from, task, &mut self.trial);
         number_back(&mut body.contacts, &self.nodes);
         let outcome = solved?;
-        let amounts = condensed.amounts(&self.trial)?;
-        cholesky.last_mut().copy_from_slice(&condensed.times_upper(&amounts));
+        condensed.read_times_upper(&self.trial, cholesky.last_mut())?;
         self.backward(trial)?;
         {
             // What the laws see is what they found, to the last bit.

@@ -3,7 +3,7 @@
 use super::equations::StepMatrix;
 use crate::{
     error::Result,
-    exchange::gather,
+    exchange::Gathering,
     petsc::{DenseCholesky, DistributedVector, times_own_transpose},
 };
 use mpi::topology::SimpleCommunicator;
@@ -35,6 +35,44 @@ pub(super) struct CondensedMatrix {
     pub own: Range<usize>,
     pub motions: Vec<Motion>,
     pub subspace: RefCell<Subspace>,
+    pub room: RefCell<Room>,
+}
+
+/// What products need room for.
+pub(super) struct Room {
+    /// Amounts of the motions of this rank, and of all ranks, in the order of the motions.
+    own: Vec<f64>,
+    all: Vec<f64>,
+    gathering: Gathering,
+    /// Amounts in the order of the factor.
+    placed: [Vec<f64>; 2],
+    /// The blocks of a projection, of this rank and of all ranks, and the images of unit motions that they are made of.
+    own_blocks: Vec<f64>,
+    blocks: Vec<f64>,
+    block_gathering: Gathering,
+    images: [Vec<f64>; DIMENSIONS],
+    /// Bytes read since traffic is counted.
+    traffic: u64,
+}
+
+impl Room {
+    /// For these motions of this rank, and so many of all ranks. Collective.
+    pub fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
+        let world = SimpleCommunicator::world();
+        let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
+        let block_gathering = Gathering::new(&world, pairs)?;
+        Ok(RefCell::new(Self {
+            own: vec![0.0; motions.len()],
+            all: vec![0.0; total],
+            gathering: Gathering::new(&world, motions.len())?,
+            placed: [vec![0.0; total], vec![0.0; total]],
+            own_blocks: Vec::with_capacity(pairs),
+            blocks: vec![0.0; block_gathering.total()],
+            block_gathering,
+            images: Default::default(),
+            traffic: 0,
+        }))
+    }
 }
 
 /// What is made for the subspace of the solves.
@@ -55,22 +93,49 @@ impl Subspace {
 }
 
 impl CondensedMatrix {
-    /// The amounts of all motions in a vector of contact nodes, in the order of the factor. Collective.
-    pub fn amounts(&self, vector: &DistributedVector) -> Result<Vec<f64>> {
-        let values = vector.owned()?;
-        let along = |motion: &Motion| {
-            let value = &values[motion.at..][..motion.direction.len()];
-            dot(&motion.direction, value)
-        };
-        let mine: Vec<f64> = self.motions.iter().map(along).collect();
-        let all = gather(&SimpleCommunicator::world(), &mine)?;
-        let mut placed = vec![0.0; all.len()];
-        self.places.iter().zip(all).for_each(|(&place, amount)| placed[place] = amount);
-        Ok(placed)
+    /// Writes a vector of contact nodes that moves by `L x`.
+    pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
+        let room = &mut *self.room.borrow_mut();
+        room.traffic += self.bytes();
+        self.times_lower(x, &mut room.placed[0]);
+        self.write(&room.placed[0], vector)
+    }
+
+    /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
+    pub fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
+        let room = &mut *self.room.borrow_mut();
+        self.read(vector, room)?;
+        room.traffic += self.bytes();
+        self.times_upper(&room.placed[0], product);
+        Ok(())
+    }
+
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&self) {
+        self.room.borrow_mut().traffic = 0;
+    }
+
+    /// Bytes of `L`, or of the factor on a subspace, that products and solves read since then.
+    pub fn traffic(&self) -> u64 {
+        self.room.borrow().traffic
+    }
+
+    /// Reads the amounts of all motions in a vector of contact nodes into the first place, in the order of the factor. Collective.
+    fn read(&self, vector: &DistributedVector, room: &mut Room) -> Result<()> {
+        let Room { own, all, gathering, placed: [placed, _], .. } = room;
+        {
+            let values = vector.owned()?;
+            for (amount, motion) in own.iter_mut().zip(&self.motions) {
+                *amount = dot(&motion.direction, &values[motion.at..][..motion.direction.len()]);
+            }
+        }
+        gathering.gather(&SimpleCommunicator::world(), own, all);
+        self.places.iter().zip(all).for_each(|(&place, amount)| placed[place] = *amount);
+        Ok(())
     }
 
     /// Writes a vector of contact nodes that moves by these amounts, given in the order of the factor.
-    pub fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
+    fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let mut values = vector.owned_mut()?;
         values.fill(0.0);
         for (motion, number) in self.motions.iter().zip(self.own.clone()) {
@@ -81,19 +146,25 @@ impl CondensedMatrix {
         Ok(())
     }
 
+    /// Bytes of `L`; the factor on a subspace has as many.
+    fn bytes(&self) -> u64 {
+        size_of_val(&self.lower[..]) as u64
+    }
+
     /// `L x`.
-    pub fn times_lower(&self, x: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; x.len()];
+    fn times_lower(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
         for (column, x) in columns(&self.lower, x.len()).zip(x) {
             let first = y.len() - column.len();
             y[first..].iter_mut().zip(column).for_each(|(y, l)| *y += l * x);
         }
-        y
     }
 
     /// `L^T x`.
-    pub fn times_upper(&self, x: &[f64]) -> Vec<f64> {
-        columns(&self.lower, x.len()).map(|column| dot(column, &x[x.len() - column.len()..])).collect()
+    fn times_upper(&self, x: &[f64], y: &mut [f64]) {
+        for (y, column) in y.iter_mut().zip(columns(&self.lower, x.len())) {
+            *y = dot(column, &x[x.len() - column.len()..]);
+        }
     }
 
     /// Replaces `x` by `L^-T L^-1 x`.
@@ -110,15 +181,15 @@ impl CondensedMatrix {
         }
     }
 
-    /// The blocks of a projection that works node by node, node after node of all ranks. Collective.
-    fn projection(
+    /// Writes the blocks of a projection that works node by node, node after node of all ranks. Collective.
+    fn write_blocks(
         &self,
         project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
         column: &mut DistributedVector,
-    ) -> Result<Vec<f64>> {
+        room: &mut Room,
+    ) -> Result<()> {
         let dimension = self.motions.first().map_or(0, |motion| motion.direction.len());
-        let mut columns = Vec::new();
-        for i in 0..DIMENSIONS {
+        for (i, image) in room.images.iter_mut().enumerate() {
             {
                 let mut values = column.owned_mut()?;
                 values.fill(0.0);
@@ -127,19 +198,21 @@ impl CondensedMatrix {
                 }
             }
             project(column)?;
-            columns.push(column.owned()?.to_vec());
+            image.clear();
+            image.extend_from_slice(&column.owned()?);
         }
-        let mut blocks = Vec::new();
+        room.own_blocks.clear();
         for row in &self.motions {
             for other in self.motions.iter().filter(|other| other.at == row.at) {
                 let mut entry = 0.0;
-                for (j, image) in other.direction.iter().zip(&columns) {
+                for (j, image) in other.direction.iter().zip(&room.images) {
                     entry += j * dot(&row.direction, &image[row.at..][..dimension]);
                 }
-                blocks.push(entry);
+                room.own_blocks.push(entry);
             }
         }
-        gather(&SimpleCommunicator::world(), &blocks)
+        room.block_gathering.gather(&SimpleCommunicator::world(), &room.own_blocks, &mut room.blocks);
+        Ok(())
     }
 
     /// Factors `P S P + k (I - P)`, where `P` has these blocks; in the order of the motions.
@@ -181,38 +254,48 @@ const DIMENSIONS: usize = 3;
 
 impl StepMatrix for CondensedMatrix {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        let amounts = self.amounts(x)?;
-        self.write(&self.times_lower(&self.times_upper(&amounts)), y)
+        let room = &mut *self.room.borrow_mut();
+        self.read(x, room)?;
+        room.traffic += 2 * self.bytes();
+        let [amounts, product] = &mut room.placed;
+        self.times_upper(amounts, product);
+        self.times_lower(product, amounts);
+        self.write(amounts, y)
     }
 
     fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        let mut amounts = self.amounts(r)?;
+        let room = &mut *self.room.borrow_mut();
+        self.read(r, room)?;
+        room.traffic += 2 * self.bytes();
+        let [amounts, ordered] = &mut room.placed;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {
             Subspace { factor: Some(factor), in_use: true, .. } => {
-                let mut ordered: Vec<f64> = self.places.iter().map(|&place| amounts[place]).collect();
-                factor.solve(&mut ordered)?;
-                self.places.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = amount);
+                ordered.iter_mut().zip(&self.places).for_each(|(amount, &place)| *amount = amounts[place]);
+                factor.solve(ordered)?;
+                self.places.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
             }
-            _ => self.solve(&mut amounts),
+            _ => self.solve(amounts),
         }
-        self.write(&amounts, z)
+        self.write(amounts, z)
     }
 
     fn look(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut subspace = self.subspace.borrow_mut();
-        let blocks = self.projection(project, &mut subspace.room)?;
+        let room = &mut *self.room.borrow_mut();
+        self.write_blocks(project, &mut subspace.room, room)?;
+        let blocks = &room.blocks;
         let (mut removed, mut first) = (0.0, 0);
         for count in self.nodes.iter().map(ExactSizeIterator::len) {
             removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();
             first += count * count;
         }
         subspace.in_use = removed.round() >= WORTH;
-        if !subspace.in_use || (subspace.factor.is_some() && subspace.made_for == blocks) {
+        if !subspace.in_use || (subspace.factor.is_some() && subspace.made_for == *blocks) {
             return Ok(false);
         }
-        subspace.factor = Some(self.factor_on(&blocks)?);
-        subspace.made_for = blocks;
+        subspace.factor = Some(self.factor_on(blocks)?);
+        subspace.made_for.clone_from(blocks);
         Ok(true)
     }
 }

@@ -121,6 +121,12 @@ pub struct Effort {
 }
 
 impl Effort {
+    /// Nothing done; the room for sets stays.
+    pub fn restart(&mut self) {
+        self.sets.clear();
+        *self = Self { sets: std::mem::take(&mut self.sets), ..Self::default() };
+    }
+
     /// How many iterations ago the set of branches was the same as now, if there were others in between.
     pub fn period(&self) -> Option<usize> {
         let (last, before) = self.sets.split_last()?;

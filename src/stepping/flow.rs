@@ -70,11 +70,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
         let Flow { values, forces, tangents } = &mut *self.flow;
         let (values, mut forces) = (values.local()?, forces.local_mut()?);
         forces.fill(0.0);
-        let tangents = wants_tangents.then(|| {
-            tangents.clear();
-            tangents
-        });
-        self.cells.add_flow(&values, tangents, &mut forces);
+        self.cells.add_flow(&values, wants_tangents.then_some(tangents), &mut forces);
         Ok(())
     }
 }

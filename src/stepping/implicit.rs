@@ -31,6 +31,8 @@ pub(super) struct Implicit {
     /// Squares of the forces of this rank's cells at the start.
     squares: f64,
     solved: Energy,
+    /// `M v_n`, where the energy balance needs it.
+    momentum: Vec<f64>,
 }
 
 impl Implicit {
@@ -45,6 +47,7 @@ impl Implicit {
             end: like()?,
             squares: 0.0,
             solved: Energy::default(),
+            momentum: Vec::new(),
         })
     }
 
@@ -139,7 +142,7 @@ impl Implicit {
     }
 
     pub fn energy<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
@@ -156,17 +159,19 @@ impl Implicit {
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells.
     fn beside<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         body: &Body<D, S>,
         state: &State,
         step: Step,
     ) -> Result<f64> {
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let start = self.velocity.local()?;
-        let mut momentum = vec![0.0; now.len()];
-        body.add_form(Form::Mass, &now, &mut momentum);
+        let momentum = &mut self.momentum;
+        momentum.clear();
+        momentum.resize(now.len(), 0.0);
+        body.add_form(Form::Mass, &now, momentum);
         let share = step.length / self.blend.length;
-        let terms = now.iter().zip(before.iter()).zip(start.iter()).zip(&momentum);
+        let terms = now.iter().zip(before.iter()).zip(start.iter()).zip(momentum.iter());
         Ok(terms.map(|(((now, before), start), p)| p * ((now - before) - share * (now - start))).sum())
     }
 }

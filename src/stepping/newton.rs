@@ -27,6 +27,10 @@ pub(super) struct Newton {
     pub after: Vec<u8>,
     /// The parameters of each contact's graphs for the matrix in use: along the normal, of friction.
     pub scales: Vec<[f64; 2]>,
+    /// The steepest fall of each contact's friction at the pressures of the last attempt.
+    pub falls: Vec<f64>,
+    /// What was done for the step.
+    effort: Effort,
     /// Where the step started.
     pub start: DistributedVector,
     /// Whether the user chose how to search along steps.
@@ -88,6 +92,8 @@ impl Newton {
             before: Vec::new(),
             after: Vec::new(),
             scales: Vec::new(),
+            falls: Vec::new(),
+            effort: Effort::default(),
             start: like.like()?,
             chosen_search: has_option("snes_linesearch_type")?,
             flow: None,
@@ -175,13 +181,14 @@ impl Newton {
             Search::Equilibrated => inside,
             Search::Backtracking => true,
         });
-        let mut falls = largest_falls(session, &body.contacts);
-        let mut effort = Effort::default();
+        largest_falls(session, &body.contacts, &mut self.falls);
+        let mut effort = std::mem::take(&mut self.effort);
+        effort.restart();
         let mut newton_iterations = 0;
         let mut attempt = attempts.next().copied();
         let mut why = String::new();
         while let Some(now) = attempt {
-            self.parametrise(body, &falls, now);
+            self.parametrise(body, now);
             match self.attempt(session, body, task, now, trial, &mut effort)? {
                 Ok(iterations) => newton_iterations += iterations,
                 Err((iterations, words)) => {
@@ -191,18 +198,19 @@ impl Newton {
                     continue;
                 }
             }
-            let steepest = largest_falls(session, &body.contacts);
-            let mut pairs = body.contacts.iter().zip(&steepest);
+            // Where the pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
+            largest_falls(session, &body.contacts, &mut self.falls);
+            let mut pairs = body.contacts.iter().zip(&self.falls);
             if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
                 break;
             }
-            // The pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
-            falls = steepest;
         }
         if attempt.is_none() {
             return Err(failed(step, &why, REMEDY));
         }
-        self.judge(session, body, step, trial, settings, (newton_iterations, &effort))
+        let judged = self.judge(session, body, step, trial, settings, (newton_iterations, &effort));
+        self.effort = effort;
+        judged
     }
 
     /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
@@ -260,13 +268,14 @@ impl Newton {
     }
 }
 
-/// The steepest fall of each contact's friction at the pressures of now, over all ranks. Collective.
-fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>]) -> Vec<f64> {
+/// Writes the steepest fall of each contact's friction at the pressures of now, over all ranks. Collective.
+fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let falls = |contact: &Contact<D>| match contact.friction() {
         Some(law) if law.steepest_fall() > 0.0 => session.largest([contact.steepest_friction_fall()])[0],
         _ => 0.0,
     };
-    contacts.iter().map(falls).collect()
+    out.clear();
+    out.extend(contacts.iter().map(falls));
 }
 
 fn positive_or_one(stiffness: f64) -> f64 {

@@ -137,7 +137,7 @@ impl Method {
 
     /// Energies of the step just committed, over all ranks, without the work of the loads. Collective.
     pub fn energy<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,

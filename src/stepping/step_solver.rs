@@ -218,6 +218,41 @@ impl StepSolver {
         self.matrix()?.multiply(x, y)
     }
 
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&mut self) {
+        self.matrices().for_each(Matrix::restart_products);
+        match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.restart_traffic(),
+            Solver::Linear(ksp) => ksp.restart_applications(),
+            Solver::Newton(newton) => newton.linear_solver.restart_applications(),
+        }
+    }
+
+    /// Bytes that were moved on this rank since then, at the least; `None` where that is not counted: cells that flow, PETSc's solver
+    /// for variational inequalities, preconditioners that don't tell their size.
+    pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
+        let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
+        match &mut self.solver {
+            Solver::Condensed(condensed) => Ok(Some(condensed.traffic())),
+            Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
+            Solver::Newton(newton) => {
+                let applications = newton.linear_solver.applications();
+                let applied = newton.linear_solver.linear_solver().bytes_applied(ranks)?;
+                Ok(applied.map(|bytes| products + applications * bytes))
+            }
+            Solver::Linear(ksp) => {
+                // PETSc multiplies as often: for the first residual, and in each iteration.
+                let (applications, applied) = (ksp.applications(), ksp.bytes_applied(ranks)?);
+                let matrix = self.matrix()?.bytes_of_a_product();
+                Ok(applied.map(|bytes| applications * (matrix + bytes)))
+            }
+        }
+    }
+
+    fn matrices(&self) -> impl Iterator<Item = &Matrix> {
+        [&self.rung, &self.between].into_iter().flatten().map(|(_, matrix)| matrix)
+    }
+
     /// Applies the preconditioner. Collective.
     pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         match &mut self.solver {

@@ -7,17 +7,18 @@ use super::{
     linear_solver::{Preconditioner, SolverSettings},
     rungs::nearest,
     scheme::{Method, Scheme},
+    step_clock::{Stages, StepClock, StepTraffic},
     step_solver::{Known, Lengths, StepSolver},
 };
 use crate::{
-    body::Body,
+    body::{Body, PassBytes},
     effect::{Energy, Form, PointCount, Step},
     error::{Error, Result},
-    petsc::{DistributedVector, Stage},
+    petsc::DistributedVector,
     session::Session,
     state::State,
 };
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Share of the root of the kinetic energy up to which that of the elastic energy does not matter.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -43,40 +44,6 @@ pub struct StepOutcome {
     pub energy: Energy,
 }
 
-/// Seconds spent by phase.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct StepClock {
-    /// Explicit stress, history and forces.
-    pub history: Duration,
-    /// Newton and linear solves.
-    pub solve: Duration,
-    /// Energy balance and certificates of the step.
-    pub balance: Duration,
-    /// Matrix assembly and preconditioner, whenever the step length changes.
-    pub assembly: Duration,
-    /// The part of `assembly` before the first step.
-    pub first_assembly: Duration,
-}
-
-/// Stages of PETSc's `-log_view`.
-struct Stages {
-    assembly: Stage,
-    history: Stage,
-    solve: Stage,
-    balance: Stage,
-}
-
-impl Stages {
-    fn register() -> Result<Self> {
-        Ok(Self {
-            assembly: Stage::register("assembly")?,
-            history: Stage::register("history")?,
-            solve: Stage::register("solve")?,
-            balance: Stage::register("balance")?,
-        })
-    }
-}
-
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
     scheme: Scheme,
@@ -87,6 +54,8 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
+    /// Room for the error of a step: two changes of the velocity, and forces.
+    room: [Vec<f64>; 3],
     /// Length in s through which the ladder of preconditioners goes.
     ladder: f64,
     /// Other starts from which steps with contact are solved, to look for other solutions.
@@ -95,6 +64,9 @@ pub struct Stepper {
     pub set_ups: u64,
     /// Seconds by phase.
     pub clock: StepClock,
+    /// Bytes by phase.
+    pub traffic: StepTraffic,
+    passes: PassBytes,
 }
 
 impl Stepper {
@@ -115,10 +87,13 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
+            room: Default::default(),
             ladder: 1.0,
             guesses: 0,
             set_ups: 0,
             clock: StepClock::default(),
+            traffic: StepTraffic::default(),
+            passes: body.pass_bytes(),
         })
     }
 
@@ -219,6 +194,8 @@ impl Stepper {
         self.write_right_hand_side(session, body, state, step)?;
         self.start(session, body, state, step)?;
         drop(stage);
+        self.count_history(body, state, step);
+        self.solver.restart_traffic();
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
@@ -238,6 +215,7 @@ impl Stepper {
         let outcome = self.solve(session, body, state, step, others.as_deref());
         drop(stage);
         self.clock.solve += solving.elapsed();
+        self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         outcome
     }
 
@@ -281,6 +259,9 @@ impl Stepper {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
         self.method.finish(body, state, &self.trial, step)?;
+        if self.scheme.is_implicit() {
+            self.traffic.add_solve(Some(self.passes.finish));
+        }
         self.method.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
@@ -289,8 +270,10 @@ impl Stepper {
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
         outcome.energy = self.method.energy(session, body, state, step)?;
+        self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
             outcome.energy.work = step.length * load.dot(&state.velocity)?;
+            self.traffic.balance += 2 * vector_bytes(body);
         }
         self.clock.balance += balancing.elapsed();
         Ok(())
@@ -298,7 +281,7 @@ impl Stepper {
 
     /// The error of the step that was attempted last, and the sizes that it has to be compared with. Collective.
     pub fn error<const D: usize, const S: usize>(
-        &self,
+        &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
@@ -311,27 +294,26 @@ impl Stepper {
         let ratio = if is_second { step.length / step.previous_length } else { 0.0 };
         let share = if is_second { ratio / (1.0 + ratio) } else { 0.5 };
         let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let curved: Vec<f64> = values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))).collect();
+        let [curved, strained, forces] = &mut self.room;
+        write(curved, values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))));
         // Displacements, and stresses with them, are one order better in the formula of second order.
-        let (strained, length) = if self.scheme.is_two_step() && is_second {
-            (curved.clone(), self.method.matrix_length(step))
+        let length = if self.scheme.is_two_step() && is_second {
+            strained.clone_from(curved);
+            self.method.matrix_length(step)
         } else {
-            (values.map(|(t, (v, _))| 0.5 * (t - v)).collect(), step.length)
+            write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
+            step.length
         };
         let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
-        let square = |form: Option<Form>, x: &[f64]| {
+        let mut square = |form: Option<Form>, x: &[f64]| {
             let Some(form) = form else { return 0.0 };
-            let mut forces = vec![0.0; x.len()];
-            body.add_form(form, x, &mut forces);
+            write(forces, x.iter().map(|_| 0.0));
+            body.add_form(form, x, forces);
             forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
         };
         let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
-        let mine = [
-            square(form, &curved),
-            square(elastic, &strained),
-            square(form, &trial),
-            square(elastic, &trial),
-        ];
+        let mine =
+            [square(form, curved), square(elastic, strained), square(form, &trial), square(elastic, &trial)];
         let [velocity, stress, all_velocity, all_stress] =
             session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
         // Both are roots of energies where there is mass: a body that flies free of stress has some from rounding.
@@ -383,13 +365,41 @@ impl Stepper {
         self.method.prepare_contacts(body, state)
     }
 
+    /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.
+    fn count_history<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) {
+        let load = if self.load.is_some() { 3 } else { 0 };
+        let start = if extrapolates(state, step) { 8 } else { 2 };
+        self.traffic.history += self.passes.explicit + (1 + load + start) * vector_bytes(body);
+    }
+
     fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
         self.trial.copy_from(&state.velocity)?;
-        if step.previous_length > 0.0 && state.step > 1 {
+        if extrapolates(state, step) {
             let ratio = step.length / step.previous_length;
             self.trial.add_scaled(ratio, &state.velocity)?;
             self.trial.add_scaled(-ratio, &state.previous_velocity)?;
         }
         Ok(())
     }
+}
+
+/// Writes these values in place of the ones before.
+fn write(room: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
+    room.clear();
+    room.extend(values);
+}
+
+/// Whether there are two velocities to start a step from.
+fn extrapolates(state: &State, step: Step) -> bool {
+    step.previous_length > 0.0 && state.step > 1
+}
+
+/// Bytes of the values that this rank owns of a vector.
+fn vector_bytes<const D: usize, const S: usize>(body: &Body<D, S>) -> u64 {
+    (body.mesh.owned * D * size_of::<f64>()) as u64
 }

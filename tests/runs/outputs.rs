@@ -126,6 +126,30 @@ fn the_summary_has_the_keys_of_the_contract() {
     assert!(seconds.values().all(|value| value.as_f64().is_some_and(|part| part <= total)));
 }
 
+#[test]
+fn memory_traffic_is_counted_by_phase() {
+    let of = |case: Case| case.run(1).summary()["traffic_bytes"].clone();
+    let traffic = of(Case::square(6));
+    // A cell: three nodes, an area and two gradients, three stresses. A field: two numbers at 49 nodes.
+    let (cell, stress, field, steps) = (3 * 4 + 5 * 8, 3 * 8, 49 * 2 * 8, 16);
+    // Displacement and velocity are read, forces and the history read and written; forces set to zero, the load added, the start
+    // copied and, behind the second step, extrapolated.
+    let passes = 72 * (cell + 2 * stress) + (2 + 2) * field;
+    assert_eq!(traffic["history"], steps * (passes + (1 + 3) * field) + (2 * 2 + 14 * 8) * field);
+    // Displacement and both velocities are read, and the history; the load times the velocity is the work.
+    assert_eq!(traffic["balance"], steps * (72 * (cell + stress) + (3 + 2) * field));
+    assert_eq!(traffic["assembly"], serde_json::Value::Null);
+    let count = |traffic: &serde_json::Value, phase: &str| traffic[phase].as_u64().unwrap_or(0);
+    // At the least the lower half of the matrix is read twice a step: some 7 nodes a row, of 4 numbers each.
+    assert!(count(&traffic, "solve") > steps * 2 * 8 * 4 * 49 * 7 / 2, "{traffic}");
+    assert!(count(&traffic, "output") > 10_000, "{traffic}");
+    let multigrid = of(Case::square(12).set("solver.preconditioner", "\"gamg\""));
+    assert!(count(&multigrid, "solve") > count(&multigrid, "history"), "{multigrid}");
+    let flow = of(Case::square(6).set("time.scheme", "\"implicit_euler\""));
+    assert_eq!(flow["solve"], serde_json::Value::Null, "flow in Newton's method is not counted");
+    assert!(count(&flow, "history") > 0);
+}
+
 fn field_times(case: &Case) -> Vec<f64> {
     NumberFile::open(&case.run(1).path("fields.vtkhdf")).times()
 }

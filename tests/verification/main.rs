@@ -4,6 +4,7 @@
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
 
 mod adhesion;
+mod allocations;
 mod assembly;
 mod callbacks;
 mod closed_forms;
@@ -50,6 +51,7 @@ fn scenario() {
         "newton" => callbacks::solve_nonlinear(&session),
         "callback_error" => callbacks::fail_on_the_last_rank(&session),
         "callback_panic" => callbacks::panic_on_the_last_rank(&session, &folder),
+        "allocations" => allocations::count(&session),
         "assembly" => assembly::compare(&session),
         "jacobian" => jacobian::compare(&session),
         "indicator" => indicator::sums(&session),

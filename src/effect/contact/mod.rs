@@ -38,6 +38,7 @@ use crate::{
 };
 use friction::Friction;
 use point::{Point, Unknown, gauss_points};
+use xxhash_rust::xxh3::Xxh3;
 
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
@@ -330,8 +331,9 @@ impl<const D: usize> Contact<D> {
     pub fn set_digest(&self) -> u64 {
         let normal = self.points.iter().flat_map(|p| [p.theta, p.slope]);
         let numbers = normal.chain(self.friction.iter().flat_map(Friction::numbers));
-        let bits: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
-        xxhash_rust::xxh3::xxh3_64(&bits)
+        let mut digest = Xxh3::new();
+        numbers.for_each(|number| digest.update(&number.to_le_bytes()));
+        digest.digest()
     }
 
     /// Adds the tractions in Pa on the body's obstacle to nodal values: `-sigma_nu` along the free normal, and `-sigma_tau`.

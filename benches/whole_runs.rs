@@ -1,0 +1,148 @@
+//! Whole runs against the memory bandwidth of the same machine:
+//! `cargo bench --bench whole_runs -- [--quick] [--peer "COMMAND"]`.
+//!
+//! Runs the solver on the problem of Wang and Cheng (2022) in the plane and in space, on one process, and takes seconds and bytes
+//! by phase from `summary.json`. The bytes are those that have to be moved at the least if nothing stays in cache; a triad before
+//! and after each run tells what the memory gives. Their ratio is how near to the memory bound a run is.
+//!
+//! A peer is another program for the same problem: its command is given the dimension, the cells along an edge and the number of
+//! steps, and prints the seconds that a step took as its last word.
+
+mod triad;
+
+use serde_json::Value;
+use std::{path::Path, process::Command};
+use triad::{BYTES, Triad, fastest};
+
+/// Steps a second.
+const RATE: u32 = 64;
+/// Phases of a step.
+const PHASES: [&str; 3] = ["history", "solve", "balance"];
+
+/// A run.
+struct Case {
+    dimension: usize,
+    /// Along an edge.
+    cells: usize,
+    steps: u32,
+    preconditioner: &'static str,
+    quick: bool,
+}
+
+const fn case(dimension: usize, cells: usize, steps: u32, preconditioner: &'static str, quick: bool) -> Case {
+    Case { dimension, cells, steps, preconditioner, quick }
+}
+
+const CASES: [Case; 8] = [
+    case(2, 128, 64, "auto", true),
+    case(2, 256, 32, "auto", true),
+    case(2, 512, 16, "auto", false),
+    case(3, 16, 64, "auto", true),
+    case(3, 32, 16, "auto", false),
+    case(2, 256, 8, "gamg", true),
+    case(2, 512, 4, "gamg", false),
+    case(3, 32, 4, "gamg", false),
+];
+
+/// What the command line asks for.
+#[derive(Default)]
+struct Wanted {
+    quick: bool,
+    peer: Option<String>,
+}
+
+fn wanted() -> Wanted {
+    let mut wanted = Wanted::default();
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            // Given by cargo.
+            "--bench" => {}
+            "--quick" => wanted.quick = true,
+            "--peer" => wanted.peer = Some(words.next().expect("a command behind --peer")),
+            other => panic!("{other}: known are --quick and --peer \"COMMAND\""),
+        }
+    }
+    wanted
+}
+
+/// Runs the solver; gives its `summary.json`.
+fn run(case: &Case) -> Value {
+    let (job, cells) = match case.dimension {
+        2 => ("wang_cheng_2022.toml", format!("mesh.rectangle.cells=[{0},{0}]", case.cells)),
+        _ => ("wang_cheng_cube.toml", format!("mesh.box.cells=[{0},{0},{0}]", case.cells)),
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = [
+        cells,
+        format!("time.step={}", 1.0 / f64::from(RATE)),
+        format!("time.end={}", f64::from(case.steps) / f64::from(RATE)),
+        format!("solver.preconditioner={:?}", case.preconditioner),
+        format!("output.folder={:?}", folder.path().join("out")),
+        "output.fields={every=1000000}".into(),
+        "checkpoint.every=1000000".into(),
+    ];
+    let output = Command::new(env!("CARGO_BIN_EXE_solver"))
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job))
+        .args(settings.iter().flat_map(|setting| ["--set", setting]))
+        .output()
+        .expect("the solver");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(folder.path().join("out/summary.json")).expect("a summary");
+    serde_json::from_str(&text).expect("an object")
+}
+
+/// Seconds that a step took another program.
+fn peer(command: &str, case: &Case) -> f64 {
+    let words = format!("{command} {} {} {}", case.dimension, case.cells, case.steps);
+    let output = Command::new("sh").args(["-c", &words]).output().expect("sh");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let last = text.split_whitespace().last().and_then(|word| word.parse().ok());
+    last.unwrap_or_else(|| panic!("{words}: the last word is no number of seconds:\n{text}"))
+}
+
+/// A row of the table: a phase with its seconds and bytes, beside what the memory gives in bytes a second.
+fn row(head: &str, phase: &str, steps: f64, seconds: f64, bytes: Option<f64>, memory: f64) -> String {
+    let time = 1e3 * seconds / steps;
+    let counted = bytes.map_or_else(
+        || format!("{:>9} {:>7} {:>8}", "-", "-", "-"),
+        |bytes| {
+            let rate = bytes / seconds;
+            format!("{:>9.2} {:>7.2} {:>8.2}", bytes / steps / 1e6, rate / 1e9, rate / memory)
+        },
+    );
+    format!("{head:<50} {phase:<8} {time:>9.2} {counted}")
+}
+
+fn main() {
+    let wanted = wanted();
+    let mut triad = Triad::new();
+    let mut memory = || BYTES as f64 / fastest(&mut || triad.run());
+    println!(
+        "{:<50} {:<8} {:>9} {:>9} {:>7} {:>8}",
+        "problem, unknowns, preconditioner, steps", "phase", "ms a step", "MB a step", "GB/s", "of triad"
+    );
+    for case in CASES.iter().filter(|case| case.quick || !wanted.quick) {
+        let before = memory();
+        let summary = run(case);
+        let memory = before.max(memory());
+        let steps = f64::from(case.steps);
+        let shape = if case.dimension == 2 { "square" } else { "cube" };
+        let preconditioner = summary["preconditioner"].as_str().unwrap_or("?");
+        let head = format!("{shape} {}, {}, {preconditioner}, {steps}", case.cells, summary["unknowns"]);
+        let (mut seconds, mut bytes) = (0.0, Some(0.0));
+        for (at, phase) in PHASES.iter().enumerate() {
+            let spent = summary["wall_seconds"][phase].as_f64().expect("seconds");
+            let moved = summary["traffic_bytes"][phase].as_f64();
+            seconds += spent;
+            bytes = bytes.zip(moved).map(|(sum, more)| sum + more);
+            println!("{}", row(if at == 0 { &head } else { "" }, phase, steps, spent, moved, memory));
+        }
+        let triad = format!("  triad {:.1} GB/s", memory / 1e9);
+        println!("{}", row(&triad, "step", steps, seconds, bytes, memory));
+        if let Some(command) = &wanted.peer {
+            let other = peer(command, case);
+            println!("{:<50} {:<8} {:>9.2}, ratio {:.2}", "", "peer", 1e3 * other, seconds / steps / other);
+        }
+    }
+}

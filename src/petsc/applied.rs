@@ -1,0 +1,95 @@
+//! What applying a preconditioner reads.
+
+use super::{Ksp, check, levels::Level, library::is_set, matrix::bytes_of_a_product, sys};
+use crate::error::Result;
+use std::{
+    ffi::{CStr, c_char},
+    mem::MaybeUninit,
+    ptr,
+};
+
+impl Ksp {
+    /// Bytes of this rank that the preconditioner, which must be set up, moves at the least when it is applied once by CG or
+    /// GMRES: V-cycles of multigrid with Chebyshev's smoother, without the coarsest level, or a factor twice. `None`
+    /// for all else.
+    pub fn bytes_applied(&self, ranks: usize) -> Result<Option<u64>> {
+        let (mut pc, mut kind, mut method) = (ptr::null_mut(), ptr::null(), ptr::null());
+        // SAFETY: live solver; names and preconditioner are its own.
+        unsafe {
+            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::PCGetType(pc, &mut kind))?;
+            check(sys::KSPGetType(self.raw, &mut method))?;
+        }
+        if !is_one_of(method, &[c"cg", c"gmres"]) {
+            Ok(None)
+        } else if is_one_of(kind, &[c"gamg"]) && !is_set(c"-pc_mg_type")? && !is_set(c"-pc_mg_cycle_type")? {
+            cycle(pc, &self.levels)
+        } else if is_one_of(kind, &[c"cholesky"]) && ranks == 1 {
+            factor(pc)
+        } else {
+            Ok(None)
+        }
+    }
+}
+
+fn is_one_of(name: *const c_char, names: &[&CStr]) -> bool {
+    // SAFETY: PETSc's names are NUL-terminated and live as long as their object.
+    !name.is_null() && names.contains(&unsafe { CStr::from_ptr(name) })
+}
+
+/// A V-cycle: on each level but the coarsest the smoother before, which starts from zero, the residual, the smoother behind, and
+/// the way down and up.
+fn cycle(pc: sys::PC, copies: &[Level]) -> Result<Option<u64>> {
+    let mut levels = 0;
+    // SAFETY: a live preconditioner that is multigrid.
+    check(unsafe { sys::PCMGGetLevels(pc, &mut levels) })?;
+    let mut bytes = 0;
+    for (level, copies) in (1..levels).zip(copies) {
+        let (mut smoother, mut transfer, mut kind) = (ptr::null_mut(), ptr::null_mut(), ptr::null());
+        let (mut matrix, mut sweeps) = (ptr::null_mut(), 0);
+        let none = ptr::null_mut;
+        // SAFETY: a live hierarchy, which owns what it hands out; PETSc takes NULL for what is not asked for.
+        unsafe {
+            check(sys::PCMGGetSmoother(pc, level, &mut smoother))?;
+            check(sys::PCMGGetInterpolation(pc, level, &mut transfer))?;
+            check(sys::KSPGetType(smoother, &mut kind))?;
+            check(sys::KSPGetOperators(smoother, ptr::null_mut(), &mut matrix))?;
+            check(sys::KSPGetTolerances(smoother, none(), none(), none(), &mut sweeps))?;
+        }
+        if !is_one_of(kind, &[c"chebyshev"]) {
+            return Ok(None);
+        }
+        let products = 2 * u64::try_from(sweeps).unwrap_or(0);
+        let [own, between] = copies.bytes();
+        let own = own.map_or_else(|| product(matrix), Ok)?;
+        bytes += products * own + 2 * between.map_or_else(|| product(transfer), Ok)?;
+    }
+    Ok(Some(bytes))
+}
+
+/// A product with a matrix of PETSc's.
+fn product(matrix: sys::Mat) -> Result<u64> {
+    let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
+    let (mut block, mut rows, mut columns) = (1, 0, 0);
+    // SAFETY: a live matrix and live numbers.
+    let entries = unsafe {
+        check(sys::MatGetInfo(matrix, sys::MAT_LOCAL, counts.as_mut_ptr()))?;
+        check(sys::MatGetBlockSize(matrix, &mut block))?;
+        check(sys::MatGetLocalSize(matrix, &mut rows, &mut columns))?;
+        counts.assume_init().nz_used
+    };
+    let count = |number: sys::PetscInt| usize::try_from(number).unwrap_or(0);
+    Ok(bytes_of_a_product(entries as usize, count(block), [count(rows), count(columns)]))
+}
+
+/// Both halves of a solve with a factor.
+fn factor(pc: sys::PC) -> Result<Option<u64>> {
+    let (mut matrix, mut counts) = (ptr::null_mut(), MaybeUninit::<sys::MatInfo>::zeroed());
+    // SAFETY: a live factorisation, which owns its matrix.
+    let entries = unsafe {
+        check(sys::PCFactorGetMatrix(pc, &mut matrix))?;
+        check(sys::MatGetInfo(matrix, sys::MAT_LOCAL, counts.as_mut_ptr()))?;
+        counts.assume_init().nz_used
+    };
+    Ok((entries > 0.0).then(|| (2.0 * entries) as u64 * size_of::<f64>() as u64))
+}

@@ -1,0 +1,48 @@
+//! What each phase of a run took, as `summary.json` has it.
+
+use super::Clock;
+use crate::{
+    session::Session,
+    stepping::{StepClock, StepTraffic},
+};
+use serde_json::{Map, Value};
+use std::time::Duration;
+
+/// Seconds by phase of the slowest rank. Collective.
+pub(super) fn seconds(
+    session: &Session,
+    run: Clock,
+    setup: Duration,
+    (clock, output): (&StepClock, Duration),
+) -> Map<String, Value> {
+    let phases = [
+        ("total", run.began.elapsed()),
+        ("launch", run.launched),
+        ("setup", setup.saturating_sub(clock.first_assembly)),
+        ("assembly", clock.assembly),
+        ("history", clock.history),
+        ("solve", clock.solve),
+        ("balance", clock.balance),
+        ("output", output),
+    ];
+    let seconds = session.largest(phases.map(|(_, spent)| spent.as_secs_f64()));
+    phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
+}
+
+/// Bytes that the phases of steps moved through memory at the least, over all ranks, and that files grew by; `null` where that is not
+/// counted. Collective.
+pub(super) fn traffic(session: &Session, steps: &StepTraffic, written: u64) -> Map<String, Value> {
+    let phases = [
+        ("assembly", None),
+        ("history", Some(steps.history)),
+        ("solve", steps.solve),
+        ("balance", Some(steps.balance)),
+        ("output", Some(written)),
+    ];
+    let whole = |(name, mine): (&str, Option<u64>)| {
+        let sum = session.total(usize::try_from(mine.unwrap_or(0)).unwrap_or(usize::MAX));
+        let unknown = session.total(usize::from(mine.is_none())) > 0;
+        (name.to_owned(), if unknown { Value::Null } else { sum.into() })
+    };
+    phases.into_iter().map(whole).collect()
+}

@@ -1,0 +1,130 @@
+//! Steps allocate nothing: what they need is made with the run, or in its first steps.
+//!
+//! Counted is what this program asks of Rust's allocator, on one rank; not what PETSc, CHOLMOD, MPI and HDF5 ask of the system.
+//! A step for which a matrix is assembled sets up anew and may allocate; so may one that writes fields or a checkpoint.
+
+use allocation_counter::measure;
+use clarke::{
+    job::{Hypothesis, Job, Loaded},
+    mesh::{GlobalMesh, gmsh::AnyMesh},
+    run::{Clock, Simulation, Start, run, whole_mesh},
+    session::Session,
+};
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// Steps that may make room.
+const FIRST: usize = 8;
+/// Steps behind these that must do with it.
+const COUNTED: usize = 16;
+
+const PAPER: &str = "papers/wang_cheng_2022.toml";
+const CUBE: &str = "papers/wang_cheng_cube.toml";
+const MULTIGRID: &str = "solver.preconditioner=\"gamg\"";
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs")
+}
+
+fn loaded(job: &str, changes: &[&str]) -> Loaded {
+    let path = folder().join(job);
+    let text = std::fs::read_to_string(&path).expect("the job");
+    let changes: Vec<String> = changes.iter().map(|change| (*change).to_owned()).collect();
+    Job::from_text(&text, job, path.parent().expect("a folder"), &changes).expect("a job")
+}
+
+/// Allocations of each step behind the first ones for which no matrix was assembled.
+fn steps<const D: usize, const S: usize>(
+    session: &Session,
+    mut loaded: Loaded,
+    mesh: GlobalMesh<D>,
+) -> Vec<u64> {
+    let mut run = Simulation::<D, S>::new(session, &mut loaded, Some(mesh)).expect("a simulation");
+    let mut counts = Vec::with_capacity(COUNTED);
+    for number in 0..FIRST + COUNTED {
+        let assembly = run.scheme.clock.assembly;
+        let mut went_on = false;
+        let info = measure(|| went_on = run.advance(session).expect("a step").is_some());
+        if !went_on {
+            break;
+        }
+        if number >= FIRST && run.scheme.clock.assembly == assembly {
+            counts.push(info.count_total);
+        }
+    }
+    counts
+}
+
+fn counted(session: &Session, job: &str, changes: &[&str]) -> Vec<u64> {
+    let loaded = loaded(job, changes);
+    match whole_mesh(&loaded.job).expect("a mesh") {
+        AnyMesh::Two(mesh) if loaded.job.material.hypothesis == Some(Hypothesis::PlaneStrain) => {
+            steps::<2, 4>(session, loaded, mesh)
+        }
+        AnyMesh::Two(mesh) => steps::<2, 3>(session, loaded, mesh),
+        AnyMesh::Three(mesh) => steps::<3, 6>(session, loaded, mesh),
+    }
+}
+
+/// Jobs in a folder of `jobs`.
+fn jobs(inside: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(folder().join(inside)).expect("a folder");
+    let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("text"));
+    let mut jobs: Vec<String> =
+        names.filter(|name| name.ends_with(".toml")).map(|name| inside.to_owned() + &name).collect();
+    jobs.sort();
+    jobs
+}
+
+/// Allocations of a whole run of so many steps of 1/64 s, with all that it writes.
+fn whole_run(session: &Session, steps: u32) -> u64 {
+    let out = tempfile::tempdir().expect("a folder");
+    let out = format!("output.folder={:?}", out.path().join("out").to_str().expect("text"));
+    let end = format!("time.end={}", f64::from(steps) / 64.0);
+    let rare = ["mesh.rectangle.cells=[8,8]", "output.fields={every=1000}", "checkpoint.every=1000"];
+    let loaded = loaded(PAPER, &[&[end.as_str(), out.as_str()][..], &rare[..]].concat());
+    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let info = measure(|| {
+        run(session, loaded, &Start::Anew, clock).expect("a run");
+    });
+    info.count_total
+}
+
+#[test]
+fn steps_allocate_nothing() {
+    crate::run_on(&[1], "allocations");
+}
+
+/// The side under `mpirun`.
+pub fn count(session: &Session) {
+    assert!(measure(|| drop(std::hint::black_box(vec![0.0; 100]))).count_total > 0, "nothing is counted");
+    let changed: [(&str, &[&str]); 6] = [
+        (PAPER, &[MULTIGRID]),
+        (CUBE, &[MULTIGRID]),
+        (PAPER, &["time.scheme=\"implicit_euler\""]),
+        (PAPER, &["time.scheme=\"implicit_euler\"", MULTIGRID]),
+        (PAPER, &["time.scheme=\"bdf2\""]),
+        ("slip_weakening_block.toml", &[MULTIGRID]),
+    ];
+    let all = [jobs("papers/"), jobs("")].concat();
+    let all = all.iter().map(|job| (job.as_str(), &[][..])).chain(changed);
+    let mut faults = Vec::new();
+    let mut sum = 0;
+    for (job, changes) in all {
+        let counts = counted(session, job, changes);
+        sum += counts.len();
+        if counts.iter().any(|count| *count > 0) {
+            faults.push(format!("{job} {changes:?}: {counts:?}"));
+        }
+    }
+    assert!(faults.is_empty(), "allocations by step:\n{}", faults.join("\n"));
+    assert!(sum > 20 * COUNTED, "only {sum} steps were counted");
+    // Texts of different lengths may take a piece more or less at the start and at the end.
+    let [more, less] = [64, 16].map(|steps| whole_run(session, steps));
+    assert!(
+        more.abs_diff(less) < 8,
+        "48 more steps, with their rows and lines: {more} allocations, not {less}"
+    );
+}
