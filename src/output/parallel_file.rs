@@ -190,7 +190,7 @@ impl ParallelFile {
     }
 
     /// As [`Self::create_rows`], compressed (bytes shuffled, then deflated) at a level from 1 to 9, in chunks of some
-    /// [`CHUNK_BYTES`]; level 0 is `create_rows`.
+    /// 1 MiB; level 0 is `create_rows`.
     pub fn create_packed_rows<T: Element>(
         &self,
         name: &str,
