@@ -12,6 +12,8 @@ const NO_PHYSICS: &[&str] = &[
     "about",
     "check",
     "checkpoint",
+    "mesh.box.partition",
+    "mesh.rectangle.partition",
     "output",
     "solver.accept",
     "solver.guesses",

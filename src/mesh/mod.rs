@@ -1,19 +1,23 @@
 //! Simplicial meshes with named boundaries and regions.
 
+mod bodies;
 pub mod check;
+mod digest;
 mod distributed;
 pub mod generate;
 pub mod gmsh;
 mod hanging;
 mod lookup;
 pub mod partition;
+pub mod piece;
 pub mod rigid;
 pub mod shape;
+mod skeleton;
 pub mod surface;
 mod tags;
 pub mod tree;
 
-pub use distributed::{Mesh, distribute};
+pub use distributed::{Mesh, Names, distribute};
 pub use tags::Tags;
 
 use crate::tensor::Vector;
