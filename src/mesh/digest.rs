@@ -1,7 +1,6 @@
 //! A number that tells meshes apart, however they are split.
 
-use super::Mesh;
-use crate::session::Session;
+use super::{Names, piece::Piece};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 /// Seeds that keep nodes, cells and facets apart.
@@ -30,39 +29,65 @@ impl Bytes {
     }
 }
 
-impl<const D: usize> Mesh<D> {
-    /// The wrapping sum over ranks of the hashes of owned nodes (id and place), cells (ids and region) and named facets (ids
-    /// and name). Collective.
-    pub(super) fn find_digest(&self, session: &Session) -> u64 {
-        session.total(self.own_digest() as usize) as u64
-    }
-
-    fn own_digest(&self) -> u64 {
+impl<const D: usize> Piece<D> {
+    /// The wrapping sum of the hashes of this part's own nodes (id and place), its cells (ids and region) and named facets (ids
+    /// and name). Of all parts together it is the digest of the mesh.
+    pub fn digest(&self, part: usize, names: &Names) -> u64 {
         let mut sum = 0_u64;
-        for (id, place) in self.node_ids[..self.owned].iter().zip(&self.nodes) {
+        let own = |node: &usize| self.owners[*node] as usize == part;
+        for node in (0..self.nodes.len()).filter(own) {
             let mut bytes = Bytes::new();
-            bytes.add(id.to_le_bytes());
-            place.iter().for_each(|x| bytes.add(x.to_le_bytes()));
+            bytes.add(self.node_ids[node].to_le_bytes());
+            self.nodes[node].iter().for_each(|x| bytes.add(x.to_le_bytes()));
             sum = sum.wrapping_add(bytes.hash(NODE));
         }
-        let regions: Vec<u64> = self.regions.iter().map(|name| xxh3_64(name.as_bytes())).collect();
-        for (cell, id) in self.cell_ids.iter().enumerate() {
+        let hashes = |names: &[String]| -> Vec<[u8; 8]> {
+            names.iter().map(|name| xxh3_64(name.as_bytes()).to_le_bytes()).collect()
+        };
+        let (regions, boundaries) = (hashes(&names.regions), hashes(&names.boundaries));
+        let add_nodes = |bytes: &mut Bytes, nodes: &[u32]| {
+            nodes.iter().for_each(|&node| bytes.add(self.node_ids[node as usize].to_le_bytes()));
+        };
+        for (cell, nodes) in self.cells.chunks_exact(D + 1).enumerate() {
             let mut bytes = Bytes::new();
-            bytes.add(id.to_le_bytes());
-            bytes.add(regions[usize::from(self.cell_regions[cell])].to_le_bytes());
-            self.cell(cell).iter().for_each(|&node| bytes.add(self.node_ids[node as usize].to_le_bytes()));
+            bytes.add(self.cell_ids[cell].to_le_bytes());
+            bytes.add(regions[usize::from(self.cell_regions[cell])]);
+            add_nodes(&mut bytes, nodes);
             sum = sum.wrapping_add(bytes.hash(CELL));
         }
-        for boundary in &self.boundaries {
-            let name = xxh3_64(boundary.name.as_bytes());
-            for &facet in &boundary.facets {
-                let mut bytes = Bytes::new();
-                bytes.add(name.to_le_bytes());
-                let nodes = self.facets[facet as usize];
-                nodes.iter().for_each(|&node| bytes.add(self.node_ids[node as usize].to_le_bytes()));
-                sum = sum.wrapping_add(bytes.hash(FACET));
-            }
+        for &[boundary, facet] in &self.named {
+            let mut bytes = Bytes::new();
+            bytes.add(boundaries[boundary as usize]);
+            add_nodes(&mut bytes, &self.facets[facet as usize]);
+            sum = sum.wrapping_add(bytes.hash(FACET));
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::generate::{Cuboid, Grid};
+
+    fn digest(parts: usize, change: impl Fn(usize, &mut Piece<3>)) -> u64 {
+        let grid = Cuboid::new([1.0, 2.0, 3.0], [3, 2, 4], [1.0; 3]).unwrap();
+        let of_part = |rank: usize| {
+            let mut piece = grid.part(rank, parts).unwrap();
+            change(rank, &mut piece);
+            piece.digest(rank, &grid.names())
+        };
+        (0..parts).fold(0, |sum, rank| sum.wrapping_add(of_part(rank)))
+    }
+
+    #[test]
+    fn a_mesh_has_the_same_digest_in_any_number_of_parts_and_any_change_shows() {
+        let whole = digest(1, |_, _| {});
+        (2..8).for_each(|parts| assert_eq!(digest(parts, |_, _| {}), whole, "{parts} parts"));
+        assert_ne!(digest(1, |_, piece| piece.nodes[7][1] += 1e-15), whole);
+        assert_ne!(digest(1, |_, piece| piece.cells.swap(0, 1)), whole);
+        assert_ne!(digest(1, |_, piece| piece.cell_ids.swap(0, 1)), whole);
+        assert_ne!(digest(1, |_, piece| drop(piece.named.pop())), whole);
+        assert_ne!(digest(1, |_, piece| piece.named[0][0] = 5), whole);
     }
 }

@@ -128,6 +128,7 @@ impl<const D: usize> Mesh<D> {
     /// ghosts, and counts what the ranks have together. Collective, with the same outcome on all ranks.
     pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self> {
         let (rank, ranks, world) = (session.rank(), session.ranks(), session.world());
+        let digest = session.total(piece.digest(rank, &names) as usize) as u64;
         let (owned, mut ghosts): (Vec<usize>, Vec<usize>) =
             (0..piece.node_ids.len()).partition(|&node| piece.owners[node] as usize == rank);
         let ids = |nodes: &[usize]| -> Vec<u32> { nodes.iter().map(|&node| piece.node_ids[node]).collect() };
@@ -149,7 +150,9 @@ impl<const D: usize> Mesh<D> {
         let first_node = node_starts[rank];
         let number = |id: &u32| match owned_ids.binary_search(id) {
             Ok(place) => Ok((first_node + place) as u32),
-            Err(_) => Err(Error::Internal(format!("rank {rank} does not own node {id}, which others say"))),
+            Err(_) => {
+                Err(Error::Refused(format!("the parts of the mesh do not agree on who owns node {id}")))
+            }
         };
         let numbers = session.agree(asked.iter().map(number).collect::<Result<Vec<u32>>>())?;
         let (ghost_numbers, _) = exchange(world, &numbers, &askers)?;
@@ -185,7 +188,7 @@ impl<const D: usize> Mesh<D> {
             let between = session.agree(mesh.facets_to_others())?;
             mesh.edge_cut = session.total(between) / 2;
         }
-        mesh.digest = mesh.find_digest(session);
+        mesh.digest = digest;
         Ok(mesh)
     }
 
@@ -224,7 +227,7 @@ pub fn distribute<const D: usize>(
     let mut names = String::new();
     let piece = match whole {
         Some((mesh, partition)) => {
-            names = encode_names(&mesh);
+            names = encode(&mesh.names());
             let mut cutter = Cutter::new(&mesh, &partition, session.ranks());
             (1..session.ranks()).rev().for_each(|rank| cutter.piece(rank).send(world, rank));
             cutter.piece(0)
@@ -237,7 +240,7 @@ pub fn distribute<const D: usize>(
     let mut bytes = names.into_bytes();
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
-    let names = decode_names(&String::from_utf8_lossy(&bytes))?;
+    let names = decode(&String::from_utf8_lossy(&bytes))?;
     Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names)? })
 }
 
@@ -281,12 +284,11 @@ impl<const D: usize> Piece<D> {
 }
 
 /// Names one a line: the regions, an empty line, the boundaries.
-fn encode_names<const D: usize>(mesh: &GlobalMesh<D>) -> String {
-    let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
-    format!("{}\n\n{}", mesh.regions.join("\n"), boundaries.join("\n"))
+fn encode(names: &Names) -> String {
+    format!("{}\n\n{}", names.regions.join("\n"), names.boundaries.join("\n"))
 }
 
-fn decode_names(text: &str) -> Result<Names> {
+fn decode(text: &str) -> Result<Names> {
     let (regions, boundaries) =
         text.split_once("\n\n").ok_or_else(|| Error::Internal("the mesh's names arrived garbled".into()))?;
     let list = |text: &str| text.lines().map(str::to_owned).collect();

@@ -43,6 +43,14 @@ pub struct GlobalMesh<const D: usize> {
     pub boundaries: Vec<Boundary>,
 }
 
+impl<const D: usize> GlobalMesh<D> {
+    /// Names of regions and boundaries.
+    pub fn names(&self) -> Names {
+        let boundaries = self.boundaries.iter().map(|boundary| boundary.name.clone()).collect();
+        Names { regions: self.regions.clone(), boundaries }
+    }
+}
+
 /// A named part of the surface.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Boundary {

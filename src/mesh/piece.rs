@@ -1,6 +1,6 @@
 //! A part of a mesh that stands for itself: its cells and every node they touch.
 
-use super::{Boundary, GlobalMesh, partition::Partition};
+use super::{Boundary, GlobalMesh, Names, partition::Partition};
 use crate::{
     error::{Error, Result},
     tensor::Vector,
@@ -66,14 +66,40 @@ impl<const D: usize> Piece<D> {
         out
     }
 
+    /// What is wrong with a piece that was read, one of `parts`.
+    pub fn check(&self, parts: usize, names: &Names) -> std::result::Result<(), &'static str> {
+        let below = |numbers: &[u32], limit: usize| numbers.iter().all(|&number| (number as usize) < limit);
+        let ascending = |ids: &[u32]| ids.is_sorted_by(|a, b| a < b);
+        let (nodes, cells, facets) = (self.nodes.len(), self.cell_ids.len(), self.facets.len());
+        let named = |&[boundary, facet]: &[u32; 2]| {
+            (boundary as usize) < names.boundaries.len() && (facet as usize) < facets
+        };
+        let regions = |&region: &u16| usize::from(region) < names.regions.len();
+        if !(ascending(&self.node_ids) && ascending(&self.cell_ids) && ascending(&self.facet_ids)) {
+            Err("ids are not in order")
+        } else if !below(&self.owners, parts) {
+            Err("a node has an owner that is no part")
+        } else if !self.nodes.as_flattened().iter().all(|x| x.is_finite()) {
+            Err("a coordinate is not finite")
+        } else if !(below(&self.cells, nodes) && below(self.facets.as_flattened(), nodes)) {
+            Err("a cell or facet has a node that does not exist")
+        } else if !below(&self.facet_cells, cells) {
+            Err("a facet lies on a cell that does not exist")
+        } else if !(self.cell_regions.iter().all(regions) && self.named.iter().all(named)) {
+            Err("a region, boundary or facet is named that does not exist")
+        } else {
+            Ok(())
+        }
+    }
+
     /// The whole mesh, of which this is all; refused where ids are missing.
-    pub fn into_whole(self, regions: Vec<String>, boundaries: Vec<String>) -> Result<GlobalMesh<D>> {
+    pub fn into_whole(self, names: Names) -> Result<GlobalMesh<D>> {
         let whole = |ids: &[u32]| ids.iter().zip(0..).all(|(&id, place)| id == place);
         if !(whole(&self.node_ids) && whole(&self.cell_ids) && whole(&self.facet_ids)) {
             return Err(Error::Refused("the parts of the mesh lack nodes, cells or facets".into()));
         }
         let mut boundaries: Vec<Boundary> =
-            boundaries.into_iter().map(|name| Boundary { name, facets: Vec::new() }).collect();
+            names.boundaries.into_iter().map(|name| Boundary { name, facets: Vec::new() }).collect();
         for [boundary, facet] in self.named {
             boundaries[boundary as usize].facets.push(facet);
         }
@@ -81,7 +107,7 @@ impl<const D: usize> Piece<D> {
             nodes: self.nodes,
             cells: self.cells,
             cell_regions: self.cell_regions,
-            regions,
+            regions: names.regions,
             facets: self.facets,
             facet_cells: self.facet_cells,
             boundaries,
@@ -198,15 +224,11 @@ mod tests {
         (0..parts).map(|part| cutter.piece(part)).collect()
     }
 
-    fn names<const D: usize>(mesh: &GlobalMesh<D>) -> (Vec<String>, Vec<String>) {
-        (mesh.regions.clone(), mesh.boundaries.iter().map(|b| b.name.clone()).collect())
-    }
-
     fn comes_back<const D: usize>(mesh: &GlobalMesh<D>) {
         for parts in 1..8 {
             let pieces = cut(mesh, parts);
-            let (regions, boundaries) = names(mesh);
-            let whole = Piece::merged(&pieces).into_whole(regions, boundaries).unwrap();
+            assert!(pieces.iter().all(|piece| piece.check(parts, &mesh.names()).is_ok()));
+            let whole = Piece::merged(&pieces).into_whole(mesh.names()).unwrap();
             assert!(whole == *mesh, "{parts} parts");
             for piece in &pieces {
                 for (position, &cell) in piece.cell_ids.iter().enumerate() {
@@ -233,8 +255,25 @@ mod tests {
     #[test]
     fn a_part_alone_is_not_the_whole() {
         let mesh = rectangle([2.0, 1.0], [6, 5], Diagonal::Right, [1.0; 2]).unwrap();
-        let (regions, boundaries) = names(&mesh);
-        let error = cut(&mesh, 2).remove(1).into_whole(regions, boundaries).unwrap_err().to_string();
+        let error = cut(&mesh, 2).remove(1).into_whole(mesh.names()).unwrap_err().to_string();
         assert!(error.contains("lack"), "{error}");
+    }
+
+    #[test]
+    fn a_piece_that_contradicts_itself_is_found() {
+        let mesh = rectangle([2.0, 1.0], [6, 5], Diagonal::Right, [1.0; 2]).unwrap();
+        let fault = |change: fn(&mut Piece<2>)| {
+            let mut piece = cut(&mesh, 2).remove(0);
+            change(&mut piece);
+            piece.check(2, &mesh.names()).unwrap_err()
+        };
+        assert!(fault(|piece| piece.node_ids.swap(0, 1)).contains("order"));
+        assert!(fault(|piece| piece.owners[3] = 2).contains("owner"));
+        assert!(fault(|piece| piece.nodes[0][1] = f64::NAN).contains("finite"));
+        assert!(fault(|piece| piece.cells[5] = 1000).contains("node"));
+        assert!(fault(|piece| piece.facets[1] = [0, 1000]).contains("node"));
+        assert!(fault(|piece| piece.facet_cells[0] = 1000).contains("facet lies"));
+        assert!(fault(|piece| piece.cell_regions[0] = 1).contains("named"));
+        assert!(fault(|piece| piece.named[0] = [4, 0]).contains("named"));
     }
 }

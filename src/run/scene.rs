@@ -11,6 +11,7 @@ use crate::{
         partition::{Method, partition},
         surface::Topology,
     },
+    partitioned::{self, PartitionedFile},
     session::Session,
 };
 use mpi::{topology::Communicator, traits::Root};
@@ -69,6 +70,15 @@ fn generated<const D: usize, G: Grid<D>>(
 }
 
 fn from_file(session: &Session, path: &Path) -> Result<Scene> {
+    let mut in_parts = session.is_first() && partitioned::is_meant(path);
+    session.world().process_at_rank(0).broadcast_into(&mut in_parts);
+    if in_parts {
+        let file = PartitionedFile::open(path, session.world())?;
+        return match file.header.dimension {
+            2 => file.mesh(session).map(Scene::Two),
+            _ => file.mesh(session).map(Scene::Three),
+        };
+    }
     let whole = session.agree(session.is_first().then(|| gmsh::read(path)).transpose())?;
     let mut dimension = match whole {
         Some(AnyMesh::Two(_)) => 2,

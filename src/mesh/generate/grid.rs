@@ -35,9 +35,7 @@ pub trait Grid<const D: usize> {
     /// The whole mesh; refused where METIS could not split it.
     fn whole(&self) -> Result<GlobalMesh<D>> {
         countable(self.counts(), i32::MAX as usize, i32::MAX as usize / (D + 1))?;
-        let names = self.names();
-        self.piece(&self.bricks().map(|count| 0..count), &|_, _| 0)?
-            .into_whole(names.regions, names.boundaries)
+        self.piece(&self.bricks().map(|count| 0..count), &|_, _| 0)?.into_whole(self.names())
     }
 
     /// The part of a rank: a box of bricks, near equal ones for all ranks. A node between parts goes to the lowest or the highest
@@ -133,9 +131,8 @@ mod tests {
     fn parts_make_the_whole<const D: usize>(grid: &impl Grid<D>, parts: usize) {
         let whole = grid.whole().unwrap();
         let pieces: Vec<Piece<D>> = (0..parts).map(|rank| grid.part(rank, parts).unwrap()).collect();
-        let names = grid.names();
         assert_eq!(pieces.iter().map(|p| p.cell_ids.len()).sum::<usize>(), whole.cell_count());
-        assert!(Piece::merged(&pieces).into_whole(names.regions, names.boundaries).unwrap() == whole);
+        assert!(Piece::merged(&pieces).into_whole(grid.names()).unwrap() == whole);
 
         let mut around: BTreeMap<u32, (Vec<u32>, Vec<u32>)> = BTreeMap::new();
         for (rank, piece) in pieces.iter().enumerate() {
@@ -187,12 +184,15 @@ mod tests {
             }
             assert!(seen.iter().all(|&bricks| bricks > 0), "{parts}: {seen:?}");
         }
-        for parts in [2, 3, 5, 7, 12, 100, 1000] {
+        // What is left is a layer of bricks more or less.
+        for (parts, bound) in
+            [(2, 1.001), (3, 1.01), (5, 1.01), (7, 1.01), (12, 1.03), (100, 1.06), (1000, 1.2)]
+        {
             let bisection = Bisection::new([100, 100, 100], parts).unwrap();
             let largest =
                 (0..parts).map(|p| bisection.range(p).iter().map(Range::len).product::<usize>()).max();
             let imbalance = largest.unwrap() as f64 * parts as f64 / 1e6;
-            assert!(imbalance < 1.16, "{parts}: {imbalance}");
+            assert!(imbalance < bound, "{parts}: {imbalance}");
         }
         assert!(Bisection::new([4, 6], 25).err().unwrap().to_string().contains("at most 24 ranks"));
     }
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn parts_may_count_to_the_end_of_32_bits_and_the_whole_may_not() {
         let grid = Cuboid::new([1.0; 3], [890, 890, 890], [1.0; 3]).unwrap();
-        assert!(grid.whole().unwrap_err().to_string().contains("at most 536870911 cells"));
+        assert!(grid.whole().unwrap_err().to_string().contains("and 536870911 cells"));
         let part = grid.part(999_999, 1_000_000).unwrap();
         assert!(part.cell_ids.len() < 10_000 && *part.cell_ids.last().unwrap() == 6 * 890_u32.pow(3) - 1);
         let error = Cuboid::new([1.0; 3], [900, 900, 900], [1.0; 3]).unwrap_err().to_string();
