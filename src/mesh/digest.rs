@@ -87,7 +87,7 @@ mod tests {
         assert_ne!(digest(1, |_, piece| piece.nodes[7][1] += 1e-15), whole);
         assert_ne!(digest(1, |_, piece| piece.cells.swap(0, 1)), whole);
         assert_ne!(digest(1, |_, piece| piece.cell_ids.swap(0, 1)), whole);
-        assert_ne!(digest(1, |_, piece| drop(piece.named.pop())), whole);
+        assert_ne!(digest(1, |_, piece| piece.named.truncate(9)), whole);
         assert_ne!(digest(1, |_, piece| piece.named[0][0] = 5), whole);
     }
 }

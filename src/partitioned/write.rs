@@ -96,15 +96,8 @@ fn table<'a, T: Element, const D: usize>(
     pieces: &'a [Piece<D>],
     rows: impl Fn(&'a Piece<D>) -> std::borrow::Cow<'a, [T]>,
 ) -> Result<()> {
-    let total: usize = pieces.iter().map(|piece| rows(piece).len()).sum();
-    let dataset = file.create_rows::<T>(name, (total / width) as u64, width)?;
-    let mut first = 0;
-    for piece in pieces {
-        let rows = rows(piece);
-        dataset.write(first, &rows)?;
-        first += (rows.len() / width) as u64;
-    }
-    Ok(())
+    let all: Vec<T> = pieces.iter().flat_map(|piece| rows(piece).into_owned()).collect();
+    file.create_rows::<T>(name, (all.len() / width) as u64, width)?.write(0, &all)
 }
 
 impl<const D: usize> Piece<D> {

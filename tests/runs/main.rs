@@ -15,6 +15,7 @@ mod iterations;
 mod launch;
 mod materials;
 mod outputs;
+mod partitions;
 mod ranks;
 mod readers;
 mod regions;
