@@ -4,6 +4,7 @@ use crate::{
     error::{Error, Exit, Result},
     job::{self, Job, Loaded},
     output::{inspect::inspect, parallel_file::given_up},
+    partitioned,
     report::report,
     run::{self, Clock, Start},
     session::{Mpi, Session},
@@ -25,12 +26,13 @@ Examples:
   solver check job.toml                    see what it would simulate and cost
   solver job.toml --set time.step=0.01     run it with another step
   solver job.toml --restart                go on where it stopped
+  solver partition m.msh -n 64 -o m.h5     split a mesh for runs on up to 64 processes
   solver describe contact                  read about the keys of [[contact]]
 
 Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
 
 /// What the commands are called, for misspelt ones.
-const COMMANDS: [&str; 6] = ["run", "check", "describe", "inspect", "study", "report"];
+const COMMANDS: [&str; 7] = ["run", "check", "describe", "inspect", "partition", "study", "report"];
 
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
 #[derive(Debug, Parser)]
@@ -72,10 +74,21 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// What is in a checkpoint or result file.
+    /// What is in a checkpoint, a result file or a partitioned mesh.
     Inspect {
         /// The file.
         file: PathBuf,
+    },
+    /// Split a mesh into parts that ranks read by themselves (`[mesh] file = "FILE.h5"`).
+    Partition {
+        /// The mesh: of Gmsh (.msh), or split before (.h5).
+        mesh: PathBuf,
+        /// How many parts: the most ranks that can run on it.
+        #[arg(short = 'n', value_name = "RANKS")]
+        parts: usize,
+        /// The file to write.
+        #[arg(short = 'o', value_name = "FILE.h5")]
+        output: PathBuf,
     },
     /// Accuracy against cost.
     Study {
@@ -141,7 +154,9 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Run(arguments)) => run_job(&arguments),
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
+        Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
+        Some(Command::Partition { mesh, parts, output }) => partition(&mesh, parts, &output),
         Some(Command::Study { study, overrides, ablate, part }) => {
             run_study(&study, &overrides, ablate, part)
         }
@@ -260,6 +275,25 @@ fn report_on(folder: &Path) -> Result<Exit> {
         }
         error.exit()
     }))
+}
+
+/// Splits a mesh, on one process.
+fn partition(mesh: &Path, parts: usize, output: &Path) -> Result<Exit> {
+    in_session(|session, _| {
+        let alone =
+            || Error::Refused("solver partition works on one process: start it without mpirun".into());
+        session.agree((session.ranks() == 1).then_some(()).ok_or_else(alone))?;
+        let header = partitioned::make(mesh, parts, output)?;
+        print(&format!(
+            "{}: {} cells in {parts} parts, imbalance {:.3}, {} facets between them; run it with [mesh] file = {output:?} on 1 to \
+             {parts} ranks",
+            output.display(),
+            header.cells,
+            header.imbalance,
+            header.edge_cut
+        ));
+        Ok(Exit::Done)
+    })
 }
 
 fn run_job(arguments: &RunArguments) -> Result<Exit> {

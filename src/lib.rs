@@ -20,6 +20,7 @@ pub mod body;
 pub mod stepping;
 pub mod certificate;
 pub mod output;
+pub mod partitioned;
 pub mod drawing;
 pub mod run;
 pub mod study;

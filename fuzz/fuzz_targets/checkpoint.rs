@@ -39,7 +39,7 @@ fuzz_target!(|bytes: &[u8]| {
     std::fs::write(file, bytes).expect("a file");
     read(file, &world).err();
     if bytes.len() as u64 > SEAL_BYTES {
-        seal::seal(file, &world).expect("sealed");
+        seal::seal(file, seal::CHECKPOINT, &world).expect("sealed");
         read(file, &world).err();
     }
 });

@@ -6,12 +6,15 @@ use std::path::{Path, PathBuf};
 use super::{Job, Mesh};
 use crate::error::{Error, Result};
 
-/// Keys that don't change the answer, and all below them. The mesh counts by its file's name: its content is
-/// compared by whoever read it.
+/// Keys that don't change the answer, and all below them. The same mesh may stand in several files: its content is compared
+/// by whoever read it.
 const NO_PHYSICS: &[&str] = &[
     "about",
     "check",
     "checkpoint",
+    "mesh.box.partition",
+    "mesh.file",
+    "mesh.rectangle.partition",
     "output",
     "solver.accept",
     "solver.guesses",
@@ -56,9 +59,6 @@ impl Job {
     /// Everything that changes the answer: keys joined by dots, and their values as TOML.
     pub fn physics(&self) -> Result<BTreeMap<String, String>> {
         let mut job = self.clone();
-        if let Mesh::File(path) = &mut job.mesh {
-            *path = path.file_name().map(PathBuf::from).unwrap_or_default();
-        }
         job.output.folder = None;
         let value = toml::Value::try_from(&job)
             .map_err(|error| Error::Internal(format!("the job can't be written: {error}")))?;

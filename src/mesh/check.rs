@@ -1,11 +1,12 @@
 //! What a mesh must satisfy before anything is computed on it.
 
-use super::GlobalMesh;
 use super::hanging::refuse_hanging_nodes;
-use super::shape::longest_edge;
+use super::shape::{self, longest_edge};
 use super::surface::Topology;
 use super::tags::{Tags, place};
+use super::{GlobalMesh, Mesh};
 use crate::error::{Error, Result};
+use crate::session::Session;
 use crate::tensor::{Vector, add_scaled, dot, norm};
 
 /// Cells whose [quality](super::shape::quality) is below this are called poor: they spoil accuracy and conditioning.
@@ -122,9 +123,31 @@ fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) ->
 impl<const D: usize> GlobalMesh<D> {
     /// The shape qualities of all cells in short; of an empty mesh, none is poor.
     pub fn quality_summary(&self) -> Quality {
-        let mut summary = Quality { smallest: 1.0, worst_cell: 0, poor: 0 };
-        for cell in 0..self.cell_count() {
-            let quality = self.quality(cell);
+        Quality::of((0..self.cell_count()).map(|cell| (cell, self.quality(cell))))
+    }
+}
+
+impl<const D: usize> Mesh<D> {
+    /// The shape qualities of the cells of all ranks in short. Collective.
+    pub fn quality_summary(&self, session: &Session) -> Quality {
+        let quality = |cell: usize| {
+            let nodes = self.cell(cell);
+            let corners: [Vector<D>; 4] = std::array::from_fn(|i| self.nodes[nodes[i.min(D)] as usize]);
+            (self.cell_ids[cell] as usize, shape::quality(&corners[..=D]))
+        };
+        let own = Quality::of((0..self.cell_count()).map(quality));
+        let smallest = -session.largest([-own.smallest])[0];
+        let worst = if own.smallest == smallest { own.worst_cell as f64 } else { f64::INFINITY };
+        let worst_cell = -session.largest([-worst])[0] as usize;
+        Quality { smallest, worst_cell, poor: session.total(own.poor) }
+    }
+}
+
+impl Quality {
+    /// Of cells, each with its id and quality.
+    fn of(cells: impl Iterator<Item = (usize, f64)>) -> Self {
+        let mut summary = Self { smallest: 1.0, worst_cell: 0, poor: 0 };
+        for (cell, quality) in cells {
             summary.poor += (quality < POOR_QUALITY) as usize;
             if quality < summary.smallest {
                 (summary.smallest, summary.worst_cell) = (quality, cell);

@@ -1,8 +1,14 @@
-//! One rank's part of a mesh, and how rank 0 hands the parts out.
+//! One rank's part of a mesh, put together from pieces; and how rank 0 hands pieces of a whole mesh out.
 
-use super::{Boundary, GlobalMesh, partition::Partition};
+use super::{
+    Boundary, GlobalMesh, Tags,
+    partition::Partition,
+    piece::{Cutter, Piece},
+    surface::Topology,
+};
 use crate::{
     error::{Error, Result},
+    exchange::{exchange, gather},
     session::Session,
     tensor::Vector,
 };
@@ -55,6 +61,8 @@ pub struct Mesh<const D: usize> {
     pub imbalance: f64,
     /// Digest of the whole mesh, independent of the partition.
     pub digest: u64,
+    /// Whether rank 0 held the whole mesh at first.
+    pub handed_out: bool,
 }
 
 impl<const D: usize> Mesh<D> {
@@ -106,256 +114,183 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
+/// Names of a mesh, the same on all ranks.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Names {
+    /// Regions.
+    pub regions: Vec<String>,
+    /// Boundaries.
+    pub boundaries: Vec<String>,
+}
+
+impl<const D: usize> Mesh<D> {
+    /// Puts the ranks' pieces together, whose nodes are owned by ranks: numbers the nodes, asks owners for the numbers of
+    /// ghosts, and counts what the ranks have together. Collective, with the same outcome on all ranks.
+    pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self> {
+        let (rank, ranks, world) = (session.rank(), session.ranks(), session.world());
+        let digest = session.total(piece.digest(rank, &names) as usize) as u64;
+        let (owned, mut ghosts): (Vec<usize>, Vec<usize>) =
+            (0..piece.node_ids.len()).partition(|&node| piece.owners[node] as usize == rank);
+        let ids = |nodes: &[usize]| -> Vec<u32> { nodes.iter().map(|&node| piece.node_ids[node]).collect() };
+        let owned_ids = ids(&owned);
+        let counts = gather(world, &[owned.len() as u64])?;
+        let node_starts: Vec<usize> = std::iter::once(0)
+            .chain(counts.iter().scan(0, |end, &count| {
+                *end += count as usize;
+                Some(*end)
+            }))
+            .collect();
+        session.agree(countable(node_starts[ranks], session.total(piece.cell_ids.len())))?;
+
+        // By owner, then by id: that is the order of their global numbers.
+        ghosts.sort_by_key(|&node| piece.owners[node]);
+        let mut wanted = vec![0; ranks];
+        ghosts.iter().for_each(|&node| wanted[piece.owners[node] as usize] += 1);
+        let (asked, askers) = exchange(world, &ids(&ghosts), &wanted)?;
+        let first_node = node_starts[rank];
+        let number = |id: &u32| match owned_ids.binary_search(id) {
+            Ok(place) => Ok((first_node + place) as u32),
+            Err(_) => {
+                Err(Error::Refused(format!("the parts of the mesh do not agree on who owns node {id}")))
+            }
+        };
+        let numbers = session.agree(asked.iter().map(number).collect::<Result<Vec<u32>>>())?;
+        let (ghost_numbers, _) = exchange(world, &numbers, &askers)?;
+
+        let order: Vec<usize> = owned.iter().chain(&ghosts).copied().collect();
+        let mut local = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(&node, place)| local[node] = place);
+        let mut boundaries: Vec<Boundary> =
+            names.boundaries.into_iter().map(|name| Boundary { name, facets: Vec::new() }).collect();
+        piece.named.iter().for_each(|&[boundary, facet]| boundaries[boundary as usize].facets.push(facet));
+        let mut mesh = Self {
+            owned: owned.len(),
+            first_node,
+            total_nodes: node_starts[ranks],
+            nodes: order.iter().map(|&node| piece.nodes[node]).collect(),
+            node_ids: ids(&order),
+            ghosts: ghost_numbers,
+            node_starts,
+            cells: piece.cells.iter().map(|&node| local[node as usize]).collect(),
+            first_cell: session.share_start(piece.cell_ids.len()),
+            total_cells: session.total(piece.cell_ids.len()),
+            cell_ids: piece.cell_ids,
+            cell_regions: piece.cell_regions,
+            regions: names.regions,
+            facets: piece.facets.iter().map(|facet| facet.map(|node| local[node as usize])).collect(),
+            facet_cells: piece.facet_cells,
+            boundaries,
+            ..Self::default()
+        };
+        let [fullest] = session.largest([mesh.cell_count() as f64]);
+        mesh.imbalance = fullest * ranks as f64 / mesh.total_cells as f64;
+        if ranks > 1 {
+            let between = session.agree(mesh.facets_to_others())?;
+            mesh.edge_cut = session.total(between) / 2;
+        }
+        mesh.digest = digest;
+        Ok(mesh)
+    }
+
+    /// How many facets of the cells here have their other cell on another rank.
+    fn facets_to_others(&self) -> Result<usize> {
+        let topology = self.topology()?;
+        Ok(topology.facets_without_neighbour() - self.facets.len())
+    }
+
+    /// Which of the cells here share facets.
+    pub fn topology(&self) -> Result<Topology<D>> {
+        let topology = Topology::<D>::new(&self.cells, self.nodes.len(), &Tags::default())?;
+        if topology.facets_without_neighbour() < self.facets.len() {
+            return Err(Error::Refused("the mesh counts facets as outer ones that lie between cells".into()));
+        }
+        Ok(topology)
+    }
+}
+
+fn countable(nodes: usize, cells: usize) -> Result<()> {
+    match u32::try_from(nodes.max(cells)) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(Error::Refused(format!(
+            "the mesh has {nodes} nodes and {cells} cells; ids are 32-bit: at most {} of each",
+            u32::MAX
+        ))),
+    }
+}
+
 /// Hands the parts of `whole` (on rank 0, `None` elsewhere) out to all ranks; rank 0 frees it. Collective.
 pub fn distribute<const D: usize>(
     session: &Session,
     whole: Option<(GlobalMesh<D>, Partition)>,
 ) -> Result<Mesh<D>> {
     let world = session.world();
-    let ranks = session.ranks();
-    let mut mesh = Mesh { node_starts: vec![0; ranks + 1], ..Mesh::default() };
     let mut names = String::new();
-    if let Some((whole, parts)) = whole {
-        names = encode_names(&whole);
-        let digest = whole.digest();
-        let order = NodeOrder::new(&parts, ranks);
-        mesh.node_starts.clone_from(&order.starts);
-        (mesh.edge_cut, mesh.imbalance, mesh.digest) = (parts.edge_cut, parts.imbalance, digest);
-        (mesh.total_nodes, mesh.total_cells) = (whole.nodes.len(), whole.cell_count());
-        let mut cells_of = vec![Vec::new(); ranks];
-        for (cell, &rank) in parts.cell_ranks.iter().enumerate() {
-            cells_of[rank as usize].push(cell as u32);
+    let piece = match whole {
+        Some((mesh, partition)) => {
+            names = encode(&mesh.names());
+            let mut cutter = Cutter::new(&mesh, &partition, session.ranks());
+            (1..session.ranks()).rev().for_each(|rank| cutter.piece(rank).send(world, rank));
+            cutter.piece(0)
         }
-        let facets_of = facets_by_rank(&whole, &parts, ranks);
-        for rank in (0..ranks).rev() {
-            let part = Part::cut(&whole, &order, rank, &cells_of[rank], &facets_of[rank]);
-            if rank == 0 {
-                part.unpack(&mut mesh);
-            } else {
-                part.send(world, rank);
-            }
-        }
-    } else {
-        Part::receive(world).unpack(&mut mesh);
-    }
+        None => Piece::receive(world),
+    };
     let root = world.process_at_rank(0);
-    root.broadcast_into(&mut mesh.node_starts[..]);
-    for count in [&mut mesh.total_nodes, &mut mesh.total_cells, &mut mesh.edge_cut] {
-        root.broadcast_into(count);
-    }
-    root.broadcast_into(&mut mesh.imbalance);
-    root.broadcast_into(&mut mesh.digest);
     let mut length = names.len();
     root.broadcast_into(&mut length);
     let mut bytes = names.into_bytes();
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
-    decode_names(&String::from_utf8_lossy(&bytes), &mut mesh)?;
-    mesh.first_node = mesh.node_starts[session.rank()];
-    mesh.first_cell = session.share_start(mesh.cell_count());
-    mesh.localise();
-    Ok(mesh)
+    let names = decode(&String::from_utf8_lossy(&bytes))?;
+    Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names)? })
 }
 
-/// Global numbering: the nodes of rank 0 first, each rank's in the order of their ids.
-struct NodeOrder {
-    starts: Vec<usize>,
-    numbers: Vec<u32>,
-    ids: Vec<u32>,
-}
-
-impl NodeOrder {
-    fn new(parts: &Partition, ranks: usize) -> Self {
-        let mut starts = vec![0usize; ranks + 1];
-        for &rank in &parts.node_ranks {
-            starts[rank as usize + 1] += 1;
-        }
-        for rank in 0..ranks {
-            starts[rank + 1] += starts[rank];
-        }
-        let mut next = starts.clone();
-        let mut numbers = vec![0; parts.node_ranks.len()];
-        let mut ids = vec![0; parts.node_ranks.len()];
-        for (id, &rank) in parts.node_ranks.iter().enumerate() {
-            let number = &mut next[rank as usize];
-            numbers[id] = *number as u32;
-            ids[*number] = id as u32;
-            *number += 1;
-        }
-        Self { starts, numbers, ids }
-    }
-}
-
-fn facets_by_rank<const D: usize>(mesh: &GlobalMesh<D>, parts: &Partition, ranks: usize) -> Vec<Vec<u32>> {
-    let mut of = vec![Vec::new(); ranks];
-    for (facet, &cell) in mesh.facet_cells.iter().enumerate() {
-        of[parts.cell_ranks[cell as usize] as usize].push(facet as u32);
-    }
-    of
-}
-
-/// What is sent to one rank: plain arrays, node numbers global.
-#[derive(Default)]
-struct Part {
-    coordinates: Vec<f64>,
-    node_ids: Vec<u32>,
-    ghosts: Vec<u32>,
-    cells: Vec<u32>,
-    cell_ids: Vec<u32>,
-    cell_regions: Vec<u16>,
-    facets: Vec<u32>,
-    facet_cells: Vec<u32>,
-    /// For each boundary the number of facets here, then their positions.
-    boundaries: Vec<u32>,
-}
-
-impl Part {
-    fn cut<const D: usize>(
-        mesh: &GlobalMesh<D>,
-        order: &NodeOrder,
-        rank: usize,
-        cell_ids: &[u32],
-        facet_ids: &[u32],
-    ) -> Self {
-        let owned = order.starts[rank] as u32..order.starts[rank + 1] as u32;
-        let cells: Vec<u32> = cell_ids
-            .iter()
-            .flat_map(|&c| mesh.cell(c as usize))
-            .map(|&node| order.numbers[node as usize])
-            .collect();
-        let mut ghosts: Vec<u32> = cells.iter().copied().filter(|n| !owned.contains(n)).collect();
-        ghosts.sort_unstable();
-        ghosts.dedup();
-        let node_ids: Vec<u32> = owned.chain(ghosts.iter().copied()).map(|n| order.ids[n as usize]).collect();
-        Self {
-            coordinates: node_ids.iter().flat_map(|&id| mesh.nodes[id as usize]).collect(),
-            node_ids,
-            ghosts,
-            cells,
-            cell_ids: cell_ids.to_vec(),
-            cell_regions: cell_ids.iter().map(|&c| mesh.cell_regions[c as usize]).collect(),
-            facets: facet_ids
-                .iter()
-                .flat_map(|&f| mesh.facets[f as usize])
-                .map(|node| order.numbers[node as usize])
-                .collect(),
-            facet_cells: facet_ids
-                .iter()
-                .map(|&f| position(cell_ids, mesh.facet_cells[f as usize]))
-                .collect(),
-            boundaries: boundaries_here(&mesh.boundaries, facet_ids),
-        }
-    }
-
+impl<const D: usize> Piece<D> {
     fn send(&self, world: &impl Communicator, rank: usize) {
         let to = world.process_at_rank(rank as i32);
-        to.send(&self.coordinates[..]);
+        to.send(self.nodes.as_flattened());
         for list in [
-            &self.node_ids,
-            &self.ghosts,
-            &self.cells,
+            &self.node_ids[..],
+            &self.owners,
             &self.cell_ids,
-            &self.facets,
+            &self.cells,
+            &self.facet_ids,
+            self.facets.as_flattened(),
             &self.facet_cells,
-            &self.boundaries,
+            self.named.as_flattened(),
         ] {
-            to.send(&list[..]);
+            to.send(list);
         }
         to.send(&self.cell_regions[..]);
     }
 
     fn receive(world: &impl Communicator) -> Self {
         let from = world.process_at_rank(0);
-        let coordinates = from.receive_vec::<f64>().0;
-        let [node_ids, ghosts, cells, cell_ids, facets, facet_cells, boundaries] =
+        let nodes = from.receive_vec::<f64>().0;
+        let [node_ids, owners, cell_ids, cells, facet_ids, facets, facet_cells, named] =
             std::array::from_fn(|_| from.receive_vec::<u32>().0);
-        let cell_regions = from.receive_vec::<u16>().0;
-        Self { coordinates, node_ids, ghosts, cells, cell_ids, cell_regions, facets, facet_cells, boundaries }
-    }
-
-    fn unpack<const D: usize>(self, mesh: &mut Mesh<D>) {
-        mesh.owned = self.node_ids.len() - self.ghosts.len();
-        mesh.nodes = self.coordinates.chunks_exact(D).map(|x| std::array::from_fn(|i| x[i])).collect();
-        mesh.node_ids = self.node_ids;
-        mesh.ghosts = self.ghosts;
-        mesh.cells = self.cells;
-        mesh.cell_ids = self.cell_ids;
-        mesh.cell_regions = self.cell_regions;
-        mesh.facets = self.facets.chunks_exact(D).map(|f| std::array::from_fn(|i| f[i])).collect();
-        mesh.facet_cells = self.facet_cells;
-        let mut rest = &self.boundaries[..];
-        while let Some((&count, others)) = rest.split_first() {
-            let (facets, others) = others.split_at(count as usize);
-            mesh.boundaries.push(Boundary { name: String::new(), facets: facets.to_vec() });
-            rest = others;
+        Self {
+            node_ids,
+            owners,
+            nodes: nodes.as_chunks().0.to_vec(),
+            cell_ids,
+            cells,
+            cell_regions: from.receive_vec::<u16>().0,
+            facet_ids,
+            facets: facets.as_chunks().0.to_vec(),
+            facet_cells,
+            named: named.as_chunks().0.to_vec(),
         }
     }
-}
-
-impl<const D: usize> Mesh<D> {
-    /// Turns the global node numbers of cells and facets, as sent, into local ones.
-    fn localise(&mut self) {
-        let owned = self.first_node..self.first_node + self.owned;
-        let ghosts = &self.ghosts;
-        let local = |node: &mut u32| {
-            let global = *node as usize;
-            *node = if owned.contains(&global) {
-                (global - owned.start) as u32
-            } else {
-                owned.len() as u32 + position(ghosts, *node)
-            };
-        };
-        self.cells.iter_mut().for_each(local);
-        self.facets.iter_mut().flatten().for_each(local);
-    }
-}
-
-fn position(ascending: &[u32], value: u32) -> u32 {
-    ascending.partition_point(|&v| v < value) as u32
-}
-
-fn boundaries_here(boundaries: &[Boundary], facet_ids: &[u32]) -> Vec<u32> {
-    let mut out = Vec::new();
-    for boundary in boundaries {
-        let here: Vec<u32> = boundary
-            .facets
-            .iter()
-            .filter_map(|f| facet_ids.binary_search(f).ok())
-            .map(|local| local as u32)
-            .collect();
-        out.push(here.len() as u32);
-        out.extend(here);
-    }
-    out
 }
 
 /// Names one a line: the regions, an empty line, the boundaries.
-fn encode_names<const D: usize>(mesh: &GlobalMesh<D>) -> String {
-    let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
-    format!("{}\n\n{}", mesh.regions.join("\n"), boundaries.join("\n"))
+fn encode(names: &Names) -> String {
+    format!("{}\n\n{}", names.regions.join("\n"), names.boundaries.join("\n"))
 }
 
-fn decode_names<const D: usize>(names: &str, mesh: &mut Mesh<D>) -> Result<()> {
+fn decode(text: &str) -> Result<Names> {
     let (regions, boundaries) =
-        names.split_once("\n\n").ok_or_else(|| Error::Internal("the mesh's names arrived garbled".into()))?;
-    mesh.regions = regions.lines().map(str::to_owned).collect();
-    for (boundary, name) in mesh.boundaries.iter_mut().zip(boundaries.lines()) {
-        name.clone_into(&mut boundary.name);
-    }
-    Ok(())
-}
-
-impl<const D: usize> GlobalMesh<D> {
-    /// Digest of nodes, cells, regions and boundaries.
-    pub fn digest(&self) -> u64 {
-        let mut hasher = xxhash_rust::xxh3::Xxh3::new();
-        self.nodes.iter().flatten().for_each(|x| hasher.update(&x.to_le_bytes()));
-        self.cells.iter().for_each(|n| hasher.update(&n.to_le_bytes()));
-        self.cell_regions.iter().for_each(|r| hasher.update(&r.to_le_bytes()));
-        for boundary in &self.boundaries {
-            hasher.update(boundary.name.as_bytes());
-            boundary.facets.iter().for_each(|f| hasher.update(&f.to_le_bytes()));
-        }
-        hasher.digest()
-    }
+        text.split_once("\n\n").ok_or_else(|| Error::Internal("the mesh's names arrived garbled".into()))?;
+    let list = |text: &str| text.lines().map(str::to_owned).collect();
+    Ok(Names { regions: list(regions), boundaries: list(boundaries) })
 }

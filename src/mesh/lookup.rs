@@ -2,7 +2,7 @@
 
 use super::shape::centroid;
 use super::tags::place;
-use super::{Boundary, GlobalMesh};
+use super::{Boundary, GlobalMesh, Mesh};
 use crate::error::{Error, Result};
 
 impl<const D: usize> GlobalMesh<D> {
@@ -21,35 +21,47 @@ impl<const D: usize> GlobalMesh<D> {
             .map(|at| at as u16)
             .ok_or_else(|| unknown("region", name, self.regions.iter().map(String::as_str)))
     }
+}
 
-    /// Refuses a facet that belongs to a boundary with a support and to one with contact: its motion would be
-    /// prescribed and unknown at once.
-    pub fn claimed_twice(&self, supports: &[&str], contacts: &[&str]) -> Result<()> {
+/// Facets of this rank that belong to a boundary with a support and to one with contact: their motion would be prescribed
+/// and unknown at once.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Claims {
+    /// Who claims the first of them, and where.
+    pub first: String,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl<const D: usize> Mesh<D> {
+    /// What these supports and contacts both claim, as far as it is here.
+    pub fn claimed_twice(&self, supports: &[&str], contacts: &[&str]) -> Claims {
+        let facets = |name: &str| self.boundary(name).map_or(&[][..], |boundary| &boundary.facets);
         let mut supported_by = vec![None; self.facets.len()];
         for &name in supports {
-            for &facet in &self.boundary(name)?.facets {
+            for &facet in facets(name) {
                 supported_by[facet as usize].get_or_insert(name);
             }
         }
+        let mut claims = Claims::default();
         for &contact in contacts {
-            let facets = &self.boundary(contact)?.facets;
-            let mut claimed =
-                facets.iter().filter_map(|&facet| supported_by[facet as usize].map(|name| (facet, name)));
-            if let Some((facet, support)) = claimed.next() {
-                let names = if support == contact {
-                    format!("a support and a contact both claim the boundary `{contact}`")
-                } else {
-                    format!("the support on `{support}` and the contact on `{contact}` both claim a facet")
-                };
-                let others = claimed.count();
-                return Err(Error::Refused(format!(
-                    "{names}: around {}{}. Give each facet to one of them",
-                    place(&centroid(&self.facet_corners(facet as usize))),
-                    if others > 0 { format!(" and at {others} more facets") } else { String::new() },
-                )));
+            for &facet in facets(contact) {
+                let Some(support) = supported_by[facet as usize] else { continue };
+                if claims.count == 0 {
+                    let corners = self.facets[facet as usize].map(|node| self.nodes[node as usize]);
+                    let names = if support == contact {
+                        format!("a support and a contact both claim the boundary `{contact}`")
+                    } else {
+                        format!(
+                            "the support on `{support}` and the contact on `{contact}` both claim a facet"
+                        )
+                    };
+                    claims.first = format!("{names}: around {}", place(&centroid(&corners)));
+                }
+                claims.count += 1;
             }
         }
-        Ok(())
+        claims
     }
 }
 
@@ -75,6 +87,7 @@ fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::mesh::generate::{Diagonal, rectangle};
 
     #[test]
@@ -99,19 +112,18 @@ mod tests {
     }
 
     #[test]
-    fn a_facet_with_support_and_contact_is_refused_with_both_names() {
-        let mut mesh = rectangle([2.0, 1.0], [2, 1], Diagonal::Right, [1.0; 2]).unwrap();
-        mesh.claimed_twice(&["left", "top"], &["bottom", "right"]).unwrap();
-        let error = mesh.claimed_twice(&["left", "bottom"], &["bottom"]).unwrap_err().to_string();
-        assert!(
-            error.contains("both claim the boundary `bottom`: around (0.5, 0) and at 1 more facets"),
-            "{error}"
-        );
+    fn facets_with_support_and_contact_are_found_with_both_names() {
+        let whole = rectangle([2.0, 1.0], [2, 1], Diagonal::Right, [1.0; 2]).unwrap();
+        let GlobalMesh { nodes, facets, boundaries, .. } = whole;
+        let mut mesh = Mesh { nodes, facets, boundaries, ..Mesh::default() };
+        assert_eq!(mesh.claimed_twice(&["left", "top"], &["bottom", "right"]), Claims::default());
+        let claims = mesh.claimed_twice(&["left", "bottom"], &["bottom"]);
+        assert_eq!(claims.first, "a support and a contact both claim the boundary `bottom`: around (0.5, 0)");
+        assert_eq!(claims.count, 2);
         let shared = mesh.boundaries[2].facets[1];
         mesh.boundaries[0].facets.push(shared);
-        let error = mesh.claimed_twice(&["left"], &["bottom"]).unwrap_err().to_string();
-        assert!(error.contains("support on `left` and the contact on `bottom`"), "{error}");
-        assert!(error.contains("around (1.5, 0)."), "{error}");
-        assert!(mesh.claimed_twice(&["letf"], &[]).unwrap_err().to_string().contains("`left`"));
+        let claims = mesh.claimed_twice(&["left"], &["bottom"]);
+        assert!(claims.first.contains("support on `left` and the contact on `bottom`"), "{claims:?}");
+        assert!(claims.first.ends_with("around (1.5, 0)") && claims.count == 1, "{claims:?}");
     }
 }

@@ -1,19 +1,23 @@
 //! Simplicial meshes with named boundaries and regions.
 
+mod bodies;
 pub mod check;
+mod digest;
 mod distributed;
 pub mod generate;
 pub mod gmsh;
 mod hanging;
 mod lookup;
 pub mod partition;
+pub mod piece;
 pub mod rigid;
 pub mod shape;
+mod skeleton;
 pub mod surface;
 mod tags;
 pub mod tree;
 
-pub use distributed::{Mesh, distribute};
+pub use distributed::{Mesh, Names, distribute};
 pub use tags::Tags;
 
 use crate::tensor::Vector;
@@ -37,6 +41,14 @@ pub struct GlobalMesh<const D: usize> {
     pub facet_cells: Vec<u32>,
     /// Named parts of the surface.
     pub boundaries: Vec<Boundary>,
+}
+
+impl<const D: usize> GlobalMesh<D> {
+    /// Names of regions and boundaries.
+    pub fn names(&self) -> Names {
+        let boundaries = self.boundaries.iter().map(|boundary| boundary.name.clone()).collect();
+        Names { regions: self.regions.clone(), boundaries }
+    }
 }
 
 /// A named part of the surface.

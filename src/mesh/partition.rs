@@ -16,16 +16,31 @@ pub struct Partition {
     pub imbalance: f64,
 }
 
-/// Splits the mesh into `ranks` parts of near equal cell count with few facets between parts: METIS k-way on the dual
-/// graph with a fixed seed, so that equal meshes give equal parts.
-pub fn partition<const D: usize>(mesh: &GlobalMesh<D>, dual: &DualGraph, ranks: usize) -> Result<Partition> {
+/// How METIS splits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Into all parts at once.
+    KWay,
+    /// In two again and again: consecutive parts lie side by side, so that several of them are a good part, too.
+    Recursive,
+}
+
+/// Splits the mesh into `ranks` parts of near equal cell count with few facets between parts: METIS on the dual graph
+/// with a fixed seed, so that equal meshes give equal parts.
+pub fn partition<const D: usize>(
+    mesh: &GlobalMesh<D>,
+    dual: &DualGraph,
+    ranks: usize,
+    method: Method,
+) -> Result<Partition> {
     let cells = mesh.cell_count();
     if cells < ranks {
         return Err(Error::Refused(format!(
-            "the mesh has {cells} cells, fewer than the {ranks} ranks: run on at most {cells} ranks or refine the mesh"
+            "the mesh has {cells} cells, fewer than the {ranks} ranks or parts it is split for: take at most {cells}, or refine \
+             the mesh"
         )));
     }
-    let mut cell_ranks = if ranks == 1 { vec![0; cells] } else { k_way(dual, cells, ranks)? };
+    let mut cell_ranks = if ranks == 1 { vec![0; cells] } else { split(dual, cells, ranks, method)? };
     fill_empty_parts(&mut cell_ranks, ranks);
     let mut sizes = vec![0usize; ranks];
     for &rank in &cell_ranks {
@@ -40,15 +55,18 @@ pub fn partition<const D: usize>(mesh: &GlobalMesh<D>, dual: &DualGraph, ranks: 
     })
 }
 
-fn k_way(dual: &DualGraph, cells: usize, ranks: usize) -> Result<Vec<u32>> {
+fn split(dual: &DualGraph, cells: usize, ranks: usize, method: Method) -> Result<Vec<u32>> {
     let refuse = |e: &dyn std::fmt::Display| Error::Internal(format!("METIS cannot partition the mesh: {e}"));
     let parts = i32::try_from(ranks).map_err(|e| refuse(&e))?;
     let mut part = vec![0i32; cells];
-    metis::Graph::new(1, parts, &dual.offsets, &dual.adjacency)
+    let graph = metis::Graph::new(1, parts, &dual.offsets, &dual.adjacency)
         .map_err(|e| refuse(&e))?
-        .set_option(metis::option::Seed(1))
-        .part_kway(&mut part)
-        .map_err(|e| refuse(&e))?;
+        .set_option(metis::option::Seed(1));
+    match method {
+        Method::KWay => graph.part_kway(&mut part),
+        Method::Recursive => graph.part_recursive(&mut part),
+    }
+    .map_err(|e| refuse(&e))?;
     Ok(part.into_iter().map(i32::cast_unsigned).collect())
 }
 
@@ -118,7 +136,7 @@ mod tests {
     fn parts_are_balanced_and_every_rank_has_cells() {
         let (mesh, dual) = square(16);
         for ranks in [1, 2, 3, 4, 7] {
-            let parts = partition(&mesh, &dual, ranks).unwrap();
+            let parts = partition(&mesh, &dual, ranks, Method::KWay).unwrap();
             assert!(parts.imbalance < 1.1, "{ranks} ranks: {}", parts.imbalance);
             assert!((0..ranks).all(|r| parts.cell_ranks.contains(&(r as u32))));
             assert_eq!(parts.edge_cut == 0, ranks == 1);
@@ -126,9 +144,18 @@ mod tests {
     }
 
     #[test]
+    fn consecutive_parts_of_a_recursive_split_lie_side_by_side() {
+        let (mesh, dual) = square(32);
+        let parts = partition(&mesh, &dual, 16, Method::Recursive).unwrap();
+        let four: Vec<u32> = parts.cell_ranks.iter().map(|part| part / 4).collect();
+        let direct = partition(&mesh, &dual, 4, Method::Recursive).unwrap();
+        assert!(edge_cut(&dual, &four) <= 2 * direct.edge_cut);
+    }
+
+    #[test]
     fn as_many_ranks_as_cells_get_one_cell_each() {
         let (mesh, dual) = square(2);
-        let mut ranks = partition(&mesh, &dual, 8).unwrap().cell_ranks;
+        let mut ranks = partition(&mesh, &dual, 8, Method::KWay).unwrap().cell_ranks;
         ranks.sort_unstable();
         assert_eq!(ranks, (0..8).collect::<Vec<_>>());
     }
@@ -136,14 +163,14 @@ mod tests {
     #[test]
     fn more_ranks_than_cells_are_refused() {
         let (mesh, dual) = square(1);
-        let words = partition(&mesh, &dual, 3).unwrap_err().to_string();
+        let words = partition(&mesh, &dual, 3, Method::KWay).unwrap_err().to_string();
         assert!(words.contains("2 cells") && words.contains("3 ranks"), "{words}");
     }
 
     #[test]
     fn nodes_belong_to_a_rank_of_a_cell_around_them() {
         let (mesh, dual) = square(8);
-        let parts = partition(&mesh, &dual, 4).unwrap();
+        let parts = partition(&mesh, &dual, 4, Method::KWay).unwrap();
         for node in 0..mesh.nodes.len() {
             let around = (0..mesh.cell_count())
                 .filter(|&c| mesh.cell(c).contains(&(node as u32)))

@@ -1,93 +1,89 @@
 //! Rigid motions that the supports leave free.
 
-use super::GlobalMesh;
-use super::surface::Bodies;
+use super::Mesh;
+use super::skeleton::skeleton;
 use super::tags::place;
+use crate::error::Result;
+use crate::session::Session;
 use crate::tensor::{Vector, add_scaled, dot, norm};
 
 /// A rigid motion: translation, then rotation about x, y, z through the body's centre, lengths in units of its radius.
-type Motion = [f64; 6];
+pub(super) type Motion = [f64; 6];
 
 /// A unit row that adds less than this to the span of the others adds nothing.
 const INDEPENDENT: f64 = 1e-9;
 
-/// The rigid motions each body can still do when `fixed` components of its nodes are held, in words: one text for
-/// each body that can move, none when every body is held.
+/// The rigid motions each body can still do when `held` components of its nodes are held, in words: one text for
+/// each body that can move, none when every body is held. Collective, with the same words on all ranks.
 ///
-/// A node component fixed at `x` is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
+/// A node component held at `x` is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
 /// A body that touches a held body in single nodes is held there.
 pub fn free_motions<const D: usize>(
-    mesh: &GlobalMesh<D>,
-    bodies: &Bodies,
-    fixed: &dyn Fn(usize) -> [bool; D],
-) -> Vec<String> {
-    let mut held: Vec<[bool; D]> = (0..mesh.nodes.len()).map(fixed).collect();
-    let mut loose: Vec<Body<D>> = collect(mesh, bodies);
-    loop {
-        let before = loose.len();
-        loose.retain(|body| {
-            let free = !body.free(mesh, &held).is_empty();
-            if !free {
-                body.nodes.iter().for_each(|&node| held[node as usize] = [true; D]);
-            }
-            free
-        });
-        if loose.len() == before {
-            break;
-        }
-    }
-    loose
-        .iter()
-        .map(|body| {
-            let motions = body.in_words(&body.free(mesh, &held));
-            format!("body {} (around {}): {}", body.number, place(&body.centre), motions.join(", "))
-        })
-        .collect()
+    session: &Session,
+    mesh: &Mesh<D>,
+    held: &[[bool; D]],
+) -> Result<Vec<String>> {
+    Ok(skeleton(session, mesh, held)?.free_motions())
 }
 
-struct Body<const D: usize> {
-    number: usize,
-    nodes: Vec<u32>,
-    centre: Vector<D>,
-    radius: f64,
+/// What the bodies of a mesh are held by: points, some of them shared by bodies.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Skeleton<const D: usize> {
+    /// Coordinates in m.
+    pub points: Vec<Vector<D>>,
+    /// Components held there.
+    pub held: Vec<[bool; D]>,
+    /// The bodies, by number.
+    pub bodies: Vec<Body<D>>,
 }
 
-fn collect<const D: usize>(mesh: &GlobalMesh<D>, bodies: &Bodies) -> Vec<Body<D>> {
-    let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); bodies.count];
-    let mut order: Vec<u32> = (0..mesh.cell_count() as u32).collect();
-    order.sort_by_key(|&cell| bodies.of_cell[cell as usize]);
-    let mut last_body = vec![u32::MAX; mesh.nodes.len()];
-    for cell in order {
-        let body = bodies.of_cell[cell as usize];
-        for &node in mesh.cell(cell as usize) {
-            if std::mem::replace(&mut last_body[node as usize], body) != body {
-                nodes[body as usize].push(node);
+/// A body as far as its rigid motions go.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Body<const D: usize> {
+    /// The points at which it is held, or touches another body.
+    pub points: Vec<usize>,
+    /// Its middle, in m.
+    pub centre: Vector<D>,
+    /// How far it reaches from there, in m.
+    pub radius: f64,
+}
+
+impl<const D: usize> Skeleton<D> {
+    fn free_motions(mut self) -> Vec<String> {
+        let mut loose: Vec<usize> = (0..self.bodies.len()).collect();
+        loop {
+            let before = loose.len();
+            loose.retain(|&number| {
+                let body = &self.bodies[number];
+                let free = !body.free(&self.points, &self.held).is_empty();
+                if !free {
+                    body.points.iter().for_each(|&point| self.held[point] = [true; D]);
+                }
+                free
+            });
+            if loose.len() == before {
+                break;
             }
         }
+        let words = |&number: &usize| {
+            let body = &self.bodies[number];
+            let motions = body.in_words(&body.free(&self.points, &self.held));
+            format!("body {} (around {}): {}", number + 1, place(&body.centre), motions.join(", "))
+        };
+        loose.iter().map(words).collect()
     }
-    let describe = |(number, nodes): (usize, Vec<u32>)| {
-        let share = 1.0 / nodes.len() as f64;
-        let place = |node: &u32| &mesh.nodes[*node as usize];
-        let centre = nodes.iter().fold([0.0; D], |sum, node| add_scaled(&sum, share, place(node)));
-        let distance = |node: &u32| norm(&add_scaled(place(node), -1.0, &centre));
-        let radius = nodes.iter().map(distance).fold(f64::MIN_POSITIVE, f64::max);
-        Body { number: number + 1, nodes, centre, radius }
-    };
-    nodes.into_iter().enumerate().map(describe).collect()
 }
 
 impl<const D: usize> Body<D> {
     /// An orthonormal basis of the free motions.
-    fn free(&self, mesh: &GlobalMesh<D>, held: &[[bool; D]]) -> Vec<Motion> {
+    fn free(&self, points: &[Vector<D>], held: &[[bool; D]]) -> Vec<Motion> {
         let rows = || {
-            self.nodes.iter().flat_map(|&node| {
-                let from_centre = add_scaled(&mesh.nodes[node as usize], -1.0, &self.centre);
-                let components = (0..D).filter(move |&component| held[node as usize][component]);
-                components.map(move |component| self.row(component, &from_centre))
+            self.points.iter().flat_map(|&point| {
+                let components = (0..D).filter(move |&component| held[point][component]);
+                components.map(move |component| self.row(component, &points[point]))
             })
         };
-        // In the plane, motion along z and rotations about x and y do not exist.
-        let mut constrained: Vec<Motion> = if D == 2 { [2, 3, 4].map(unit).to_vec() } else { Vec::new() };
+        let mut constrained = absent::<D>();
         extend(&mut constrained, rows);
         let held_count = constrained.len();
         extend(&mut constrained, || (0..6).map(unit));
@@ -95,7 +91,8 @@ impl<const D: usize> Body<D> {
     }
 
     /// The displacement component of a unit motion at a point.
-    fn row(&self, component: usize, from_centre: &Vector<D>) -> Motion {
+    pub fn row(&self, component: usize, point: &Vector<D>) -> Motion {
+        let from_centre = add_scaled(point, -1.0, &self.centre);
         let mut at = [0.0; 3];
         for i in 0..D {
             at[i] = from_centre[i] / self.radius;
@@ -144,6 +141,11 @@ impl<const D: usize> Body<D> {
     }
 }
 
+/// In the plane, motion along z and rotations about x and y do not exist.
+pub(super) fn absent<const D: usize>() -> Vec<Motion> {
+    if D == 2 { [2, 3, 4].map(unit).to_vec() } else { Vec::new() }
+}
+
 fn unit(axis: usize) -> Motion {
     std::array::from_fn(|i| (i == axis) as u8 as f64)
 }
@@ -152,20 +154,29 @@ fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Extends an orthonormal basis by the span of rows, the most independent row first.
-fn extend<I: Iterator<Item = Motion>>(basis: &mut Vec<Motion>, rows: impl Fn() -> I) {
+/// Extends an orthonormal basis by the span of rows, the most independent row first; gives the positions of the rows taken.
+pub(super) fn extend<I: Iterator<Item = Motion>>(
+    basis: &mut Vec<Motion>,
+    rows: impl Fn() -> I,
+) -> Vec<usize> {
+    let mut taken = Vec::new();
     while basis.len() < 6 {
         let rest = |row: Motion| basis.iter().fold(row, |row, b| add_scaled(&row, -dot(&row, b), b));
-        let Some(best) = rows().map(rest).max_by(|a, b| norm(a).total_cmp(&norm(b))) else { return };
+        let candidates = rows().map(rest).enumerate();
+        let Some((position, best)) = candidates.max_by(|a, b| norm(&a.1).total_cmp(&norm(&b.1))) else {
+            break;
+        };
         let length = norm(&best);
         if length <= INDEPENDENT {
-            return;
+            break;
         }
         // Once more, so that rounding in a small rest does not spoil orthogonality.
         let again = rest(best.map(|x| x / length));
         let length = norm(&again);
         basis.push(again.map(|x| x / length));
+        taken.push(position);
     }
+    taken
 }
 
 /// The motions combined so that each turns about one axis where that is possible; those that don't turn are left out.
@@ -198,13 +209,32 @@ fn reduced(mut motions: Vec<Motion>) -> Vec<Motion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::GlobalMesh;
     use crate::mesh::Tags;
     use crate::mesh::generate::{Diagonal, box_mesh, rectangle};
     use crate::mesh::surface::Topology;
 
-    fn free<const D: usize>(mesh: &GlobalMesh<D>, fixed: impl Fn(Vector<D>) -> [bool; D]) -> Vec<String> {
+    /// All nodes of a mesh as points, some of whose components are held.
+    fn free<const D: usize>(mesh: &GlobalMesh<D>, held: impl Fn(Vector<D>) -> [bool; D]) -> Vec<String> {
         let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default()).unwrap();
-        free_motions(mesh, &topology.bodies(), &|node| fixed(mesh.nodes[node]))
+        let bodies = topology.bodies();
+        let body = |number: u32| {
+            let cells = (0..mesh.cell_count()).filter(|&cell| bodies.of_cell[cell] == number);
+            let mut points: Vec<usize> = cells.flat_map(|c| mesh.cell(c)).map(|&n| n as usize).collect();
+            points.sort_unstable();
+            points.dedup();
+            let share = 1.0 / points.len() as f64;
+            let centre = points.iter().fold([0.0; D], |sum, &p| add_scaled(&sum, share, &mesh.nodes[p]));
+            let distance = |&p: &usize| norm(&add_scaled(&mesh.nodes[p], -1.0, &centre));
+            let radius = points.iter().map(distance).fold(0.0, f64::max);
+            Body { points, centre, radius }
+        };
+        let skeleton = Skeleton {
+            points: mesh.nodes.clone(),
+            held: mesh.nodes.iter().map(|&point| held(point)).collect(),
+            bodies: (0..bodies.count as u32).map(body).collect(),
+        };
+        skeleton.free_motions()
     }
 
     fn plate() -> GlobalMesh<2> {

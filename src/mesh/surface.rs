@@ -87,10 +87,15 @@ impl<const D: usize> Topology<D> {
         Ok(Self { neighbours })
     }
 
+    /// How many facets of cells have no cell on their other side.
+    pub fn facets_without_neighbour(&self) -> usize {
+        self.neighbours.iter().filter(|&&neighbour| neighbour == OUTSIDE).count()
+    }
+
     /// The facets on the outer surface, outward, and the cell behind each; in the order of the cells.
     pub fn outer_facets(&self, cells: &[u32]) -> (Vec<[u32; D]>, Vec<u32>) {
         let outside = |place: &usize| self.neighbours[*place] == OUTSIDE;
-        let count = (0..self.neighbours.len()).filter(outside).count();
+        let count = self.facets_without_neighbour();
         let (mut facets, mut behind) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for place in (0..self.neighbours.len()).filter(outside) {
             let (cell, opposite) = (place / (D + 1), place % (D + 1));

@@ -84,7 +84,7 @@ fn write_part(
     let written = write_content(&file, communicator, header, sets, tables);
     let closed = file.close();
     written.and(closed)?;
-    seal::seal(part, communicator)
+    seal::seal(part, seal::CHECKPOINT, communicator)
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -158,7 +158,7 @@ pub struct Checkpoint {
 impl Checkpoint {
     /// Checks that the file is whole, opens it and reads the header. Collective, with the same outcome on all ranks.
     pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self> {
-        seal::verify(path, communicator)?;
+        seal::verify(path, seal::CHECKPOINT, communicator)?;
         let communicator = communicator.duplicate();
         let file = ParallelFile::open_readonly(path, &communicator)?;
         let rows = file.rows::<u8>("header")?;

@@ -1,6 +1,6 @@
 //! What is in a checkpoint or a field file, in words; in one process, without MPI.
 
-use super::seal::{FORMAT_VERSION, is_sealed, verify_alone};
+use super::seal::{CHECKPOINT, is_sealed, verify_alone};
 use crate::error::{Error, Result};
 use hdf5::types::FixedAscii;
 use std::fmt::Write;
@@ -9,9 +9,9 @@ use std::path::Path;
 /// Describes the file: of a checkpoint its header and tables, of a field file mesh, times and fields. A checkpoint that is
 /// not whole is refused with the reason.
 pub fn inspect(path: &Path) -> Result<String> {
-    let sealed = is_sealed(path);
+    let sealed = is_sealed(path, CHECKPOINT);
     if sealed {
-        verify_alone(path)?;
+        verify_alone(path, CHECKPOINT)?;
     }
     let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
     let refused = |words: &str| Error::Refused(format!("{}: {words}", path.display()));
@@ -39,7 +39,7 @@ fn describe_checkpoint(file: &hdf5::File) -> hdf5::Result<String> {
         Err(_) => String::from_utf8_lossy(&header).into_owned(),
     };
     let mut text =
-        format!("checkpoint of format {FORMAT_VERSION}, every byte as written\n\nheader:\n{header}\n");
+        format!("checkpoint of format {}, every byte as written\n\nheader:\n{header}\n", CHECKPOINT.version);
     for set in file.group("ids")?.member_names()? {
         let rows = file.dataset(&format!("ids/{set}"))?.size();
         line(&mut text, format!("\n{set}: {rows} rows"));

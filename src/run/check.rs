@@ -1,7 +1,7 @@
 //! Everything but the run: what a job would simulate, on which mesh, how and at what cost.
 
 use super::{
-    Inventory, Scene, build,
+    Inventory, build,
     estimate::Estimate,
     header,
     setup::{Setup, setup},
@@ -13,13 +13,13 @@ use crate::{
     certificate::Certificates,
     error::{Error, Result},
     job::{Job, Loaded},
-    mesh::check::Quality,
+    mesh::{Mesh, check::Quality},
     session::Session,
     state::State,
 };
 use serde::Serialize;
 
-/// What a job would be; on rank 0 complete, with warnings and the quality of the mesh.
+/// What a job would be.
 ///
 /// The fields are the object that `solver check --json` prints; their names are part of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -69,10 +69,10 @@ struct CellQuality {
 pub(super) fn check<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
-    scene: Option<Scene<D>>,
+    mesh: Mesh<D>,
 ) -> Result<Report> {
-    let quality = scene.as_ref().map(|s| s.mesh.quality_summary());
-    let ready = setup::<D, S>(session, loaded, scene)?;
+    let quality = mesh.quality_summary(session);
+    let ready = setup::<D, S>(session, loaded, mesh)?;
     session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
     report(session, loaded, &ready, quality)
 }
@@ -87,12 +87,12 @@ fn try_loads<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>, state
     tried.into_iter().collect::<Result<()>>().map_err(|error| Error::Refused(error.to_string()))
 }
 
-/// Collective; cell quality is known on rank 0 only.
+/// Collective.
 fn report<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     ready: &Setup<D, S>,
-    quality: Option<Quality>,
+    quality: Quality,
 ) -> Result<Report> {
     let (job, body, scheme) = (&loaded.job, &ready.body, &ready.scheme);
     let mesh = &body.mesh;
@@ -100,7 +100,6 @@ fn report<const D: usize, const S: usize>(
     let steps = steps_between(0.0, job.time.end, longest);
     let inventory = Inventory::of(session, body, scheme);
     let preconditioner = scheme.preconditioner();
-    let quality = quality.unwrap_or(Quality { smallest: 1.0, worst_cell: 0, poor: 0 });
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,
@@ -178,11 +177,14 @@ impl Report {
             .filter(|(_, bytes)| *bytes > 0)
             .map(|(name, bytes)| format!("{name} {}", size(*bytes)))
             .collect();
+        let whole = match memory.whole_mesh_at_start {
+            0 => String::new(),
+            bytes => format!("; rank 0 holds the whole mesh at first, {}", size(bytes)),
+        };
         lines.push(format!(
-            "memory     about {} over all ranks ({}); rank 0 holds the whole mesh at first, {}",
+            "memory     about {} over all ranks ({}){whole}",
             size(memory.total),
-            parts.join(", "),
-            size(memory.whole_mesh_at_start)
+            parts.join(", ")
         ));
         let seconds = &self.estimate.seconds;
         lines.push(format!(

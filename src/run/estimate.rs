@@ -39,7 +39,7 @@ pub struct MemoryEstimate {
     pub preconditioner: u64,
     /// All of these.
     pub total: u64,
-    /// The whole mesh on rank 0, before it is handed out; gone afterwards.
+    /// The whole mesh on rank 0, before it is handed out; gone afterwards. 0 where ranks make or read their own parts.
     pub whole_mesh_at_start: u64,
 }
 
@@ -100,7 +100,7 @@ impl Estimate {
                 vectors: vectors as u64,
                 preconditioner: preconditioner as u64,
                 total: total as u64,
-                whole_mesh_at_start: whole as u64,
+                whole_mesh_at_start: if mesh.handed_out { whole as u64 } else { 0 },
             },
             seconds: TimeEstimate { set_up, step, run: set_up + step * steps as f64 },
         }

@@ -40,6 +40,10 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
         );
     }
     let mut differing = differing_keys(&there.physics()?, &job.physics()?);
+    let file_name = |job: &Job| job.mesh_file().and_then(Path::file_name).map(std::ffi::OsStr::to_owned);
+    if file_name(&there) != file_name(job) && !goes_on {
+        differing.insert(0, "mesh.file".into());
+    }
     if there.about != job.about && !goes_on {
         differing.insert(0, "about".into());
     }

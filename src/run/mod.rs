@@ -6,6 +6,7 @@ mod deadline;
 mod estimate;
 mod folder;
 mod header;
+mod hold;
 mod inventory;
 mod outputs;
 mod phases;
@@ -20,18 +21,15 @@ mod time_loop;
 pub use build::{friction_law, normal_law};
 pub use check::Report;
 pub use inventory::Inventory;
-pub use scene::{Scene, whole_mesh};
 pub use simulation::Simulation;
 pub use summary::Summary;
 
 use crate::{
-    error::{Error, Exit, Result},
+    error::{Exit, Result},
     job::{self, Loaded},
     session::Session,
 };
-use mpi::topology::Communicator;
-use mpi::traits::Root;
-use scene::AnyScene;
+use scene::Scene;
 use std::{
     path::PathBuf,
     time::{Duration, Instant},
@@ -75,14 +73,12 @@ pub struct Clock {
 macro_rules! on_the_mesh {
     ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{
         let mut loaded = $loaded;
-        let scene = $session.agree(AnyScene::of($session, &mut loaded))?;
-        match (dimension($session, &scene), loaded.job.material.hypothesis) {
-            (2, Some(job::Hypothesis::PlaneStrain)) => {
-                $module::$function::<2, 4>($session, &loaded, scene.and_then(AnyScene::two) $(, $more)*)
+        match (Scene::of($session, &mut loaded)?, loaded.job.material.hypothesis) {
+            (Scene::Two(mesh), Some(job::Hypothesis::PlaneStrain)) => {
+                $module::$function::<2, 4>($session, &loaded, mesh $(, $more)*)
             }
-            (2, _) => $module::$function::<2, 3>($session, &loaded, scene.and_then(AnyScene::two) $(, $more)*),
-            (3, _) => $module::$function::<3, 6>($session, &loaded, scene.and_then(AnyScene::three) $(, $more)*),
-            (other, _) => Err(Error::Internal(format!("a mesh of dimension {other}"))),
+            (Scene::Two(mesh), _) => $module::$function::<2, 3>($session, &loaded, mesh $(, $more)*),
+            (Scene::Three(mesh), _) => $module::$function::<3, 6>($session, &loaded, mesh $(, $more)*),
         }
     }};
 }
@@ -95,15 +91,4 @@ pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Re
 /// Everything but the run: sets a job up as a run does and tells what it would be; writes no file. Collective.
 pub fn check(session: &Session, loaded: Loaded) -> Result<Report> {
     on_the_mesh!(session, loaded, check::check)
-}
-
-/// The dimension of the mesh, which rank 0 knows. Collective.
-fn dimension(session: &Session, scene: &Option<AnyScene>) -> usize {
-    let mut dimension = match scene {
-        Some(AnyScene::Two(_)) => 2,
-        Some(AnyScene::Three(_)) => 3,
-        None => 0,
-    };
-    session.world().process_at_rank(0).broadcast_into(&mut dimension);
-    dimension
 }

@@ -1,80 +1,118 @@
-//! The whole mesh of a job, held against the job, and its partition: on rank 0 only.
+//! Each rank's part of a job's mesh, from wherever the job takes it.
 
+use super::hold::hold;
 use crate::{
     error::Result,
-    job::{self, Fix, Job, Loaded, Material, MeshNames, Named},
+    job::{self, Loaded, Partition},
     mesh::{
-        GlobalMesh, Tags,
-        generate::{Diagonal, Grading, Toward, box_mesh, rectangle},
+        GlobalMesh, Mesh, Tags, distribute,
+        generate::{Cuboid, Diagonal, Grading, Grid, Rectangle, Toward},
         gmsh::{self, AnyMesh},
-        partition::{Partition, partition},
-        rigid::free_motions,
+        partition::{Method, partition},
         surface::Topology,
     },
+    partitioned::{self, PartitionedFile},
     session::Session,
 };
+use mpi::{topology::Communicator, traits::Root};
+use std::path::Path;
 
-/// A mesh with its partition.
-pub struct Scene<const D: usize> {
-    /// The mesh.
-    pub mesh: GlobalMesh<D>,
-    /// Which rank gets what.
-    pub partition: Partition,
+/// Generated meshes of more cells than this are made in parts, each by its rank.
+const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
+
+/// This rank's part of a mesh of either dimension.
+pub(super) enum Scene {
+    Two(Mesh<2>),
+    Three(Mesh<3>),
 }
 
-/// A scene of either dimension.
-pub(super) enum AnyScene {
-    Two(Scene<2>),
-    Three(Scene<3>),
-}
-
-impl AnyScene {
-    /// The scene on rank 0, nothing elsewhere; the job's warnings grow by those of the mesh.
-    pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Option<Self>> {
-        if !session.is_first() {
-            return Ok(None);
+impl Scene {
+    /// The mesh of a job, held against it; the job's warnings grow by those of the mesh. Collective.
+    pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self> {
+        let scene = match &loaded.job.mesh {
+            job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
+            job::Mesh::Box(of) => generated(session, cuboid(of), of.partition).map(Self::Three)?,
+            job::Mesh::File(path) => from_file(session, path)?,
+        };
+        match &scene {
+            Self::Two(mesh) => hold(session, mesh, loaded)?,
+            Self::Three(mesh) => hold(session, mesh, loaded)?,
         }
-        Ok(Some(match whole_mesh(&loaded.job)? {
-            AnyMesh::Two(mesh) => Self::Two(scene(mesh, loaded, session.ranks())?),
-            AnyMesh::Three(mesh) => Self::Three(scene(mesh, loaded, session.ranks())?),
-        }))
-    }
-
-    pub fn two(self) -> Option<Scene<2>> {
-        if let Self::Two(scene) = self { Some(scene) } else { None }
-    }
-
-    pub fn three(self) -> Option<Scene<3>> {
-        if let Self::Three(scene) = self { Some(scene) } else { None }
+        Ok(scene)
     }
 }
 
-/// Generates or reads the mesh of a job.
-pub fn whole_mesh(job: &Job) -> Result<AnyMesh> {
-    match &job.mesh {
-        job::Mesh::Rectangle(r) => {
-            let diagonal = match r.diagonal {
-                job::Diagonal::Right => Diagonal::Right,
-                job::Diagonal::Left => Diagonal::Left,
-                job::Diagonal::Alternating => Diagonal::Alternating,
-                job::Diagonal::Crossed => Diagonal::Crossed,
-            };
-            let cells = r.cells.map(|n| n as usize);
-            let grading = |power, low, high| grading(power, &r.grading.toward, low, high);
-            let gradings = [grading(r.grading.x, "left", "right"), grading(r.grading.y, "bottom", "top")];
-            rectangle(r.size, cells, diagonal, gradings).map(AnyMesh::Two)
-        }
-        job::Mesh::Box(b) => {
-            let grading = |power, low, high| grading(power, &b.grading.toward, low, high);
-            let gradings = [
-                grading(b.grading.x, "left", "right"),
-                grading(b.grading.y, "front", "back"),
-                grading(b.grading.z, "bottom", "top"),
-            ];
-            box_mesh(b.size, b.cells.map(|n| n as usize), gradings).map(AnyMesh::Three)
-        }
-        job::Mesh::File(path) => gmsh::read(path),
+/// Splits a mesh that is whole on rank 0 (`None` elsewhere) and hands the parts out. Collective.
+pub(super) fn split<const D: usize>(session: &Session, whole: Option<GlobalMesh<D>>) -> Result<Mesh<D>> {
+    let split = |mesh: GlobalMesh<D>| {
+        let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
+        let dual = topology.dual_graph();
+        drop(topology);
+        let parts = partition(&mesh, &dual, session.ranks(), Method::KWay)?;
+        Ok((mesh, parts))
+    };
+    distribute(session, session.agree(whole.map(split).transpose())?)
+}
+
+fn generated<const D: usize, G: Grid<D>>(
+    session: &Session,
+    grid: Result<G>,
+    partition: Partition,
+) -> Result<Mesh<D>> {
+    let grid = session.agree(grid)?;
+    let large = grid.counts()[1].is_none_or(|cells| cells > MOST_CELLS_ON_ONE_RANK);
+    if partition == Partition::Grid || (partition == Partition::Auto && large) {
+        let piece = session.agree(grid.part(session.rank(), session.ranks()))?;
+        return Mesh::assemble(session, piece, grid.names());
     }
+    let whole = session.is_first().then(|| grid.whole()).transpose();
+    split(session, session.agree(whole)?)
+}
+
+fn from_file(session: &Session, path: &Path) -> Result<Scene> {
+    let mut in_parts = session.is_first() && partitioned::is_meant(path);
+    session.world().process_at_rank(0).broadcast_into(&mut in_parts);
+    if in_parts {
+        let file = PartitionedFile::open(path, session.world())?;
+        return match file.header.dimension {
+            2 => file.mesh(session).map(Scene::Two),
+            _ => file.mesh(session).map(Scene::Three),
+        };
+    }
+    let whole = session.agree(session.is_first().then(|| gmsh::read(path)).transpose())?;
+    let mut dimension = match whole {
+        Some(AnyMesh::Two(_)) => 2,
+        _ => 3,
+    };
+    session.world().process_at_rank(0).broadcast_into(&mut dimension);
+    Ok(match (dimension, whole) {
+        (_, Some(AnyMesh::Two(mesh))) => Scene::Two(split(session, Some(mesh))?),
+        (_, Some(AnyMesh::Three(mesh))) => Scene::Three(split(session, Some(mesh))?),
+        (2, None) => Scene::Two(split(session, None)?),
+        (_, None) => Scene::Three(split(session, None)?),
+    })
+}
+
+fn rectangle(of: &job::Rectangle) -> Result<Rectangle> {
+    let diagonal = match of.diagonal {
+        job::Diagonal::Right => Diagonal::Right,
+        job::Diagonal::Left => Diagonal::Left,
+        job::Diagonal::Alternating => Diagonal::Alternating,
+        job::Diagonal::Crossed => Diagonal::Crossed,
+    };
+    let grading = |power, low, high| grading(power, &of.grading.toward, low, high);
+    let gradings = [grading(of.grading.x, "left", "right"), grading(of.grading.y, "bottom", "top")];
+    Rectangle::new(of.size, of.cells.map(|n| n as usize), diagonal, gradings)
+}
+
+fn cuboid(of: &job::Cuboid) -> Result<Cuboid> {
+    let grading = |power, low, high| grading(power, &of.grading.toward, low, high);
+    let gradings = [
+        grading(of.grading.x, "left", "right"),
+        grading(of.grading.y, "front", "back"),
+        grading(of.grading.z, "bottom", "top"),
+    ];
+    Cuboid::new(of.size, of.cells.map(|n| n as usize), gradings)
 }
 
 /// The grading along the axis between the sides `low` and `high`, if cells crowd toward these sides.
@@ -86,109 +124,4 @@ fn grading(power: f64, sides: &[String], low: &str, high: &str) -> Grading {
         _ => Toward::Low,
     };
     Grading { power, toward }
-}
-
-/// Holds the mesh against the job and splits it.
-pub(super) fn scene<const D: usize>(
-    mesh: GlobalMesh<D>,
-    loaded: &mut Loaded,
-    ranks: usize,
-) -> Result<Scene<D>> {
-    let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
-    let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
-    loaded.check_mesh(MeshNames { dimension: D, boundaries: &boundaries, regions: &regions })?;
-    refuse_empty_matrix(&mesh, loaded)?;
-    let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
-    let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
-    mesh.claimed_twice(&supports, &contacts)
-        .map_err(|e| loaded.fault("contact.0.on", e.to_string(), "give each facet to one of them"))?;
-    let quality = mesh.quality_summary();
-    if quality.poor > 0 {
-        loaded.warnings.push(format!(
-            "{} cells are badly shaped (the worst, cell {}, has quality {:.1e} of 1): expect slow linear solves and \
-             poor accuracy there; improve the mesh",
-            quality.poor, quality.worst_cell, quality.smallest
-        ));
-    }
-    let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
-    if mesh.regions.iter().any(|region| material_of(&loaded.job, region).density.is_none()) {
-        refuse_free_bodies(&mesh, &topology, loaded)?;
-    }
-    let dual = topology.dual_graph();
-    drop(topology);
-    let partition = partition(&mesh, &dual, ranks)?;
-    Ok(Scene { mesh, partition })
-}
-
-fn refuse_free_bodies<const D: usize>(
-    mesh: &GlobalMesh<D>,
-    topology: &Topology<D>,
-    loaded: &Loaded,
-) -> Result<()> {
-    let mut fixed = vec![[false; D]; mesh.nodes.len()];
-    for support in &loaded.job.support {
-        for name in &support.on {
-            for &facet in &mesh.boundary(name)?.facets {
-                let nodes = mesh.facets[facet as usize];
-                let normal = crate::mesh::shape::facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
-                for node in nodes {
-                    let held = &mut fixed[node as usize];
-                    match &support.fix {
-                        Fix::Named(Named::All) => *held = [true; D],
-                        Fix::Named(Named::Normal) => {
-                            let along = |a: &usize, b: &usize| normal[*a].abs().total_cmp(&normal[*b].abs());
-                            held[(0..D).max_by(along).unwrap_or(0)] = true;
-                        }
-                        Fix::Axes(axes) => axes.iter().for_each(|axis| held[axis.index()] = true),
-                    }
-                }
-            }
-        }
-    }
-    // What has mass moves by its inertia: no motion of it is free.
-    for (cell, &region) in mesh.cell_regions.iter().enumerate() {
-        if material_of(&loaded.job, &mesh.regions[usize::from(region)]).density.is_some() {
-            mesh.cell(cell).iter().for_each(|&node| fixed[node as usize] = [true; D]);
-        }
-    }
-    let free = free_motions(mesh, &topology.bodies(), &|node| fixed[node]);
-    if free.is_empty() {
-        return Ok(());
-    }
-    let key = if loaded.job.support.is_empty() { "material" } else { "support" };
-    Err(loaded.fault(
-        key,
-        format!(
-            "without density the problem is quasistatic, and these motions are free: {}",
-            free.join("; ")
-        ),
-        "add supports that hold them, or give a density",
-    ))
-}
-
-/// The material of a region of the mesh.
-fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
-    job.region.iter().find(|r| r.name == region).map_or(&job.material, |r| &r.material)
-}
-
-/// A fault if the scheme can't move some material at all.
-fn refuse_empty_matrix<const D: usize>(mesh: &GlobalMesh<D>, loaded: &Loaded) -> Result<()> {
-    if loaded.job.time.scheme != job::Scheme::LaggedEuler {
-        return Ok(());
-    }
-    for region in &mesh.regions {
-        let material = material_of(&loaded.job, region);
-        if material.density.is_none() && material.viscosity.is_none() {
-            let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
-            return Err(loaded.fault(
-                "time.scheme",
-                format!(
-                    "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity \
-                     nothing determines the velocity{place}"
-                ),
-                "give [material] density or [material.viscosity], or take an implicit scheme",
-            ));
-        }
-    }
-    Ok(())
 }

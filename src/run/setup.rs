@@ -1,12 +1,12 @@
 //! What a run starts from and a check describes: nothing of it touches the output folder.
 
-use super::{Scene, build};
+use super::{build, hold::refuse_free_bodies};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},
     error::{Error, Result},
     job::{Accept, Job, Loaded},
-    mesh::{Mesh, distribute},
+    mesh::Mesh,
     output::probes::Probes,
     petsc::set_option,
     session::Session,
@@ -25,19 +25,19 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub verdict: Verdict,
 }
 
-/// Sets the problem of a job up, whose whole mesh is on rank 0. Collective.
+/// Sets the problem of a job up on its mesh, which was held against it. Collective.
 pub(super) fn setup<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
-    scene: Option<Scene<D>>,
+    mesh: Mesh<D>,
 ) -> Result<Setup<D, S>> {
     let job = &loaded.job;
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }
-    let mesh = distribute(session, scene.map(|s| (s.mesh, s.partition)))?;
     let probes = session.agree(probes(session, &mesh, job))?;
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
+    refuse_free_bodies(session, &body.mesh, &body.fixed, loaded)?;
     let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
     let scheme = scheme.map_err(|error| match error {
         Error::Internal(words) if !job.solver.petsc.is_empty() => loaded.fault(

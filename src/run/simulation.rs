@@ -2,7 +2,8 @@
 
 use super::{
     build,
-    scene::scene,
+    hold::hold,
+    scene::split,
     setup::{Setup, setup},
 };
 use crate::{
@@ -35,9 +36,9 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     /// Sets a job up on `mesh`, the whole mesh on rank 0 and nothing elsewhere; the job's warnings grow by those of the
     /// mesh. `S` is the number of stress components that go with the job's hypothesis. Collective.
     pub fn new(session: &Session, loaded: &mut Loaded, mesh: Option<GlobalMesh<D>>) -> Result<Self> {
-        let scene = mesh.map(|mesh| scene(mesh, loaded, session.ranks())).transpose();
-        let scene = session.agree(scene)?;
-        let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, scene)?;
+        let mesh = split(session, mesh)?;
+        hold(session, &mesh, loaded)?;
+        let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
         let totals = totals_at_start(session, &body, &state)?;
         let (time, adaptive) = (loaded.job.time.clone(), build::adaptive(&loaded.job));
         Ok(Self { body, state, scheme, totals, time, adaptive })

@@ -1,7 +1,7 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Clock, Inventory, Scene, Start, build,
+    Clock, Inventory, Start, build,
     deadline::Deadline,
     folder::{claim_folder, prepare_folder, refuse_foreign},
     outputs::{Outputs, Wanted},
@@ -17,6 +17,7 @@ use crate::{
     certificate::Certificates,
     error::{Error, Exit, Result},
     job::{Accept, Every, Job, Loaded},
+    mesh::Mesh,
     output::{checkpoint::Identity, history::Totals, log::Log},
     session::Session,
     state::State,
@@ -41,13 +42,13 @@ const MOST_MADE: f64 = 1e4;
 pub(super) fn run<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
-    scene: Option<Scene<D>>,
+    mesh: Mesh<D>,
     start: &Start,
     clock: Clock,
 ) -> Result<Exit> {
     let job = &loaded.job;
     session.agree(if session.is_first() { refuse_foreign(job, start) } else { Ok(()) })?;
-    let mut ready = setup::<D, S>(session, loaded, scene)?;
+    let mut ready = setup::<D, S>(session, loaded, mesh)?;
     let folder = job.output_folder();
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };

@@ -150,7 +150,7 @@ pub fn damage(world: &impl Communicator, folder: &Path) {
     let mut bad = good.clone();
     bad[place] ^= 1;
     std::fs::write(&bad_path, &bad).expect("write");
-    seal::seal(&bad_path, world).expect("seal");
+    seal::seal(&bad_path, seal::CHECKPOINT, world).expect("seal");
     let error = read_all(&bad_path, world, &nodes, &cells).expect_err("refused").to_string();
     assert!(error.contains("tables/cells/history") && error.contains("checksum"), "{error}");
 }

@@ -16,6 +16,7 @@ mod iterations;
 mod launch;
 mod materials;
 mod outputs;
+mod partitions;
 mod ranks;
 mod readers;
 mod regions;

@@ -8,7 +8,7 @@ use clarke::{
     mesh::{
         GlobalMesh, Mesh, Tags, distribute,
         generate::{Diagonal, box_mesh, rectangle},
-        partition::partition,
+        partition::{Method, partition},
         surface::Topology,
     },
     run::Simulation,
@@ -51,7 +51,7 @@ pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D>
     let parts = session.is_first().then(|| {
         let topology = Topology::<D>::new(&whole.cells, whole.nodes.len(), &Tags::default());
         let dual = topology.expect("topology").dual_graph();
-        (whole.clone(), partition(whole, &dual, session.ranks()).expect("partition"))
+        (whole.clone(), partition(whole, &dual, session.ranks(), Method::KWay).expect("partition"))
     });
     distribute(session, parts).expect("distributed")
 }

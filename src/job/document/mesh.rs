@@ -37,6 +37,22 @@ pub struct Rectangle {
     /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: RectangleGrading,
+    /// How the mesh is split among ranks.
+    #[serde(default)]
+    pub partition: Partition,
+}
+
+/// How a generated mesh is split among ranks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Partition {
+    /// Up to 200,000 cells as metis, above as grid.
+    #[default]
+    Auto,
+    /// Rank 0 makes the whole mesh, METIS splits its cells, and rank 0 hands the parts out.
+    Metis,
+    /// Each rank makes the cells of a box of its own; no rank ever holds the whole mesh.
+    Grid,
 }
 
 /// How a rectangle is cut into triangles.
@@ -91,6 +107,9 @@ pub struct Cuboid {
     /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: CuboidGrading,
+    /// How the mesh is split among ranks.
+    #[serde(default)]
+    pub partition: Partition,
 }
 
 /// Spread of a box's cells.

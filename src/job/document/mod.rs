@@ -25,7 +25,7 @@ pub use material::{
     Viscosity,
 };
 pub use memory::Memory;
-pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Rectangle, RectangleGrading};
+pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time};
 

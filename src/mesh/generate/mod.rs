@@ -2,33 +2,28 @@
 
 mod box_mesh;
 mod grading;
+mod grid;
 mod rectangle;
 
-pub use box_mesh::box_mesh;
+pub use box_mesh::{Cuboid, box_mesh};
 pub use grading::{Grading, Toward};
-pub use rectangle::{Diagonal, rectangle};
+pub use grid::Grid;
+pub use rectangle::{Diagonal, Rectangle, rectangle};
 
 use crate::error::{Error, Result};
 
-/// Refuses numbers of nodes or cells that 32-bit ids, and the signed 32-bit dual graph, cannot count.
-fn countable(nodes: Option<usize>, cells: Option<usize>, dimension: usize) -> Result<(usize, usize)> {
-    let limit = i32::MAX as usize;
-    match (nodes, cells) {
-        (Some(nodes), Some(cells)) if nodes <= limit && cells <= limit / (dimension + 1) => {
-            Ok((nodes, cells))
-        }
-        _ => {
-            let show =
-                |n: Option<usize>| n.map_or("more than 64 bits can count".to_string(), |n| n.to_string());
-            Err(Error::Refused(format!(
-                "the mesh would have {} nodes and {} cells; ids are 32-bit: at most {limit} nodes and {} cells. \
-                 Reduce `cells`",
-                show(nodes),
-                show(cells),
-                limit / (dimension + 1)
-            )))
-        }
+/// Refuses numbers of nodes and cells, if they could be counted at all, beyond these limits.
+fn countable([nodes, cells]: [Option<usize>; 2], most_nodes: usize, most_cells: usize) -> Result<()> {
+    if nodes.is_some_and(|nodes| nodes <= most_nodes) && cells.is_some_and(|cells| cells <= most_cells) {
+        return Ok(());
     }
+    let show = |n: Option<usize>| n.map_or("more than 64 bits can count".to_string(), |n| n.to_string());
+    Err(Error::Refused(format!(
+        "the mesh would have {} nodes and {} cells; ids are 32-bit: at most {most_nodes} nodes and {most_cells} cells. \
+         Reduce `cells`",
+        show(nodes),
+        show(cells),
+    )))
 }
 
 /// An empty vector with room for `count` items; refused, not aborted, when memory is not there.

@@ -1,0 +1,128 @@
+//! What the bodies of a mesh are held by, gathered from all ranks.
+
+use super::{
+    Mesh,
+    rigid::{Body, Skeleton, absent, extend},
+    shape::{centroid, signed_measure},
+    surface::Bodies,
+};
+use crate::{
+    error::Result,
+    exchange::{exchange_lists, gather},
+    session::Session,
+    tensor::{Vector, add_scaled, norm},
+};
+
+/// The bodies; for each the points that span all that its held nodes hold, at most six of every rank, and those in
+/// which it touches others. Collective, the same on all ranks.
+pub(super) fn skeleton<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    held: &[[bool; D]],
+) -> Result<Skeleton<D>> {
+    let bodies = mesh.bodies(session)?;
+    let nodes = nodes_of(mesh, &bodies);
+    let mut skeleton = Skeleton { bodies: frames(session, mesh, &bodies, &nodes)?, ..Skeleton::default() };
+    let mut records: Vec<f64> = Vec::new();
+    for (number, (body, nodes)) in skeleton.bodies.iter().zip(&nodes).enumerate() {
+        let flags = |&node: &u32| (0..D).filter(move |&c| held[node as usize][c]).map(move |c| (node, c));
+        let all: Vec<(u32, usize)> = nodes.iter().flat_map(flags).collect();
+        let rows = || all.iter().map(|&(node, component)| body.row(component, &mesh.nodes[node as usize]));
+        for taken in extend(&mut absent::<D>(), rows) {
+            let (node, component) = all[taken];
+            records.extend([number as f64, component as f64]);
+            records.extend(mesh.nodes[node as usize]);
+        }
+    }
+    for record in gather(session.world(), &records)?.chunks_exact(D + 2) {
+        let component = record[1] as usize;
+        skeleton.bodies[record[0] as usize].points.push(skeleton.points.len());
+        skeleton.points.push(std::array::from_fn(|i| record[2 + i]));
+        skeleton.held.push(std::array::from_fn(|i| i == component));
+    }
+    if bodies.count > 1 {
+        let joints = joints(session, mesh, &nodes)?;
+        for joint in joints.chunk_by(|a, b| a.0 == b.0) {
+            joint.iter().for_each(|&(_, body, _)| skeleton.bodies[body].points.push(skeleton.points.len()));
+            skeleton.points.push(joint[0].2);
+            skeleton.held.push([false; D]);
+        }
+    }
+    Ok(skeleton)
+}
+
+/// The local nodes of each body, ghosts included.
+fn nodes_of<const D: usize>(mesh: &Mesh<D>, bodies: &Bodies) -> Vec<Vec<u32>> {
+    let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); bodies.count];
+    let mut order: Vec<u32> = (0..mesh.cell_count() as u32).collect();
+    order.sort_by_key(|&cell| bodies.of_cell[cell as usize]);
+    let mut last_body = vec![u32::MAX; mesh.nodes.len()];
+    for cell in order {
+        let body = bodies.of_cell[cell as usize];
+        for &node in mesh.cell(cell as usize) {
+            if std::mem::replace(&mut last_body[node as usize], body) != body {
+                nodes[body as usize].push(node);
+            }
+        }
+    }
+    nodes
+}
+
+/// Centre of mass (of a uniform density) and radius of each body.
+fn frames<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    bodies: &Bodies,
+    nodes: &[Vec<u32>],
+) -> Result<Vec<Body<D>>> {
+    let mut sums = vec![0.0; bodies.count * (D + 1)];
+    for (cell, &body) in bodies.of_cell.iter().enumerate() {
+        let of_cell = mesh.cell(cell);
+        let corners: [Vector<D>; 4] = std::array::from_fn(|i| mesh.nodes[of_cell[i.min(D)] as usize]);
+        let (measure, middle) = (signed_measure(&corners[..=D]), centroid(&corners[..=D]));
+        let sum = &mut sums[body as usize * (D + 1)..][..=D];
+        (0..D).for_each(|i| sum[i] += measure * middle[i]);
+        sum[D] += measure;
+    }
+    let sums = session.sum_of_lists(&sums);
+    let centres: Vec<Vector<D>> =
+        sums.chunks_exact(D + 1).map(|sum| std::array::from_fn(|i| sum[i] / sum[D])).collect();
+    let reach = |(nodes, centre): (&Vec<u32>, &Vector<D>)| {
+        let distance = |&node: &u32| norm(&add_scaled(&mesh.nodes[node as usize], -1.0, centre));
+        nodes.iter().map(distance).fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let own: Vec<f64> = nodes.iter().zip(&centres).map(reach).collect();
+    let mut radii = vec![f64::MIN_POSITIVE; bodies.count];
+    for ranks in gather(session.world(), &own)?.chunks_exact(bodies.count.max(1)) {
+        radii.iter_mut().zip(ranks).for_each(|(radius, reach)| *radius = reach.max(*radius));
+    }
+    let body = |(centre, radius)| Body { points: Vec::new(), centre, radius };
+    Ok(centres.into_iter().zip(radii).map(body).collect())
+}
+
+/// The nodes in which bodies touch: global number, body and place of each, by number. The same on all ranks. Collective.
+fn joints<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    nodes: &[Vec<u32>],
+) -> Result<Vec<(u32, usize, Vector<D>)>> {
+    let mut to_owners: Vec<Vec<u32>> = vec![Vec::new(); session.ranks()];
+    for (body, nodes) in nodes.iter().enumerate() {
+        for &node in nodes {
+            let number = mesh.global_node(node);
+            to_owners[mesh.owner(number)].extend([number, body as u32]);
+        }
+    }
+    let came = exchange_lists(session.world(), &to_owners)?;
+    let mut meetings: Vec<[u32; 2]> = came.as_chunks().0.to_vec();
+    meetings.sort_unstable();
+    meetings.dedup();
+    let several = meetings.chunk_by(|a, b| a[0] == b[0]).filter(|around| around.len() > 1).flatten();
+    let record = |&[number, body]: &[u32; 2]| {
+        let place = mesh.nodes[mesh.owned_node(number)];
+        [f64::from(number), f64::from(body)].into_iter().chain(place)
+    };
+    let all = gather(session.world(), &several.flat_map(record).collect::<Vec<f64>>())?;
+    let joint = |of: &[f64]| (of[0] as u32, of[1] as usize, std::array::from_fn(|i| of[2 + i]));
+    Ok(all.chunks_exact(D + 2).map(joint).collect())
+}

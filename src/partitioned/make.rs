@@ -1,0 +1,47 @@
+//! From a mesh to its file with parts.
+
+use super::{Header, PartitionedFile, is_meant, write};
+use crate::{
+    error::{Error, Result},
+    mesh::{
+        GlobalMesh, Tags,
+        gmsh::{self, AnyMesh},
+        partition::{Method, partition},
+        surface::Topology,
+    },
+};
+use mpi::topology::SimpleCommunicator;
+use std::path::Path;
+
+/// Reads a mesh of Gmsh, or one that was split before, checks it as runs do, splits it into parts and writes them. On one
+/// rank, which needs room for the whole mesh.
+pub fn make(source: &Path, parts: usize, target: &Path) -> Result<Header> {
+    if parts == 0 {
+        return Err(Error::Refused("a mesh can't be split into 0 parts: give -n at least 1".into()));
+    }
+    match whole(source)? {
+        AnyMesh::Two(mesh) => split(&mesh, parts, target),
+        AnyMesh::Three(mesh) => split(&mesh, parts, target),
+    }
+}
+
+fn whole(source: &Path) -> Result<AnyMesh> {
+    if !is_meant(source) {
+        return gmsh::read(source);
+    }
+    let file = PartitionedFile::open(source, &SimpleCommunicator::self_comm())?;
+    match file.header.dimension {
+        2 => file.whole().map(AnyMesh::Two),
+        _ => file.whole().map(AnyMesh::Three),
+    }
+}
+
+/// Cuts in two again and again, so that a rank that gets several consecutive parts has a compact one.
+fn split<const D: usize>(mesh: &GlobalMesh<D>, parts: usize, target: &Path) -> Result<Header> {
+    let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
+    let dual = topology.dual_graph();
+    drop(topology);
+    let partition = partition(mesh, &dual, parts, Method::Recursive)?;
+    drop(dual);
+    write(target, &SimpleCommunicator::self_comm(), mesh, &partition, parts)
+}

@@ -1,0 +1,99 @@
+//! A mesh held against its job, by all ranks together.
+
+use crate::{
+    error::Result,
+    job::{self, Job, Loaded, Material, MeshNames},
+    mesh::{Mesh, rigid::free_motions},
+    session::Session,
+};
+
+/// Refuses a mesh without what the job speaks of, and one on which it makes no sense; warns of bad cells. Collective.
+pub(super) fn hold<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &mut Loaded) -> Result<()> {
+    let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
+    let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
+    let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions };
+    session.agree(loaded.check_mesh(names))?;
+    session.agree(refuse_empty_matrix(mesh, loaded))?;
+    refuse_claims(session, mesh, loaded)?;
+    let quality = mesh.quality_summary(session);
+    if quality.poor > 0 {
+        loaded.warnings.push(format!(
+            "{} cells are badly shaped (the worst, cell {}, has quality {:.1e} of 1): expect slow linear solves and \
+             poor accuracy there; improve the mesh",
+            quality.poor, quality.worst_cell, quality.smallest
+        ));
+    }
+    Ok(())
+}
+
+fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
+    let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
+    let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
+    let claims = mesh.claimed_twice(&supports, &contacts);
+    let more = session.total(claims.count).saturating_sub(1);
+    let more = if more > 0 { format!(" and at {more} more facets") } else { String::new() };
+    let fault =
+        || loaded.fault("contact.0.on", format!("{}{more}", claims.first), "give each facet to one of them");
+    session.agree(if claims.count == 0 { Ok(()) } else { Err(fault()) })
+}
+
+/// Refuses a quasistatic body that can move without resistance, given the held components of its nodes. Collective.
+pub(super) fn refuse_free_bodies<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    fixed: &[bool],
+    loaded: &Loaded,
+) -> Result<()> {
+    let has_mass: Vec<bool> =
+        mesh.regions.iter().map(|region| material_of(&loaded.job, region).density.is_some()).collect();
+    if has_mass.iter().all(|&has| has) {
+        return Ok(());
+    }
+    let mut held: Vec<[bool; D]> = fixed.as_chunks().0.to_vec();
+    // What has mass moves by its inertia: no motion of it is free.
+    for (cell, &region) in mesh.cell_regions.iter().enumerate() {
+        if has_mass[usize::from(region)] {
+            mesh.cell(cell).iter().for_each(|&node| held[node as usize] = [true; D]);
+        }
+    }
+    let free = free_motions(session, mesh, &held)?;
+    if free.is_empty() {
+        return Ok(());
+    }
+    let key = if loaded.job.support.is_empty() { "material" } else { "support" };
+    session.agree(Err(loaded.fault(
+        key,
+        format!(
+            "without density the problem is quasistatic, and these motions are free: {}",
+            free.join("; ")
+        ),
+        "add supports that hold them, or give a density",
+    )))
+}
+
+/// The material of a region of the mesh.
+fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
+    job.region.iter().find(|r| r.name == region).map_or(&job.material, |r| &r.material)
+}
+
+/// A fault if the scheme can't move some material at all.
+fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
+    if loaded.job.time.scheme != job::Scheme::LaggedEuler {
+        return Ok(());
+    }
+    for region in &mesh.regions {
+        let material = material_of(&loaded.job, region);
+        if material.density.is_none() && material.viscosity.is_none() {
+            let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
+            return Err(loaded.fault(
+                "time.scheme",
+                format!(
+                    "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity \
+                     nothing determines the velocity{place}"
+                ),
+                "give [material] density or [material.viscosity], or take an implicit scheme",
+            ));
+        }
+    }
+    Ok(())
+}
