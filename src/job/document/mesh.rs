@@ -14,8 +14,8 @@ pub enum Mesh {
     /// A box with its low corner at the origin, cut into tetrahedra; boundaries left, right (x), front,
     /// back (y), bottom, top (z).
     Box(Cuboid),
-    /// A Gmsh 4.1 file (ASCII or binary), relative to the job file; its physical groups name boundaries and
-    /// regions.
+    /// A Gmsh 4.1 file (ASCII or binary), or what `solver partition` made of one (.h5), relative to the job file; its
+    /// physical groups name boundaries and regions.
     File(#[schemars(extend("format" = "path"), example = "../../meshes/block.msh")] PathBuf),
 }
 
