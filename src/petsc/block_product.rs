@@ -25,7 +25,9 @@ impl BlockProduct {
         // SAFETY: live matrix; PETSc writes a number.
         unsafe { check(sys::MatGetBlockSize(matrix, &mut block))? };
         let Some(parts) = Parts::of(matrix)?.filter(|_| SIZES.contains(&block)) else { return Ok(None) };
-        let Some(own) = own_rows(parts.own, |rows| product::<T>(block as usize, rows))? else { return Ok(None) };
+        let Some(own) = own_rows(parts.own, |rows| product::<T>(block as usize, rows))? else {
+            return Ok(None);
+        };
         let action = Self { own, others: parts.others(matrix)? };
         let shell = Shell::new(matrix, Box::new(action))?;
         // SAFETY: live matrix.

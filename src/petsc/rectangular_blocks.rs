@@ -124,7 +124,8 @@ mod tests {
 
     fn check<const R: usize, const C: usize>() {
         let (rows, columns) = (5 * R, 2 * C);
-        let entry = |i: usize, j: usize| if (i + j) % 4 == 1 { 0.0 } else { 1e45 * ((3 * i + 5 * j) as f64).sin() };
+        let entry =
+            |i: usize, j: usize| if (i + j) % 4 == 1 { 0.0 } else { 1e45 * ((3 * i + 5 * j) as f64).sin() };
         let (mut starts, mut at, mut values) = (vec![0], Vec::new(), Vec::new());
         for i in 0..rows {
             for j in (0..columns).filter(|&j| entry(i, j) != 0.0) {

@@ -32,7 +32,10 @@ pub(super) struct ScalarRows<'a> {
 impl<'a> ScalarRows<'a> {
     pub fn row(self, row: usize) -> impl Iterator<Item = (usize, f64)> + 'a {
         let range = self.starts[row] as usize..self.starts[row + 1] as usize;
-        self.columns[range.clone()].iter().map(|&column| column as usize).zip(self.values[range].iter().copied())
+        self.columns[range.clone()]
+            .iter()
+            .map(|&column| column as usize)
+            .zip(self.values[range].iter().copied())
     }
 }
 
@@ -89,7 +92,9 @@ impl<const B: usize, T: Stored> SymmetricBlocks<B, T> {
             columns.clear();
             columns.push(row as u32);
             for scalar in row * B..(row + 1) * B {
-                columns.extend(rows.row(scalar).map(|(column, _)| (column / B) as u32).filter(|&c| (c as usize) < row));
+                columns.extend(
+                    rows.row(scalar).map(|(column, _)| (column / B) as u32).filter(|&c| (c as usize) < row),
+                );
             }
             columns.sort_unstable();
             columns.dedup();
@@ -163,11 +168,18 @@ mod tests {
     use super::*;
 
     /// A symmetric matrix of so many blocks, dense but for blocks far from the diagonal and single zeros, and its rows.
-    fn matrix<const B: usize>(blocks: usize, size: f64) -> (Vec<Vec<f64>>, [Vec<sys::PetscInt>; 2], Vec<f64>) {
+    fn matrix<const B: usize>(
+        blocks: usize,
+        size: f64,
+    ) -> (Vec<Vec<f64>>, [Vec<sys::PetscInt>; 2], Vec<f64>) {
         let n = blocks * B;
         let entry = |i: usize, j: usize| {
             let (i, j) = (i.min(j), i.max(j));
-            if j / B - i / B > 2 || (7 * i + 3 * j) % 5 == 1 { 0.0 } else { size * ((13 * i + 29 * j) as f64).sin() }
+            if j / B - i / B > 2 || (7 * i + 3 * j) % 5 == 1 {
+                0.0
+            } else {
+                size * ((13 * i + 29 * j) as f64).sin()
+            }
         };
         let dense: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
         let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
@@ -205,16 +217,20 @@ mod tests {
 
     #[test]
     fn single_precision_rounds_the_matrix_alone_whatever_its_size() {
-        for found in
-            [differs::<2, f32>(1e60), differs::<3, f32>(1e-60), differs::<6, f32>(1.0), differs::<1, f32>(5.0)]
-        {
+        for found in [
+            differs::<2, f32>(1e60),
+            differs::<3, f32>(1e-60),
+            differs::<6, f32>(1.0),
+            differs::<1, f32>(5.0),
+        ] {
             assert!(found > 1e-12 && found < 1e-6, "{found}");
         }
     }
 
     #[test]
     fn a_product_moves_half_the_matrix_and_two_vectors() {
-        let rows = ScalarRows { starts: &[0, 4, 8, 12, 16], columns: &[0, 1, 2, 3].repeat(4), values: &[1.0; 16] };
+        let rows =
+            ScalarRows { starts: &[0, 4, 8, 12, 16], columns: &[0, 1, 2, 3].repeat(4), values: &[1.0; 16] };
         let bytes = product::<f32>(2, rows).unwrap().bytes();
         // Three starts, three column numbers, three blocks of four numbers; twice four numbers.
         assert_eq!(bytes, 3 * 8 + 3 * 4 + 3 * 4 * 4 + 2 * 4 * 8);

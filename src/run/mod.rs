@@ -21,6 +21,7 @@ mod time_loop;
 pub use build::{friction_law, normal_law};
 pub use check::Report;
 pub use inventory::Inventory;
+pub use scene::Scene;
 pub use simulation::Simulation;
 pub use summary::Summary;
 
@@ -29,7 +30,6 @@ use crate::{
     job::{self, Loaded},
     session::Session,
 };
-use scene::Scene;
 use std::{
     path::PathBuf,
     time::{Duration, Instant},

@@ -21,8 +21,11 @@ use std::path::Path;
 const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
 
 /// This rank's part of a mesh of either dimension.
-pub(super) enum Scene {
+#[derive(Debug)]
+pub enum Scene {
+    /// Of triangles.
     Two(Mesh<2>),
+    /// Of tetrahedra.
     Three(Mesh<3>),
 }
 

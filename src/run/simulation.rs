@@ -11,7 +11,7 @@ use crate::{
     effect::{Energy, Step},
     error::Result,
     job::{Loaded, Time},
-    mesh::GlobalMesh,
+    mesh::{GlobalMesh, Mesh},
     output::history::Totals,
     session::Session,
     state::State,
@@ -38,6 +38,11 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     pub fn new(session: &Session, loaded: &mut Loaded, mesh: Option<GlobalMesh<D>>) -> Result<Self> {
         let mesh = split(session, mesh)?;
         hold(session, &mesh, loaded)?;
+        Self::on(session, loaded, mesh)
+    }
+
+    /// The same on this rank's part of a mesh that was held against the job. Collective.
+    pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
         let totals = totals_at_start(session, &body, &state)?;
         let (time, adaptive) = (loaded.job.time.clone(), build::adaptive(&loaded.job));

@@ -103,7 +103,8 @@ mod tests {
     fn a_factor_in_space_soon_outgrows_multigrid() {
         let service =
             Service { dimension: 3, unknowns: 1_000_000, ranks: 1, steps: 1, contact: true, friction: false };
-        let [factor, multigrid] = [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| service.cost(which));
+        let [factor, multigrid] =
+            [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| service.cost(which));
         assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
     }
 }

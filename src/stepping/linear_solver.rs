@@ -87,7 +87,9 @@ impl Preconditioner {
         }
         let memory = service.cost(Self::Cholesky).memory;
         if service.ranks > 1 && service.unknowns > REDUNDANT {
-            let why = format!("above {REDUNDANT} velocity components several ranks don't factor all of the matrix each");
+            let why = format!(
+                "above {REDUNDANT} velocity components several ranks don't factor all of the matrix each"
+            );
             return (Self::Gamg, why);
         }
         if memory > LARGEST_FACTOR {

@@ -6,8 +6,8 @@
 use allocation_counter::measure;
 use clarke::{
     job::{Hypothesis, Job, Loaded},
-    mesh::{GlobalMesh, gmsh::AnyMesh},
-    run::{Clock, Simulation, Start, run, whole_mesh},
+    mesh::Mesh,
+    run::{Clock, Scene, Simulation, Start, run},
     session::Session,
 };
 use std::{
@@ -38,10 +38,10 @@ fn loaded(job: &str, changes: &[&str]) -> Loaded {
 /// Allocations of each step behind the first ones for which no matrix was assembled.
 fn steps<const D: usize, const S: usize>(
     session: &Session,
-    mut loaded: Loaded,
-    mesh: GlobalMesh<D>,
+    loaded: &Loaded,
+    mesh: Mesh<D>,
 ) -> Vec<u64> {
-    let mut run = Simulation::<D, S>::new(session, &mut loaded, Some(mesh)).expect("a simulation");
+    let mut run = Simulation::<D, S>::on(session, loaded, mesh).expect("a simulation");
     let mut counts = Vec::with_capacity(COUNTED);
     for number in 0..FIRST + COUNTED {
         let assembly = run.scheme.clock.assembly;
@@ -58,13 +58,13 @@ fn steps<const D: usize, const S: usize>(
 }
 
 fn counted(session: &Session, job: &str, changes: &[&str]) -> Vec<u64> {
-    let loaded = loaded(job, changes);
-    match whole_mesh(&loaded.job).expect("a mesh") {
-        AnyMesh::Two(mesh) if loaded.job.material.hypothesis == Some(Hypothesis::PlaneStrain) => {
-            steps::<2, 4>(session, loaded, mesh)
+    let mut loaded = loaded(job, changes);
+    match Scene::of(session, &mut loaded).expect("a mesh") {
+        Scene::Two(mesh) if loaded.job.material.hypothesis == Some(Hypothesis::PlaneStrain) => {
+            steps::<2, 4>(session, &loaded, mesh)
         }
-        AnyMesh::Two(mesh) => steps::<2, 3>(session, loaded, mesh),
-        AnyMesh::Three(mesh) => steps::<3, 6>(session, loaded, mesh),
+        Scene::Two(mesh) => steps::<2, 3>(session, &loaded, mesh),
+        Scene::Three(mesh) => steps::<3, 6>(session, &loaded, mesh),
     }
 }
 
