@@ -21,7 +21,7 @@ const FUNCTIONS: &[&str] = &[
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
     "Mat(Norm|Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
     "(VecEqual|PetscObject(Reference|GetComm|TypeCompare))",
-    "Mat(GetBlockSize|GetBlockSizes|SetBlockSizes|MultTranspose|GetLocalSize|MultAdd|GetRowIJ|RestoreRowIJ|MPIAIJGetSeqAIJ|SeqAIJGetArrayRead|SeqAIJRestoreArrayRead)",
+    "Mat(GetBlockSize|GetBlockSizes|SetBlockSizes|GetLocalSize|GetRowIJ|RestoreRowIJ|MPIAIJGetSeqAIJ|SeqAIJGetArrayRead|SeqAIJRestoreArrayRead)",
     "PCMG(GetLevels|(Get|Set)Interpolation|SetRestriction|GetSmoother|SetResidual|ResidualDefault)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",
     "Mat(CreateShell|ShellSetContext|ShellGetContext|ShellSetOperation|MumpsSetIcntl)",

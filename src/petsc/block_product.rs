@@ -47,6 +47,6 @@ impl Action for BlockProduct {
     }
 
     fn bytes(&self) -> u64 {
-        self.own.bytes()
+        self.own.bytes() + self.others.as_ref().map_or(0, Others::bytes)
     }
 }

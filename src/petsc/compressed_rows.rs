@@ -1,8 +1,8 @@
 //! What PETSc's matrices in compressed rows are made of.
 
 use super::{DistributedVector, check, symmetric_blocks::ScalarRows, sys};
-use crate::error::Result;
-use std::{ffi::CStr, ptr, slice};
+use crate::error::{Error, Result};
+use std::{ffi::CStr, mem::ManuallyDrop, ptr, slice};
 
 /// The parts of a matrix: the columns that belong to this rank, and the others.
 pub(super) struct Parts {
@@ -68,20 +68,77 @@ pub(super) fn own_rows<T>(
 
 /// The columns of other ranks, with the exchange of their values.
 pub(super) struct Others {
-    /// Of a matrix that is kept alive.
-    columns: sys::Mat,
-    matrix: sys::Mat,
+    entries: Entries,
     exchange: sys::VecScatter,
-    values: sys::Vec,
+    /// A value for each of these columns.
+    values: ManuallyDrop<DistributedVector>,
+}
+
+/// The rows that have entries.
+#[derive(Default)]
+struct Entries {
+    rows: Vec<u32>,
+    starts: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Entries {
+    fn new(all: ScalarRows<'_>) -> Self {
+        let mut kept = Self::default();
+        for row in 0..all.starts.len() - 1 {
+            let first = kept.columns.len();
+            for (column, value) in all.row(row) {
+                kept.columns.push(column as u32);
+                kept.values.push(value);
+            }
+            if kept.columns.len() > first {
+                kept.rows.push(row as u32);
+                kept.starts.push(first);
+            }
+        }
+        kept.starts.push(kept.columns.len());
+        kept
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = (usize, f64)>)> {
+        self.rows.iter().zip(self.starts.windows(2)).map(|(&row, range)| {
+            let range = range[0]..range[1];
+            let columns = self.columns[range.clone()].iter().map(|&column| column as usize);
+            (row as usize, columns.zip(self.values[range].iter().copied()))
+        })
+    }
+
+    /// `y += A x`.
+    fn add(&self, x: &[f64], y: &mut [f64]) {
+        for (row, entries) in self.rows() {
+            y[row] += entries.map(|(column, value)| value * x[column]).sum::<f64>();
+        }
+    }
+
+    /// `y = A^T x`.
+    fn transposed(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for (row, entries) in self.rows() {
+            entries.for_each(|(column, value)| y[column] += value * x[row]);
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        let rows = size_of_val(&self.rows[..]) + size_of_val(&self.starts[..]);
+        (rows + size_of_val(&self.columns[..]) + size_of_val(&self.values[..])) as u64
+    }
 }
 
 impl Others {
     fn new(matrix: sys::Mat, columns: sys::Mat, numbers: *const sys::PetscInt) -> Result<Self> {
+        let entries = own_rows(columns, |rows| Some(Entries::new(rows)))?
+            .ok_or_else(|| Error::Internal("a matrix in compressed rows that doesn't show them".into()))?;
         let (mut rows, mut count) = (0, 0);
         let (mut exchange, mut values) = (ptr::null_mut(), ptr::null_mut());
         let (mut from, mut template) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: live matrices; `numbers` has an entry for each column here. What is made for the exchange alone is given
-        // back; the handle owns the rest and a reference to the matrix.
+        // back; the handle owns the rest.
         unsafe {
             let alone = sys::RSMPI_COMM_SELF;
             check(sys::MatGetLocalSize(columns, &mut rows, &mut count))?;
@@ -91,48 +148,69 @@ impl Others {
             check(sys::VecScatterCreate(template, from, values, ptr::null_mut(), &mut exchange))?;
             check(sys::VecDestroy(&mut template))?;
             check(sys::ISDestroy(&mut from))?;
-            check(sys::PetscObjectReference(matrix.cast()))?;
+            Ok(Self { entries, exchange, values: DistributedVector::view(values) })
         }
-        Ok(Self { columns, matrix, exchange, values })
     }
 
     /// Begins to send the values of `x`, laid out like the columns of the matrix, to ranks that need them. Collective.
     pub fn begin(&self, x: &DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: live objects, as below.
-        check(unsafe { sys::VecScatterBegin(self.exchange, x.raw, self.values, insert, forward) })
+        check(unsafe { sys::VecScatterBegin(self.exchange, x.raw, self.values.raw, insert, forward) })
     }
 
     /// Ends that and adds the product with the columns of other ranks to `y`.
     pub fn end_adding(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: as above.
-        unsafe {
-            check(sys::VecScatterEnd(self.exchange, x.raw, self.values, insert, forward))?;
-            check(sys::MatMultAdd(self.columns, self.values, y.raw, y.raw))
-        }
+        check(unsafe { sys::VecScatterEnd(self.exchange, x.raw, self.values.raw, insert, forward) })?;
+        self.entries.add(&self.values.owned()?, &mut y.owned_mut()?);
+        Ok(())
     }
 
     /// Adds the product of the transposed columns with `x`, laid out like the rows, to the `y` of the ranks that they belong
     /// to. Collective.
     pub fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        // SAFETY: a second view of the vector, which nothing else uses until this returns.
+        let mut values = unsafe { DistributedVector::view(self.values.raw) };
+        self.entries.transposed(&x.owned()?, &mut values.owned_mut()?);
         let (add, reverse) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
         // SAFETY: as above.
         unsafe {
-            check(sys::MatMultTranspose(self.columns, x.raw, self.values))?;
-            check(sys::VecScatterBegin(self.exchange, self.values, y.raw, add, reverse))?;
-            check(sys::VecScatterEnd(self.exchange, self.values, y.raw, add, reverse))
+            check(sys::VecScatterBegin(self.exchange, self.values.raw, y.raw, add, reverse))?;
+            check(sys::VecScatterEnd(self.exchange, self.values.raw, y.raw, add, reverse))
         }
+    }
+
+    /// Bytes of the columns.
+    pub fn bytes(&self) -> u64 {
+        self.entries.bytes()
     }
 }
 
 impl Drop for Others {
     fn drop(&mut self) {
-        // SAFETY: this handle owns one reference to each.
+        // SAFETY: this handle owns one reference to each; the vector is dropped once.
         unsafe {
             sys::VecScatterDestroy(&mut self.exchange);
-            sys::VecDestroy(&mut self.values);
-            sys::MatDestroy(&mut self.matrix);
+            ManuallyDrop::drop(&mut self.values);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_without_entries_are_passed_over() {
+        let rows = ScalarRows { starts: &[0, 0, 2, 2, 3], columns: &[0, 2, 1], values: &[2.0, 3.0, 5.0] };
+        let entries = Entries::new(rows);
+        assert_eq!(entries.rows, [1, 3]);
+        let (mut y, mut z) = ([1.0; 4], [9.0; 3]);
+        entries.add(&[1.0, 10.0, 100.0], &mut y);
+        assert_eq!(y, [1.0, 303.0, 1.0, 51.0]);
+        entries.transposed(&[7.0, 1.0, 7.0, 10.0], &mut z);
+        assert_eq!(z, [2.0, 50.0, 3.0]);
     }
 }

@@ -99,7 +99,7 @@ fn report<const D: usize, const S: usize>(
     let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
     let steps = steps_between(0.0, job.time.end, longest);
     let inventory = Inventory::of(session, body, scheme);
-    let preconditioner = scheme.preconditioner();
+    let (preconditioner, reason) = scheme.preconditioner();
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,
@@ -121,7 +121,7 @@ fn report<const D: usize, const S: usize>(
         adaptive: job.time.adaptive.is_some(),
         newton: inventory.newton,
         preconditioner: preconditioner.name(),
-        preconditioner_reason: scheme.preconditioner_reason().to_owned(),
+        preconditioner_reason: reason.to_owned(),
         certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: CellQuality {

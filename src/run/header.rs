@@ -47,7 +47,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
         },
         job.solver.tolerance
     ));
-    lines.push(format!("solver     {}: {}", scheme.preconditioner().name(), scheme.preconditioner_reason()));
+    let (preconditioner, reason) = scheme.preconditioner();
+    lines.push(format!("solver     {}: {reason}", preconditioner.name()));
     lines.extend(verdict.words.iter().map(|words| format!("certified  {words}")));
     lines.push(format!("output     {}", job.output_folder().display()));
     lines

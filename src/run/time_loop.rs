@@ -322,7 +322,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             unknowns: self.body.unknowns(self.session),
             effects: self.body.effect_names(),
             scheme: self.scheme.scheme().name(),
-            preconditioner: self.scheme.preconditioner().name(),
+            preconditioner: self.scheme.preconditioner().0.name(),
             steps: self.state.step,
             time: self.state.time,
             rejected_steps: self.totals.pace.map_or(0, |pace| pace.rejected),

@@ -92,14 +92,9 @@ impl StepSolver {
         !matches!(self.solver, Solver::Linear(_))
     }
 
-    /// The preconditioner in use.
-    pub fn preconditioner(&self) -> Preconditioner {
-        self.settings.preconditioner
-    }
-
-    /// Why it is that one.
-    pub fn reason(&self) -> &str {
-        &self.reason
+    /// The preconditioner in use, and why it is that one.
+    pub fn preconditioner(&self) -> (Preconditioner, &str) {
+        (self.settings.preconditioner, &self.reason)
     }
 
     /// Whether the matrices are those of these lengths.

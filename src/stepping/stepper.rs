@@ -112,14 +112,9 @@ impl Stepper {
         self.load.is_some()
     }
 
-    /// The preconditioner in use.
-    pub fn preconditioner(&self) -> Preconditioner {
+    /// The preconditioner in use, and why it is that one.
+    pub fn preconditioner(&self) -> (Preconditioner, &str) {
         self.solver.preconditioner()
-    }
-
-    /// Why it is that one.
-    pub fn preconditioner_reason(&self) -> &str {
-        self.solver.reason()
     }
 
     /// Assembles the matrix for a first step of this length. Preconditioners will stand at this length and at powers of two

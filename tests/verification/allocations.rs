@@ -36,11 +36,7 @@ fn loaded(job: &str, changes: &[&str]) -> Loaded {
 }
 
 /// Allocations of each step behind the first ones for which no matrix was assembled.
-fn steps<const D: usize, const S: usize>(
-    session: &Session,
-    loaded: &Loaded,
-    mesh: Mesh<D>,
-) -> Vec<u64> {
+fn steps<const D: usize, const S: usize>(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Vec<u64> {
     let mut run = Simulation::<D, S>::on(session, loaded, mesh).expect("a simulation");
     let mut counts = Vec::with_capacity(COUNTED);
     for number in 0..FIRST + COUNTED {
