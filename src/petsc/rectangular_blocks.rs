@@ -1,6 +1,9 @@
 //! Matrices of small dense blocks that need not be square, in single precision: interpolations between levels.
 
-use super::symmetric_blocks::{ScalarRows, bytes_of, unit_of};
+use super::{
+    large_pages,
+    symmetric_blocks::{ScalarRows, bytes_of, unit_of},
+};
 use std::array;
 
 /// Products with a matrix and with its transpose.
@@ -62,6 +65,7 @@ impl<const R: usize, const C: usize> RectangularBlocks<R, C> {
         }
         matrix.columns.shrink_to_fit();
         matrix.blocks.shrink_to_fit();
+        large_pages::put(&matrix.blocks);
         matrix
     }
 

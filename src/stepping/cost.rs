@@ -63,7 +63,7 @@ impl Service {
                 let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
                 Cost {
                     memory: 8.0 * entries,
-                    set_up: self.pick(2e-6 * n + 2.5e-9 * n.powf(1.5), 5e-6 * n + 0.65e-9 * n * n),
+                    set_up: self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 1.05e-9 * n * n),
                     step: entries * self.pick(2.4e-9, 1.2e-9),
                 }
             }
@@ -71,8 +71,8 @@ impl Service {
                 let iterations = Iterations { without: 20.0, contact: 30.0, friction: 300.0 };
                 Cost {
                     memory: 2.2 * self.matrix(),
-                    set_up: n * self.pick(2.5e-6, 10e-6),
-                    step: self.iterations(iterations) * n * self.pick(90e-9, 110e-9),
+                    set_up: n * self.pick(7e-6, 22e-6),
+                    step: self.iterations(iterations) * n * self.pick(100e-9, 180e-9),
                 }
             }
             Preconditioner::Boomeramg => {
