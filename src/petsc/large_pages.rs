@@ -1,5 +1,4 @@
-//! Large pages for what solves read as a whole, factors and matrices: with pages of 4 KiB a good part of the time goes into
-//! finding them.
+//! Large pages for factors: a solve reads all of a factor, and with pages of 4 KiB a good part of its time goes into finding them.
 
 use super::sys;
 use std::ffi::c_int;
@@ -10,7 +9,7 @@ const PAGE: usize = 1 << 21;
 const MADV_COLLAPSE: c_int = 25;
 
 /// Puts these numbers on large pages, where the system has any to give.
-pub(super) fn put<T: Copy>(values: &[T]) {
+pub(super) fn put(values: &[f64]) {
     let range = values.as_ptr_range();
     let first = range.start.addr().next_multiple_of(PAGE);
     let Some(bytes) = (range.end.addr() / PAGE * PAGE).checked_sub(first).filter(|bytes| *bytes > 0) else {

@@ -1,9 +1,6 @@
 //! Matrices of small dense blocks that need not be square, in single precision: interpolations between levels.
 
-use super::{
-    large_pages,
-    symmetric_blocks::{ScalarRows, bytes_of, unit_of},
-};
+use super::symmetric_blocks::{ScalarRows, bytes_of, unit_of};
 use std::array;
 
 /// Products with a matrix and with its transpose.
@@ -65,7 +62,6 @@ impl<const R: usize, const C: usize> RectangularBlocks<R, C> {
         }
         matrix.columns.shrink_to_fit();
         matrix.blocks.shrink_to_fit();
-        large_pages::put(&matrix.blocks);
         matrix
     }
 

@@ -1,7 +1,7 @@
 //! Symmetric matrices of small dense blocks, of which the lower half is kept: a product reads half the numbers, and one column
 //! number for a whole block.
 
-use super::{large_pages, sys};
+use super::sys;
 use std::array;
 
 /// How a number is stored; products are summed in double precision.
@@ -111,8 +111,6 @@ impl<const B: usize, T: Stored> SymmetricBlocks<B, T> {
         }
         matrix.columns.shrink_to_fit();
         matrix.blocks.shrink_to_fit();
-        large_pages::put(&matrix.columns);
-        large_pages::put(&matrix.blocks);
         matrix
     }
 }
