@@ -180,10 +180,10 @@ fn checkpoints(session: &Session, folder: &Path, part: &Part) {
     let file = |repetition: usize| folder.join(format!("part-{repetition}"));
     measure(session, "  writing through HDF5", bytes, |n| write_tables(session, &file(n), part));
     measure(session, "  digest and seal, with the disk", bytes, |n| {
-        seal::seal(&file(n), world).expect("seal")
+        seal::seal(&file(n), seal::CHECKPOINT, world).expect("seal")
     });
     measure(session, "  digest and seal, already on the disk", bytes, |n| {
-        seal::seal(&file(n), world).expect("seal");
+        seal::seal(&file(n), seal::CHECKPOINT, world).expect("seal");
     });
     measure(session, "  rename and removal", bytes, |n| {
         on_first(session, || {
