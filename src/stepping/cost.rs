@@ -16,7 +16,14 @@ pub struct Cost {
     pub set_up: f64,
     /// Seconds of a step.
     pub step: f64,
+    /// Krylov iterations of a step that exchange messages.
+    pub iterations: f64,
 }
+
+/// Seconds of the messages of a V-cycle between processes of one machine: 25 exchanges with two neighbours (docs/scaling.md).
+const MESSAGES: f64 = 100e-6;
+/// V-cycles whose messages take as long as those of a set-up.
+const SET_UP_CYCLES: f64 = 100.0;
 
 /// Iterations of a step without contact, with it, and with friction, which may hold nodes that the preconditioner sees free.
 struct Iterations {
@@ -65,33 +72,40 @@ impl Service {
                     memory: 8.0 * entries,
                     set_up: self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 1.05e-9 * n * n),
                     step: entries * self.pick(2.4e-9, 1.2e-9),
+                    iterations: 0.0,
                 }
             }
             Preconditioner::Gamg => {
-                let iterations = Iterations { without: 20.0, contact: 30.0, friction: 300.0 };
+                let iterations =
+                    self.iterations(Iterations { without: 20.0, contact: 30.0, friction: 300.0 });
                 Cost {
                     memory: 2.2 * self.matrix(),
                     set_up: n * self.pick(7e-6, 22e-6),
-                    step: self.iterations(iterations) * n * self.pick(100e-9, 180e-9),
+                    step: iterations * n * self.pick(100e-9, 180e-9),
+                    iterations,
                 }
             }
             Preconditioner::Boomeramg => {
-                let iterations = Iterations { without: 14.0, contact: 20.0, friction: 200.0 };
+                let iterations =
+                    self.iterations(Iterations { without: 14.0, contact: 20.0, friction: 200.0 });
                 Cost {
                     memory: 3.5 * self.matrix(),
                     set_up: n * self.pick(1.5e-6, 5e-6),
-                    step: self.iterations(iterations) * n * self.pick(120e-9, 300e-9),
+                    step: iterations * n * self.pick(120e-9, 300e-9),
+                    iterations,
                 }
             }
         }
     }
 
-    /// Seconds of set-up and of the steps that one matrix is for, of the work that is shared by the ranks or done by each.
+    /// Seconds of set-up and of the steps that one matrix is for: work that every rank does, or that they share with messages.
     pub(super) fn seconds(self, preconditioner: Preconditioner) -> f64 {
-        let cost = self.cost(preconditioner);
-        let seconds = cost.set_up + self.steps as f64 * cost.step;
-        let every_rank_does_it_all = preconditioner.is_redundant(self.ranks, self.unknowns);
-        if every_rank_does_it_all { seconds } else { seconds / self.ranks as f64 }
+        let (cost, steps) = (self.cost(preconditioner), self.steps as f64);
+        let work = cost.set_up + steps * cost.step;
+        if self.ranks == 1 || preconditioner.is_redundant(self.ranks, self.unknowns) {
+            return work;
+        }
+        work / self.ranks as f64 + (SET_UP_CYCLES + steps * cost.iterations) * MESSAGES
     }
 }
 

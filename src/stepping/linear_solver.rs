@@ -215,6 +215,9 @@ mod tests {
     fn ranks_factor_small_matrices_each_for_itself() {
         assert_eq!(chosen(service(2, 500_000, 2, 64)), Preconditioner::Gamg);
         assert_eq!(chosen(service(2, 40_000, 2, 64)), Preconditioner::Cholesky);
+        for steps in [1, 8, 1000] {
+            assert_eq!(chosen(service(2, 300, 7, steps)), Preconditioner::Cholesky);
+        }
         let (asked, why) = Preconditioner::Gamg.resolve(service(3, 9, 1, 1));
         assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
     }
