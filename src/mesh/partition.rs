@@ -1,6 +1,9 @@
 //! Which rank works on which cell and owns which node.
 
-use super::{GlobalMesh, surface::DualGraph};
+use super::{
+    GlobalMesh, Tags,
+    surface::{DualGraph, Topology},
+};
 use crate::error::{Error, Result};
 
 /// The assignment of a whole mesh to ranks, made on rank 0.
@@ -27,7 +30,12 @@ pub enum Method {
 
 /// Splits the mesh into `ranks` parts of near equal cell count with few facets between parts: METIS on the dual graph
 /// with a fixed seed, so that equal meshes give equal parts.
-pub fn partition<const D: usize>(
+pub fn divide<const D: usize>(mesh: &GlobalMesh<D>, ranks: usize, method: Method) -> Result<Partition> {
+    let dual = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?.dual_graph();
+    partition(mesh, &dual, ranks, method)
+}
+
+fn partition<const D: usize>(
     mesh: &GlobalMesh<D>,
     dual: &DualGraph,
     ranks: usize,
@@ -120,11 +128,7 @@ fn edge_cut(dual: &DualGraph, cell_ranks: &[u32]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{
-        Tags,
-        generate::{Diagonal, rectangle},
-        surface::Topology,
-    };
+    use crate::mesh::generate::{Diagonal, rectangle};
 
     fn square(n: usize) -> (GlobalMesh<2>, DualGraph) {
         let mesh = rectangle([1.0, 1.0], [n, n], Diagonal::Right, [1.0, 1.0]).unwrap();

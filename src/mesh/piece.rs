@@ -211,15 +211,12 @@ impl<'a, const D: usize> Cutter<'a, D> {
 mod tests {
     use super::*;
     use crate::mesh::{
-        Tags,
         generate::{Diagonal, box_mesh, rectangle},
-        partition::{Method, partition},
-        surface::Topology,
+        partition::{Method, divide},
     };
 
     fn cut<const D: usize>(mesh: &GlobalMesh<D>, parts: usize) -> Vec<Piece<D>> {
-        let dual = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default()).unwrap().dual_graph();
-        let partition = partition(mesh, &dual, parts, Method::Recursive).unwrap();
+        let partition = divide(mesh, parts, Method::Recursive).unwrap();
         let mut cutter = Cutter::new(mesh, &partition, parts);
         (0..parts).map(|part| cutter.piece(part)).collect()
     }

@@ -4,10 +4,9 @@ use super::{Header, PartitionedFile, is_meant, write};
 use crate::{
     error::{Error, Result},
     mesh::{
-        GlobalMesh, Tags,
+        GlobalMesh,
         gmsh::{self, AnyMesh},
-        partition::{Method, partition},
-        surface::Topology,
+        partition::{Method, divide},
     },
 };
 use mpi::topology::SimpleCommunicator;
@@ -38,10 +37,6 @@ fn whole(source: &Path) -> Result<AnyMesh> {
 
 /// Cuts in two again and again, so that a rank that gets several consecutive parts has a compact one.
 fn split<const D: usize>(mesh: &GlobalMesh<D>, parts: usize, target: &Path) -> Result<Header> {
-    let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
-    let dual = topology.dual_graph();
-    drop(topology);
-    let partition = partition(mesh, &dual, parts, Method::Recursive)?;
-    drop(dual);
+    let partition = divide(mesh, parts, Method::Recursive)?;
     write(target, &SimpleCommunicator::self_comm(), mesh, &partition, parts)
 }

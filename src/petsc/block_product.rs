@@ -1,14 +1,14 @@
 use super::{
     DistributedVector, check,
-    compressed_rows::{Others, Parts, own_rows},
+    compressed_rows::{Others, Parts, multiply, own_rows},
     shell::{Action, Shell},
     symmetric_blocks::{Product, Stored, product},
     sys,
 };
 use crate::error::Result;
 
-/// Products with a symmetric matrix of PETSc's, from a copy of the rows and columns of this rank in blocks. The columns of other
-/// ranks stay PETSc's.
+/// Products with a symmetric matrix of PETSc's, from copies: in blocks of the rows and columns of this rank, entry by entry of the
+/// columns of other ranks.
 pub(super) struct BlockProduct {
     own: Box<dyn Product>,
     others: Option<Others>,
@@ -37,13 +37,8 @@ impl BlockProduct {
 }
 
 impl Action for BlockProduct {
-    /// The exchange with other ranks goes on while the rows here are multiplied.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        if let Some(others) = &self.others {
-            others.begin(x)?;
-        }
-        self.own.multiply(&x.owned()?, &mut y.owned_mut()?);
-        self.others.as_ref().map_or(Ok(()), |others| others.end_adding(x, y))
+        multiply(self.others.as_ref(), |x, y| self.own.multiply(x, y), x, y)
     }
 
     fn bytes(&self) -> u64 {

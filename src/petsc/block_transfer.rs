@@ -1,13 +1,14 @@
 use super::{
     DistributedVector, check,
-    compressed_rows::{Others, Parts, own_rows},
+    compressed_rows::{Others, Parts, multiply, own_rows},
     rectangular_blocks::{Transfer, transfer},
     shell::{Action, Shell},
     sys,
 };
 use crate::error::Result;
 
-/// Interpolation and restriction between two levels, from a copy in single precision of the rows and columns of this rank.
+/// Interpolation and restriction between two levels, from copies: in single precision of the rows and columns of this rank, in double
+/// precision of the columns of other ranks.
 pub(super) struct BlockTransfer {
     own: Box<dyn Transfer>,
     others: Option<Others>,
@@ -34,11 +35,7 @@ impl BlockTransfer {
 
 impl Action for BlockTransfer {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        if let Some(others) = &self.others {
-            others.begin(x)?;
-        }
-        self.own.multiply(&x.owned()?, &mut y.owned_mut()?);
-        self.others.as_ref().map_or(Ok(()), |others| others.end_adding(x, y))
+        multiply(self.others.as_ref(), |x, y| self.own.multiply(x, y), x, y)
     }
 
     fn multiply_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {

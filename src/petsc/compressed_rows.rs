@@ -74,6 +74,20 @@ pub(super) struct Others {
     values: ManuallyDrop<DistributedVector>,
 }
 
+/// `y = A x` from the product with this rank's own columns, which is made while the values of the others are on their way. Collective.
+pub(super) fn multiply(
+    others: Option<&Others>,
+    own: impl FnOnce(&[f64], &mut [f64]),
+    x: &DistributedVector,
+    y: &mut DistributedVector,
+) -> Result<()> {
+    if let Some(others) = others {
+        others.begin(x)?;
+    }
+    own(&x.owned()?, &mut y.owned_mut()?);
+    others.map_or(Ok(()), |others| others.end_adding(x, y))
+}
+
 /// The rows that have entries.
 #[derive(Default)]
 struct Entries {
@@ -153,14 +167,14 @@ impl Others {
     }
 
     /// Begins to send the values of `x`, laid out like the columns of the matrix, to ranks that need them. Collective.
-    pub fn begin(&self, x: &DistributedVector) -> Result<()> {
+    fn begin(&self, x: &DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: live objects, as below.
         check(unsafe { sys::VecScatterBegin(self.exchange, x.raw, self.values.raw, insert, forward) })
     }
 
     /// Ends that and adds the product with the columns of other ranks to `y`.
-    pub fn end_adding(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+    fn end_adding(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: as above.
         check(unsafe { sys::VecScatterEnd(self.exchange, x.raw, self.values.raw, insert, forward) })?;

@@ -5,11 +5,10 @@ use crate::{
     error::Result,
     job::{self, Loaded, Partition},
     mesh::{
-        GlobalMesh, Mesh, Tags, distribute,
+        GlobalMesh, Mesh, distribute,
         generate::{Cuboid, Diagonal, Grading, Grid, Rectangle, Toward},
         gmsh::{self, AnyMesh},
-        partition::{Method, partition},
-        surface::Topology,
+        partition::{Method, divide},
     },
     partitioned::{self, PartitionedFile},
     session::Session,
@@ -48,10 +47,7 @@ impl Scene {
 /// Splits a mesh that is whole on rank 0 (`None` elsewhere) and hands the parts out. Collective.
 pub(super) fn split<const D: usize>(session: &Session, whole: Option<GlobalMesh<D>>) -> Result<Mesh<D>> {
     let split = |mesh: GlobalMesh<D>| {
-        let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &Tags::default())?;
-        let dual = topology.dual_graph();
-        drop(topology);
-        let parts = partition(&mesh, &dual, session.ranks(), Method::KWay)?;
+        let parts = divide(&mesh, session.ranks(), Method::KWay)?;
         Ok((mesh, parts))
     };
     distribute(session, session.agree(whole.map(split).transpose())?)

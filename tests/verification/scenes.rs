@@ -6,10 +6,9 @@ use clarke::{
     effect::{Effect, Held, Load, Support, fixed_components},
     job::Job,
     mesh::{
-        GlobalMesh, Mesh, Tags, distribute,
+        GlobalMesh, Mesh, distribute,
         generate::{Diagonal, box_mesh, rectangle},
-        partition::{Method, partition},
-        surface::Topology,
+        partition::{Method, divide},
     },
     run::Simulation,
     session::Session,
@@ -48,11 +47,9 @@ pub fn stir<const D: usize>(mut mesh: GlobalMesh<D>, reach: f64) -> GlobalMesh<D
 
 /// This rank's part of a mesh that every rank has made.
 pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D> {
-    let parts = session.is_first().then(|| {
-        let topology = Topology::<D>::new(&whole.cells, whole.nodes.len(), &Tags::default());
-        let dual = topology.expect("topology").dual_graph();
-        (whole.clone(), partition(whole, &dual, session.ranks(), Method::KWay).expect("partition"))
-    });
+    let parts = session
+        .is_first()
+        .then(|| (whole.clone(), divide(whole, session.ranks(), Method::KWay).expect("partition")));
     distribute(session, parts).expect("distributed")
 }
 
