@@ -1,4 +1,4 @@
-//! Finds the system's PETSc through pkg-config, with the CHOLMOD that it uses, and generates the raw bindings of what `src/petsc` calls.
+//! Finds the system's PETSc through pkg-config, with the CHOLMOD and the BLAS that it uses, and generates the raw bindings of what `src/petsc` calls.
 
 use bindgen::callbacks::{IntKind, ParseCallbacks};
 use std::{
@@ -40,7 +40,8 @@ const FUNCTIONS: &[&str] = &[
     "Mat(CreateSeqDense|CholeskyFactor|MatTransposeMult|Solve|CreateVecs)",
     "MatDense(Get|Restore)Array(Read)?",
     "(madvise|dlsym)",
-    "cholmod_(l_)?(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|free_dense|free_factor)",
+    "cholmod_(l_)?(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|change_factor|free_dense|free_factor)",
+    "(cblas_s(gemm|syrk|trsm)|spotrf_)",
 ];
 
 /// What a build of PETSc may have or not, by its macro, and the cfg that says so.
@@ -70,7 +71,9 @@ fn main() {
 
     let petsc = find_petsc();
     check_configuration(&petsc.include_paths);
-    println!("cargo::rustc-link-lib=cholmod");
+    for library in ["cholmod", "lapack", "blas"] {
+        println!("cargo::rustc-link-lib={library}");
+    }
     let mpi = build_probe_mpi::probe()
         .unwrap_or_else(|e| panic!("no MPI found (Debian: apt-get install libopenmpi-dev): {e:?}"));
     let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
@@ -84,7 +87,7 @@ fn main() {
         .generate_cstr(true)
         .allowlist_function(format!("({})", FUNCTIONS.join("|")))
         .allowlist_type("(PetscInt|PetscErrorType|MatOperation|MatOption|InsertMode|ScatterMode|NormType|MatInfo.*|MatDuplicateOption|MatStructure|PetscBool)")
-        .allowlist_var("(PETSC_(COMM_WORLD|COPY_VALUES|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|MADV_HUGEPAGE)")
+        .allowlist_var("(PETSC_(COMM_WORLD|COPY_VALUES|DETERMINE|DEFAULT|ERR_USER|ERROR_INITIAL)|MAT_.*|MATOP_.*|INSERT_VALUES|ADD_VALUES|SCATTER_.*|NORM_.*|CHOLMOD_.*|KSP_NORM_.*|SAME_NONZERO_PATTERN|MADV_HUGEPAGE|Cblas.*)")
         .blocklist_type("(MPI_.*|ompi_.*|_IO_.*|FILE)")
         .raw_line("pub use mpi_sys::{MPI_Comm, RSMPI_COMM_SELF};")
         .layout_tests(false)

@@ -17,6 +17,7 @@ const NO_PHYSICS: &[&str] = &[
     "mesh.rectangle.partition",
     "output",
     "solver.accept",
+    "solver.factor_precision",
     "solver.guesses",
     "solver.inclusion_tolerance",
     "solver.max_newton_iterations",

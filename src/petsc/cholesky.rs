@@ -1,290 +1,161 @@
 use super::{
-    BlockRows, cholmod, large_pages,
-    lower_half::{Lower, view},
-    sys,
+    BlockRows, analysis::Analysis, double_factor::DoubleFactor, lower_half::Lower,
+    single_factor::SingleFactor,
 };
-use crate::error::{Error, Result};
-use std::{
-    ffi::{c_int, c_void},
-    marker::PhantomData,
-    mem::MaybeUninit,
-    ptr,
-};
+use crate::error::Result;
 
-/// Cholesky factorisation `L L^T` by CHOLMOD of a matrix that is whole on this rank, with chosen unknowns eliminated last.
+/// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last: by CHOLMOD, or
+/// in single precision on its analysis.
 ///
 /// A solve comes in two halves, [`forward`](Self::forward) and [`backward`](Self::backward); in between stands what is left
 /// for the last unknowns, and may be replaced. PETSc's own interface to CHOLMOD knows neither halves nor orders.
 #[derive(Debug)]
 pub struct Cholesky {
-    common: Box<sys::cholmod_common>,
-    factor: *mut sys::cholmod_factor,
-    given: *mut sys::cholmod_dense,
-    halfway: *mut sys::cholmod_dense,
-    work: [*mut sys::cholmod_dense; 2],
-    /// The unknown at each place of the order of elimination.
-    order: Vec<u32>,
+    analysis: Analysis,
+    numbers: Numbers,
     last: usize,
-    not_send: PhantomData<*mut ()>,
 }
 
-/// Nodes from which on nested dissection leaves less to factor than minimum degree.
-const DISSECTED: usize = 2_000;
+#[derive(Debug)]
+enum Numbers {
+    Double(DoubleFactor),
+    Single(SingleFactor),
+}
+
+/// The numbers of a factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// Of 32 bits.
+    Single,
+    /// Of 64 bits.
+    Double,
+}
+
+impl Precision {
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+        }
+    }
+}
 
 impl Cholesky {
-    /// Factors the whole matrix of these block rows, in a known order or in one with these unknowns last. `None` where they
-    /// can't be: the rest does not tie them together.
+    /// Factors the whole matrix of these block rows, in a known order or in one with these unknowns last; in double precision
+    /// also where it is not positive definite in single. `None` where they can't be last: the rest does not tie them together.
     pub fn new(
         block: usize,
         rows: &BlockRows,
         last: &[usize],
         known: Option<&[u32]>,
+        precision: Precision,
     ) -> Result<Option<Self>> {
-        let size = (rows.offsets.len() - 1) * block;
-        let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
-        // SAFETY: CHOLMOD fills the struct, which stays in its box.
-        let common = unsafe {
-            cholmod::cholmod_start(common.as_mut_ptr());
-            let mut common = Box::from_raw(Box::into_raw(common).cast::<sys::cholmod_common>());
-            common.print = 0;
-            common.supernodal = sys::CHOLMOD_SUPERNODAL as c_int;
-            common.nmethods = 1;
-            common.method[0].ordering = sys::CHOLMOD_GIVEN as c_int;
-            common
-        };
-        let mut cholesky = Self {
-            common,
-            factor: ptr::null_mut(),
-            given: ptr::null_mut(),
-            halfway: ptr::null_mut(),
-            work: [ptr::null_mut(); 2],
-            order: Vec::new(),
-            last: last.len(),
-            not_send: PhantomData,
-        };
-        let mut is_last = vec![false; size];
-        last.iter().for_each(|&unknown| is_last[unknown] = true);
-        let mut order: Vec<sys::PetscInt> = match known {
-            Some(order) => order.iter().map(|&unknown| unknown as sys::PetscInt).collect(),
-            None => {
-                let nodes = cholesky.node_order(block, rows)?.into_iter().map(|node| node as usize);
-                let unknowns = nodes.flat_map(|node| (0..block).map(move |i| node * block + i));
-                let first = unknowns.filter(|&unknown| !is_last[unknown]);
-                first.chain(last.iter().copied()).map(|unknown| unknown as sys::PetscInt).collect()
-            }
-        };
         let mut lower = Lower::of(block, rows)?;
-        let mut matrix = lower.view();
-        // SAFETY: the view lives for the call, the order has as many entries as the matrix rows; the handle owns the factor.
-        unsafe {
-            cholesky.factor = cholmod::cholmod_analyze_p(
-                &mut matrix,
-                order.as_mut_ptr(),
-                ptr::null_mut(),
-                0,
-                &mut *cholesky.common,
-            );
-            cholesky.check()?;
-            let found = std::slice::from_raw_parts((*cholesky.factor).Perm.cast::<sys::PetscInt>(), size);
-            cholesky.order = found.iter().map(|&unknown| unknown as u32).collect();
-            cholesky.given = cholmod::cholmod_allocate_dense(
-                size,
-                1,
-                size,
-                sys::CHOLMOD_REAL as c_int,
-                &mut *cholesky.common,
-            );
-        }
-        cholesky.check()?;
-        let tail = &cholesky.order[size - last.len()..];
-        if !tail.iter().all(|&unknown| is_last[unknown as usize]) {
-            return Ok(None);
-        }
-        // SAFETY: the view lives for the call; the handle owns a factor of its pattern.
-        unsafe { cholmod::cholmod_factorize(&mut matrix, cholesky.factor, &mut *cholesky.common) };
-        if cholesky.common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
-            return Err(Error::Failed(
-                "the matrix of the step is not positive definite: check densities, viscosities and moduli"
-                    .into(),
-            ));
-        }
-        cholesky.check()?;
-        // SAFETY: CHOLMOD has just written so many numbers there.
-        unsafe {
-            let factor = &*cholesky.factor;
-            large_pages::put(std::slice::from_raw_parts(factor.x.cast::<f64>(), factor.xsize));
-        }
-        Ok(Some(cholesky))
+        let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
+        let Some(mut analysis) = analysed else { return Ok(None) };
+        let single = match precision {
+            Precision::Single => SingleFactor::new(&analysis, &lower, last.len()),
+            Precision::Double => None,
+        };
+        let numbers = match single {
+            Some(single) => Numbers::Single(single),
+            None => Numbers::Double(DoubleFactor::new(&mut analysis, &mut lower.view())?),
+        };
+        Ok(Some(Self { analysis, numbers, last: last.len() }))
     }
 
-    /// Nodes in an order that leaves little to factor.
-    fn node_order(&mut self, block: usize, rows: &BlockRows) -> Result<Vec<sys::PetscInt>> {
-        let nodes = rows.offsets.len() - 1;
-        let (mut starts, mut indices) = (vec![0], Vec::new());
-        for (row, range) in rows.offsets.windows(2).enumerate() {
-            let entries = rows.columns[range[0]..range[1]].iter();
-            let blocks = rows.values[range[0] * block * block..].chunks_exact(block * block);
-            for (&column, block) in entries.zip(blocks).filter(|(column, _)| **column as usize >= row) {
-                if column as usize == row || block.iter().any(|&value| value != 0.0) {
-                    indices.push(column as sys::PetscInt);
-                }
-            }
-            starts.push(indices.len() as sys::PetscInt);
+    /// The precision of the factor.
+    pub fn precision(&self) -> Precision {
+        match self.numbers {
+            Numbers::Double(_) => Precision::Double,
+            Numbers::Single(_) => Precision::Single,
         }
-        let mut order = vec![0; nodes];
-        let mut pattern = view(nodes, &mut starts, &mut indices, None);
-        let common = &mut *self.common;
-        // SAFETY: the view lives for the call; the order has one entry a node.
-        unsafe {
-            if nodes < DISSECTED {
-                cholmod::cholmod_amd(&mut pattern, ptr::null_mut(), 0, order.as_mut_ptr(), common);
-            } else {
-                cholmod::cholmod_metis(&mut pattern, ptr::null_mut(), 0, 1, order.as_mut_ptr(), common);
-            }
-        }
-        self.check()?;
-        Ok(order)
     }
 
     /// Takes a right-hand side half through: `L y = b`.
     pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
-        let order = &self.order;
-        // SAFETY: the handle owns as many numbers as unknowns there.
-        let given = unsafe { std::slice::from_raw_parts_mut((*self.given).x.cast::<f64>(), order.len()) };
-        given.iter_mut().zip(order).for_each(|(value, &at)| *value = right_hand_side[at as usize]);
-        self.half(sys::CHOLMOD_L as c_int, true)
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.forward(&mut self.analysis, right_hand_side),
+            Numbers::Single(factor) => {
+                factor.forward(&self.analysis, right_hand_side);
+                Ok(())
+            }
+        }
     }
 
     /// The part of `y` of the last unknowns, in the order of [`last_unknowns`](Self::last_unknowns).
     pub fn last_mut(&mut self) -> &mut [f64] {
-        let (first, last) = (self.order.len() - self.last, self.last);
-        if self.halfway.is_null() {
-            return &mut [];
+        let first = self.order().len() - self.last;
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.tail_mut(&self.analysis, first),
+            Numbers::Single(factor) => &mut factor.last,
         }
-        // SAFETY: the handle owns as many numbers as unknowns there, once a solve went half through.
-        unsafe { std::slice::from_raw_parts_mut((*self.halfway).x.cast::<f64>().add(first), last) }
     }
 
     /// The order of elimination.
     pub fn order(&self) -> &[u32] {
-        &self.order
+        &self.analysis.order
     }
 
     /// The last unknowns in the order in which they are eliminated.
     pub fn last_unknowns(&self) -> &[u32] {
-        &self.order[self.order.len() - self.last..]
+        &self.order()[self.order().len() - self.last..]
     }
 
     /// Takes `y` the other half of the way: `L^T x = y`.
     pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
-        self.half(sys::CHOLMOD_Lt as c_int, false)?;
-        // SAFETY: as in `forward`.
-        let found = unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), self.order.len()) };
-        self.order.iter().zip(found).for_each(|(&at, value)| solution[at as usize] = *value);
-        Ok(())
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.backward(&mut self.analysis, solution),
+            Numbers::Single(factor) => {
+                factor.backward(&self.analysis, solution);
+                Ok(())
+            }
+        }
     }
 
     /// Bytes that half a solve reads at the least: the entries of the factor, and the rows of each of its supernodes once.
     pub fn bytes(&self) -> u64 {
-        // SAFETY: as in `last_factor`.
-        let (starts, rows) = unsafe {
-            let factor = &*self.factor;
-            let list =
-                |pointer: *mut c_void| std::slice::from_raw_parts(pointer.cast::<c_int>(), factor.nsuper + 1);
-            (list(factor.super_), list(factor.pi))
+        let [entries, rows] = self.analysis.supernodes().counts();
+        let number = match self.precision() {
+            Precision::Double => size_of::<f64>(),
+            Precision::Single => size_of::<f32>(),
         };
-        let lengths = |starts: &[c_int]| u64::try_from(starts[1] - starts[0]).unwrap_or(0);
-        let nodes = starts.windows(2).map(lengths).zip(rows.windows(2).map(lengths));
-        let (number, index) = (size_of::<f64>() as u64, size_of::<c_int>() as u64);
-        nodes
-            .map(|(columns, rows)| number * (columns * rows - columns * (columns - 1) / 2) + index * rows)
-            .sum()
-    }
-
-    fn half(&mut self, system: c_int, forward: bool) -> Result<()> {
-        let [work, more] = &mut self.work;
-        let (from, to) =
-            if forward { (self.given, &mut self.halfway) } else { (self.halfway, &mut self.given) };
-        // SAFETY: live factor and vectors of its size; CHOLMOD allocates what is missing, the handle owns it.
-        unsafe {
-            cholmod::cholmod_solve2(
-                system,
-                self.factor,
-                from,
-                ptr::null_mut(),
-                to,
-                ptr::null_mut(),
-                work,
-                more,
-                &mut *self.common,
-            )
-        };
-        self.check()
+        number as u64 * entries + size_of::<super::sys::PetscInt>() as u64 * rows
     }
 
     /// The block of `L` of the last unknowns, whose product with its transpose is their Schur complement: column after
     /// column, each from its diagonal down.
     pub fn last_factor(&self) -> Vec<f64> {
-        let (size, last) = (self.order.len(), self.last);
+        let (size, last) = (self.order().len(), self.last);
         let first = size - last;
         let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
+        let value = |at: usize, row: usize| match &self.numbers {
+            Numbers::Double(_) => DoubleFactor::values(&self.analysis)[at],
+            Numbers::Single(factor) => f64::from(factor.values[at]) / factor.scales[row],
+        };
         let mut columns = vec![0.0; last * (last + 1) / 2];
-        // SAFETY: a numeric supernodal factor; the lengths of its arrays are those that CHOLMOD documents.
-        unsafe {
-            let factor = &*self.factor;
-            let list = |pointer: *mut c_void, length: usize| {
-                std::slice::from_raw_parts(pointer.cast::<sys::PetscInt>(), length)
-            };
-            let nodes = list(factor.super_, factor.nsuper + 1);
-            let (rows_at, values_at) =
-                (list(factor.pi, factor.nsuper + 1), list(factor.px, factor.nsuper + 1));
-            let rows = list(factor.s, factor.ssize);
-            let values = std::slice::from_raw_parts(factor.x.cast::<f64>(), factor.xsize);
-            for node in (0..factor.nsuper).rev() {
-                let own = nodes[node] as usize..nodes[node + 1] as usize;
-                if own.end <= first {
-                    break;
-                }
-                let rows = &rows[rows_at[node] as usize..rows_at[node + 1] as usize];
-                for column in own.clone().filter(|&column| column >= first) {
-                    let values = &values[values_at[node] as usize + (column - own.start) * rows.len()..];
-                    let at = start(column - first);
-                    for (&row, &value) in rows.iter().zip(values).filter(|(row, _)| **row as usize >= column)
-                    {
-                        columns[at + row as usize - column] = value;
-                    }
+        let nodes = self.analysis.supernodes();
+        for node in (0..nodes.len()).rev() {
+            let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
+            if own.end <= first {
+                break;
+            }
+            for column in own.clone().filter(|&column| column >= first) {
+                let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
+                for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
+                    columns[to + row as usize - column] = value(from + at, row as usize);
                 }
             }
         }
         columns
     }
-
-    fn check(&self) -> Result<()> {
-        match self.common.status {
-            status if status >= 0 => Ok(()),
-            status if status == sys::CHOLMOD_OUT_OF_MEMORY => Err(Error::Failed(
-                "not enough memory for the factors: use [solver] preconditioner = \"gamg\", or more memory"
-                    .into(),
-            )),
-            status if status == sys::CHOLMOD_TOO_LARGE => Err(Error::Failed(
-                "the factors are too large for CHOLMOD's indices: use [solver] preconditioner = \"gamg\""
-                    .into(),
-            )),
-            status => Err(Error::Internal(format!("CHOLMOD error {status}"))),
-        }
-    }
 }
 
 impl Drop for Cholesky {
     fn drop(&mut self) {
-        let common = &mut *self.common;
-        // SAFETY: the handle owns all of these; CHOLMOD takes null pointers.
-        unsafe {
-            for dense in self.work.iter_mut().chain([&mut self.given, &mut self.halfway]) {
-                cholmod::cholmod_free_dense(dense, common);
-            }
-            cholmod::cholmod_free_factor(&mut self.factor, common);
-            cholmod::cholmod_finish(common);
+        if let Numbers::Double(factor) = &mut self.numbers {
+            factor.free(&mut self.analysis.common);
         }
     }
 }
@@ -292,6 +163,7 @@ impl Drop for Cholesky {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use Precision::{Double, Single};
 
     /// A chain of masses between springs, the last one held by one: 2 on the diagonal, -1 beside it.
     fn chain(length: usize) -> BlockRows {
@@ -316,11 +188,14 @@ mod tests {
     #[test]
     fn both_halves_together_solve() {
         let rows = chain(5);
-        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
-        // A parabola has the second difference 2.
-        let x = solve(&mut cholesky, &[2.0; 5]);
-        for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
-            assert!((found - known).abs() < 1e-13, "{x:?}");
+        for (precision, error) in [(Double, 1e-13), (Single, 1e-5)] {
+            let mut cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            assert_eq!(cholesky.precision(), precision);
+            // A parabola has the second difference 2.
+            let x = solve(&mut cholesky, &[2.0; 5]);
+            for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
+                assert!((found - known).abs() < error, "{x:?}");
+            }
         }
     }
 
@@ -329,33 +204,40 @@ mod tests {
         let mut rows = chain(3);
         (rows.offsets, rows.columns) = (vec![0, 3, 6, 9], vec![0, 1, 2, 0, 1, 2, 0, 1, 2]);
         rows.values = vec![4.0, 1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 4.0];
-        let cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
-        assert_eq!(cholesky.bytes(), 6 * 8 + 3 * 4);
+        let index = size_of::<super::super::sys::PetscInt>() as u64;
+        for (precision, number) in [(Double, 8), (Single, 4)] {
+            let cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            assert_eq!(cholesky.bytes(), 6 * number + 3 * index);
+        }
     }
 
     #[test]
     fn the_last_block_is_the_factor_of_the_schur_complement() {
         let rows = chain(3);
-        let cholesky = Cholesky::new(1, &rows, &[0, 2], None).unwrap().unwrap();
-        // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
-        let l = cholesky.last_factor();
-        let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
-        for (found, known) in schur.iter().zip([1.5, -0.5, 1.5]) {
-            assert!((found - known).abs() < 1e-14, "{schur:?}");
+        for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
+            let cholesky = Cholesky::new(1, &rows, &[0, 2], None, precision).unwrap().unwrap();
+            // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
+            let l = cholesky.last_factor();
+            let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
+            for (found, known) in schur.iter().zip([1.5, -0.5, 1.5]) {
+                assert!((found - known).abs() < error, "{schur:?}");
+            }
         }
     }
 
     #[test]
     fn a_value_set_halfway_is_that_of_the_last_unknown() {
         let rows = chain(3);
-        let mut cholesky = Cholesky::new(1, &rows, &[2], None).unwrap().unwrap();
-        cholesky.forward(&[0.0; 3]).unwrap();
-        let along = cholesky.last_factor()[0];
-        cholesky.last_mut()[0] = 3.0 * along;
-        let mut x = [0.0; 3];
-        cholesky.backward(&mut x).unwrap();
-        for (found, known) in x.iter().zip([1.0, 2.0, 3.0]) {
-            assert!((found - known).abs() < 1e-14, "{x:?}");
+        for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
+            let mut cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            cholesky.forward(&[0.0; 3]).unwrap();
+            let along = cholesky.last_factor()[0];
+            cholesky.last_mut()[0] = 3.0 * along;
+            let mut x = [0.0; 3];
+            cholesky.backward(&mut x).unwrap();
+            for (found, known) in x.iter().zip([1.0, 2.0, 3.0]) {
+                assert!((found - known).abs() < error, "{x:?}");
+            }
         }
     }
 
@@ -366,7 +248,7 @@ mod tests {
             columns: vec![0, 1, 0, 1, 2, 3, 2, 3],
             values: vec![2.0, -1.0, -1.0, 2.0, 2.0, -1.0, -1.0, 2.0],
         };
-        let both = Cholesky::new(1, &rows, &[1, 3], None).unwrap();
+        let both = Cholesky::new(1, &rows, &[1, 3], None, Double).unwrap();
         assert!(both.is_none_or(|cholesky| cholesky.last_unknowns().iter().all(|u| [1, 3].contains(u))));
     }
 
@@ -374,7 +256,75 @@ mod tests {
     fn an_indefinite_matrix_is_an_error_in_words() {
         let mut rows = chain(3);
         rows.values[0] = -2.0;
-        let error = Cholesky::new(1, &rows, &[1], None).unwrap_err();
-        assert!(error.to_string().contains("not positive definite"));
+        for precision in [Double, Single] {
+            let error = Cholesky::new(1, &rows, &[1], None, precision).unwrap_err();
+            assert!(error.to_string().contains("not positive definite"));
+        }
+    }
+
+    /// Springs between the nodes of a square grid, each also held a little: supernodes of many columns.
+    fn grid(length: usize, held: f64) -> BlockRows {
+        let mut rows = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        let near = |a: usize, b: usize| a.abs_diff(b) <= 1;
+        for node in 0..length * length {
+            let first = rows.columns.len();
+            let (x, y) = (node % length, node / length);
+            let others =
+                (0..length * length).filter(|other| near(x, other % length) && near(y, other / length));
+            rows.columns.extend(others.map(|other| other as u32));
+            let count = (rows.columns.len() - first - 1) as f64;
+            let value = |&other: &u32| if other as usize == node { count + held } else { -1.0 };
+            let values: Vec<f64> = rows.columns[first..].iter().map(value).collect();
+            rows.values.extend(values);
+            rows.offsets.push(rows.columns.len());
+        }
+        rows
+    }
+
+    #[test]
+    fn single_precision_is_near_double_on_panels_of_all_sizes() {
+        let rows = grid(60, 0.1);
+        let last: Vec<usize> = (0..60).collect();
+        let b: Vec<f64> = (0..3600).map(|i| 1e30 * f64::from(i % 17 - 8)).collect();
+        let [double, single] = [Double, Single].map(|precision| {
+            let mut cholesky = Cholesky::new(1, &rows, &last, None, precision).unwrap().unwrap();
+            (solve(&mut cholesky, &b), cholesky.last_factor(), cholesky.order().to_vec())
+        });
+        assert_eq!(double.2, single.2);
+        let worst = |a: &[f64], b: &[f64]| {
+            let largest = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
+        };
+        let errors = [worst(&double.0, &single.0), worst(&double.1, &single.1)];
+        assert!(errors.iter().all(|error| (1e-9..1e-5).contains(error)), "{errors:?}");
+    }
+
+    #[test]
+    fn entries_may_be_as_far_apart_as_double_precision_allows() {
+        let mut rows = chain(3);
+        let units = [1e60, 1.0, 1e-60];
+        for (row, range) in rows.offsets.windows(2).enumerate() {
+            for at in range[0]..range[1] {
+                rows.values[at] *= units[row] * units[rows.columns[at] as usize];
+            }
+        }
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None, Single).unwrap().unwrap();
+        assert_eq!(cholesky.precision(), Single);
+        let x = solve(&mut cholesky, &[2e60, 2.0, 2e-60]);
+        for ((found, unit), known) in x.iter().zip(units).zip([3.0, 4.0, 3.0]) {
+            assert!((found * unit - known).abs() < 1e-5, "{x:?}");
+        }
+    }
+
+    #[test]
+    fn what_single_precision_cant_factor_is_factored_in_double() {
+        let off = 1.0 - 1e-9;
+        let rows = BlockRows {
+            offsets: vec![0, 2, 4],
+            columns: vec![0, 1, 0, 1],
+            values: vec![1.0, off, off, 1.0],
+        };
+        let cholesky = Cholesky::new(1, &rows, &[0], None, Single).unwrap().unwrap();
+        assert_eq!(cholesky.precision(), Double);
     }
 }

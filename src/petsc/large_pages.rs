@@ -9,7 +9,7 @@ const PAGE: usize = 1 << 21;
 const MADV_COLLAPSE: c_int = 25;
 
 /// Puts these numbers on large pages, where the system has any to give.
-pub(super) fn put(values: &[f64]) {
+pub(super) fn put<T>(values: &[T]) {
     let range = values.as_ptr_range();
     let first = range.start.addr().next_multiple_of(PAGE);
     let Some(bytes) = (range.end.addr() / PAGE * PAGE).checked_sub(first).filter(|bytes| *bytes > 0) else {

@@ -46,6 +46,20 @@ impl Lower {
         Ok(lower)
     }
 
+    /// Stored entries.
+    pub fn len(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// Column, row and value of each entry.
+    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.starts.windows(2).enumerate().flat_map(|(column, range)| {
+            let range = range[0] as usize..range[1] as usize;
+            let rows = self.indices[range.clone()].iter().map(|&row| row as usize);
+            rows.zip(&self.values[range]).map(move |(row, &value)| (column, row, value))
+        })
+    }
+
     pub fn view(&mut self) -> sys::cholmod_sparse {
         view(self.starts.len() - 1, &mut self.starts, &mut self.indices, Some(&mut self.values))
     }

@@ -5,6 +5,7 @@
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
+mod analysis;
 mod applied;
 mod block_product;
 mod block_transfer;
@@ -13,17 +14,21 @@ mod cholesky;
 mod cholmod;
 mod compressed_rows;
 mod dense;
+mod double_factor;
 mod ksp;
 mod large_pages;
 mod levels;
 mod library;
 mod lower_half;
 mod matrix;
+mod panel;
 mod projected;
 mod projected_operator;
 mod rectangular_blocks;
 mod reduced;
 mod shell;
+mod single_blas;
+mod single_factor;
 mod snes;
 mod symmetric_blocks;
 pub mod sys;
@@ -31,7 +36,7 @@ mod threads;
 mod variational_inequality;
 mod vector;
 
-pub use cholesky::Cholesky;
+pub use cholesky::{Cholesky, Precision};
 pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};

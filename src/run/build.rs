@@ -19,7 +19,8 @@ use crate::{
     space::{Geometry, surface_points},
     state::State,
     stepping::{
-        Adaptive, AdaptiveSettings, FrictionIteration, Method, Preconditioner, Scheme, SolverSettings,
+        Adaptive, AdaptiveSettings, FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme,
+        SolverSettings,
     },
     tensor::Vector,
 };
@@ -381,6 +382,11 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
             job::Preconditioner::Cholesky => Preconditioner::Cholesky,
             job::Preconditioner::Gamg => Preconditioner::Gamg,
             job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
+        },
+        factor_precision: match job.solver.factor_precision {
+            job::FactorPrecision::Auto => FactorPrecision::Auto,
+            job::FactorPrecision::Single => FactorPrecision::Single,
+            job::FactorPrecision::Double => FactorPrecision::Double,
         },
         steps: steps_a_matrix(job),
         newton_iterations: job.solver.max_newton_iterations as usize,

@@ -100,6 +100,7 @@ fn report<const D: usize, const S: usize>(
     let steps = steps_between(0.0, job.time.end, longest);
     let inventory = Inventory::of(session, body, scheme);
     let (preconditioner, reason) = scheme.preconditioner();
+    let precision = build::settings(job).factor_precision;
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,
@@ -129,7 +130,7 @@ fn report<const D: usize, const S: usize>(
             worst_cell: quality.worst_cell,
             poor_cells: quality.poor,
         },
-        estimate: Estimate::new(session, body, &inventory, preconditioner, steps),
+        estimate: Estimate::new(session, body, &inventory, (preconditioner, precision), steps),
         warnings: loaded.warnings.clone(),
         output_folder: job.output_folder().display().to_string(),
         header: header::lines(session, loaded, ready)?,

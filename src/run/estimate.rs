@@ -9,7 +9,7 @@ use super::Inventory;
 use crate::{
     body::Body,
     session::Session,
-    stepping::{Preconditioner, Service},
+    stepping::{FactorPrecision, Preconditioner, Service},
 };
 use serde::Serialize;
 
@@ -67,7 +67,7 @@ impl Estimate {
         session: &Session,
         body: &Body<D, S>,
         inventory: &Inventory,
-        preconditioner: Preconditioner,
+        (preconditioner, precision): (Preconditioner, FactorPrecision),
         steps: u64,
     ) -> Self {
         let mesh = &body.mesh;
@@ -79,7 +79,7 @@ impl Estimate {
         ];
         let [mesh_bytes, facets, vectors] = session.sum(own);
         let matrix = matrix_bytes(D, nodes, cells, facets);
-        let service = Service::of(session, body, steps);
+        let service = Service::of(session, body, steps, precision);
         let cost = service.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;

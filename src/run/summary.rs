@@ -36,6 +36,8 @@ pub struct Summary {
     pub scheme: &'static str,
     /// Preconditioner in use.
     pub preconditioner: &'static str,
+    /// Precision of the factors at the end, where steps were solved on the contact alone.
+    pub factor_precision: Option<&'static str>,
     /// Steps since time 0.
     pub steps: u64,
     /// Time reached in s.

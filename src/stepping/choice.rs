@@ -13,7 +13,7 @@ use crate::{
     body::Body,
     effect::Contact,
     error::{Error, Result},
-    petsc::{DistributedVector, has_option},
+    petsc::{DistributedVector, Precision, has_option},
     session::Session,
     state::State,
 };
@@ -27,7 +27,7 @@ pub(super) fn newton<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
     settings: SolverSettings,
-    preconditioner: Preconditioner,
+    (preconditioner, precision): (Preconditioner, Precision),
 ) -> Result<Solver> {
     let unknowns = body.mesh.total_nodes * D;
     let whole = session.ranks() == 1 || preconditioner.is_redundant(session.ranks(), unknowns);
@@ -40,7 +40,7 @@ pub(super) fn newton<const D: usize, const S: usize>(
         && !body.contacts.iter().any(Contact::needs_ghosts)
         && Condensed::motions_of(session, body) <= MOST_MOTIONS
     {
-        let condensed = Condensed::new(session, body, state.contact_traction.is_some())?;
+        let condensed = Condensed::new(session, body, state.contact_traction.is_some(), precision)?;
         return Ok(Solver::Condensed(Box::new(condensed)));
     }
     whole_newton(session, body, &state.velocity, settings, preconditioner)

@@ -9,13 +9,14 @@ use super::{
     StepOutcome,
     condensed_matrix::{CondensedMatrix, Motion, Room, Subspace},
     newton::{From, Newton, Task},
+    refined::Refinement,
 };
 use crate::{
     body::Body,
     effect::{Contact, ContactNode, contact_nodes},
     error::{Error, Result},
     exchange::{Gathering, gather},
-    petsc::{BlockRows, Cholesky, DistributedVector, ProjectedKsp},
+    petsc::{BlockRows, Cholesky, DistributedVector, Precision, ProjectedKsp},
     session::Session,
 };
 use mpi::topology::SimpleCommunicator;
@@ -23,10 +24,12 @@ use mpi::topology::SimpleCommunicator;
 /// A solver for steps whose matrix is factored whole on each rank.
 pub(super) struct Condensed {
     newton: Newton,
-    factored: Option<Factored>,
+    pub(super) factored: Option<Factored>,
+    /// The precision that factors are made in.
+    pub asked: Precision,
     /// Contact nodes of this rank, and their numbers on this rank.
-    motions: Vec<Motion>,
-    nodes: Vec<usize>,
+    pub(super) motions: Vec<Motion>,
+    pub(super) nodes: Vec<usize>,
     /// Frames of the contact nodes of all ranks.
     frames: Frames,
     /// The motions of all ranks, and which are those of this rank.
@@ -36,8 +39,8 @@ pub(super) struct Condensed {
     first: usize,
     /// The order of elimination, once it was found.
     order: Option<Vec<u32>>,
-    right_hand_side: DistributedVector,
-    trial: DistributedVector,
+    pub(super) right_hand_side: DistributedVector,
+    pub(super) trial: DistributedVector,
     velocity: DistributedVector,
     traction: Option<DistributedVector>,
     /// The values of all ranks' nodes, and how they come here.
@@ -45,12 +48,13 @@ pub(super) struct Condensed {
     gathering: Gathering,
     /// Halves of solves since traffic is counted.
     halves: u64,
+    pub(super) refinement: Option<Box<Refinement>>,
 }
 
 /// A factored matrix.
 pub(super) struct Factored {
-    cholesky: Cholesky,
-    condensed: CondensedMatrix,
+    pub cholesky: Cholesky,
+    pub condensed: CondensedMatrix,
     /// The parameters of each contact's graphs.
     scales: Vec<[f64; 2]>,
 }
@@ -117,6 +121,7 @@ impl Condensed {
         session: &Session,
         body: &Body<D, S>,
         has_traction: bool,
+        asked: Precision,
     ) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;
@@ -158,6 +163,8 @@ impl Condensed {
             whole: vec![0.0; body.mesh.total_nodes * D],
             gathering: Gathering::new(world, body.mesh.owned * D)?,
             halves: 0,
+            asked,
+            refinement: None,
         })
     }
 
@@ -176,7 +183,7 @@ impl Condensed {
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
         self.factored = None;
-        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref());
+        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref(), self.asked);
         let Some(cholesky) = session.agree(factored)? else { return Ok(false) };
         self.order.get_or_insert_with(|| cholesky.order().to_vec());
         drop(rows);
@@ -197,6 +204,11 @@ impl Condensed {
         chosen?;
         self.factored = Some(Factored { cholesky, condensed, scales: self.newton.scales.clone() });
         Ok(true)
+    }
+
+    /// The precision of the factor in use.
+    pub fn precision(&mut self) -> Result<Precision> {
+        Ok(factored(&mut self.factored)?.cholesky.precision())
     }
 
     /// Changes the factored matrix for another.
@@ -229,14 +241,14 @@ impl Condensed {
         self.factored.as_ref().map_or(0, of)
     }
 
-    fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
+    pub(super) fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
         self.gathering.gather(&SimpleCommunicator::world(), &right_hand_side.owned()?, &mut self.whole);
         self.frames.turn(&mut self.whole, false);
         self.halves += 1;
         factored(&mut self.factored)?.cholesky.forward(&self.whole)
     }
 
-    fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
+    pub(super) fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
         self.halves += 1;
         factored(&mut self.factored)?.cholesky.backward(&mut self.whole)?;
         self.frames.turn(&mut self.whole, true);
@@ -246,7 +258,8 @@ impl Condensed {
         Ok(())
     }
 
-    /// Solves a step from the velocity in `trial`, and leaves the new one there. Collective.
+    /// Solves a step from the velocity in `trial`, and leaves the new one there; `None` where the factor is not precise
+    /// enough for it. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -254,35 +267,65 @@ impl Condensed {
         from: From<'_>,
         task: Task<'_>,
         trial: &mut DistributedVector,
-    ) -> Result<StepOutcome> {
+    ) -> Result<Option<StepOutcome>> {
+        if self.precision()? == Precision::Single {
+            return self.refine(session, body, from, task, trial);
+        }
         self.forward(task.right_hand_side)?;
+        self.restrict::<D>(from, trial)?;
+        let Factored { cholesky, condensed, .. } = factored(&mut self.factored)?;
+        condensed.write_times_lower(cholesky.last_mut(), &mut self.right_hand_side)?;
+        let outcome = self.solve_contact(session, body, from, task)?;
+        let Factored { cholesky, condensed, .. } = factored(&mut self.factored)?;
+        condensed.read_times_upper(&self.trial, cholesky.last_mut())?;
+        self.backward(trial)?;
+        self.put_found::<D>(trial)?;
+        trial.update_ghosts()?;
+        Ok(Some(outcome))
+    }
+
+    /// Copies the values of contact nodes.
+    pub(super) fn restrict<const D: usize>(
+        &mut self,
+        from: From<'_>,
+        trial: &DistributedVector,
+    ) -> Result<()> {
         restrict::<D>(&self.nodes, from.velocity, &mut self.velocity)?;
         restrict::<D>(&self.nodes, trial, &mut self.trial)?;
         if let (Some(traction), Some(known)) = (&mut self.traction, from.traction) {
             restrict::<D>(&self.nodes, known, traction)?;
         }
-        let Factored { cholesky, condensed, .. } = factored(&mut self.factored)?;
-        condensed.write_times_lower(cholesky.last_mut(), &mut self.right_hand_side)?;
-        let from = From { velocity: &self.velocity, traction: self.traction.as_ref() };
-        let task = Task { matrix: condensed, right_hand_side: &self.right_hand_side, ..task };
+        Ok(())
+    }
+
+    /// Solves for the contact nodes, from their velocities and into them. Collective.
+    pub(super) fn solve_contact<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        from: From<'_>,
+        task: Task<'_>,
+    ) -> Result<StepOutcome> {
+        let traction = from.traction.and(self.traction.as_ref());
+        let from = From { velocity: &self.velocity, traction };
+        let matrix = &factored(&mut self.factored)?.condensed;
+        let task = Task { matrix, right_hand_side: &self.right_hand_side, ..task };
         number_nodes(&mut body.contacts, &self.nodes);
         let solved = self.newton.solve(session, body, from, task, &mut self.trial);
         number_back(&mut body.contacts, &self.nodes);
-        let outcome = solved?;
-        condensed.read_times_upper(&self.trial, cholesky.last_mut())?;
-        self.backward(trial)?;
-        {
-            // What the laws see is what they found, to the last bit.
-            let (found, mut trial) = (self.trial.owned()?, trial.owned_mut()?);
-            for motion in &self.motions {
-                let found = &found[motion.at..][..D];
-                let value = &mut trial[self.nodes[motion.at / D] * D..][..D];
-                let off: f64 = (0..D).map(|i| motion.direction[i] * (found[i] - value[i])).sum();
-                (0..D).for_each(|i| value[i] += off * motion.direction[i]);
-            }
+        solved
+    }
+
+    /// Lets the laws see what they found, to the last bit.
+    pub(super) fn put_found<const D: usize>(&self, trial: &mut DistributedVector) -> Result<()> {
+        let (found, mut trial) = (self.trial.owned()?, trial.owned_mut()?);
+        for motion in &self.motions {
+            let found = &found[motion.at..][..D];
+            let value = &mut trial[self.nodes[motion.at / D] * D..][..D];
+            let off: f64 = (0..D).map(|i| motion.direction[i] * (found[i] - value[i])).sum();
+            (0..D).for_each(|i| value[i] += off * motion.direction[i]);
         }
-        trial.update_ghosts()?;
-        Ok(outcome)
+        Ok(())
     }
 }
 
@@ -314,7 +357,7 @@ fn number_back<const D: usize>(contacts: &mut [Contact<D>], nodes: &[usize]) {
     contacts.iter_mut().for_each(|contact| contact.number_nodes(|node| nodes[node]));
 }
 
-fn factored(factored: &mut Option<Factored>) -> Result<&mut Factored> {
+pub(super) fn factored(factored: &mut Option<Factored>) -> Result<&mut Factored> {
     factored.as_mut().ok_or_else(|| Error::Internal("a step was taken before its matrix was factored".into()))
 }
 

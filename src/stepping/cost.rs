@@ -4,8 +4,8 @@
 //! operations; multigrid works in proportion to the unknowns. The constants were measured on one core of a common server with
 //! 10^4 to 10^6 unknowns (docs/speed.md); expect a factor of two either way.
 
-use super::linear_solver::{Preconditioner, Service};
-use crate::{body::Body, session::Session};
+use super::linear_solver::{FactorPrecision, Preconditioner, Service};
+use crate::{body::Body, petsc::Precision, session::Session};
 
 /// Costs of a preconditioner with the solves of a step, on one rank and over all ranks together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +20,8 @@ pub struct Cost {
     pub iterations: f64,
 }
 
+/// Bytes of a factor in double precision that fits no cache.
+const BEYOND_CACHES: f64 = 16e6;
 /// Seconds of the messages of a V-cycle between processes of one machine: 25 exchanges with two neighbours (docs/scaling.md).
 const MESSAGES: f64 = 100e-6;
 /// V-cycles whose messages take as long as those of a set-up.
@@ -34,7 +36,12 @@ struct Iterations {
 
 impl Service {
     /// What a preconditioner has to serve in so many steps of this body.
-    pub fn of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>, steps: u64) -> Self {
+    pub fn of<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        steps: u64,
+        precision: FactorPrecision,
+    ) -> Self {
         Self {
             dimension: D,
             unknowns: body.mesh.total_nodes * D,
@@ -42,6 +49,7 @@ impl Service {
             steps,
             contact: !body.contacts.is_empty(),
             friction: body.contacts.iter().any(|contact| contact.friction().is_some()),
+            precision,
         }
     }
 
@@ -62,19 +70,51 @@ impl Service {
         }
     }
 
+    /// The precision of factors: single where that is asked for, or where it takes less time. In space some three corrections
+    /// reach what one solve in double precision does, in the plane four to seven (docs/speed.md).
+    pub fn factor_precision(self) -> Precision {
+        let served = self.contact
+            && (self.ranks == 1 || Preconditioner::Cholesky.is_redundant(self.ranks, self.unknowns));
+        let pays = || {
+            let time = |precision| {
+                let cost = self.factor(precision);
+                cost.set_up + self.steps as f64 * cost.step
+            };
+            self.dimension == 3
+                && self.factor(Precision::Double).memory > BEYOND_CACHES
+                && time(Precision::Single) < time(Precision::Double)
+        };
+        match self.precision {
+            FactorPrecision::Single if served => Precision::Single,
+            FactorPrecision::Auto if served && pays() => Precision::Single,
+            _ => Precision::Double,
+        }
+    }
+
+    /// The cost of a factor, with the solves of a step.
+    fn factor(self, precision: Precision) -> Cost {
+        let n = self.unknowns as f64;
+        let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
+        let [memory, set_up, step] = match precision {
+            Precision::Double => [
+                8.0,
+                self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 0.9e-9 * n * n),
+                self.pick(2.4e-9, 1.2e-9),
+            ],
+            Precision::Single => [
+                4.0,
+                self.pick(5e-6 * n + 3e-9 * n.powf(1.5), 5e-6 * n + 0.25e-9 * n * n),
+                self.pick(8.0e-9, 2.0e-9),
+            ],
+        };
+        Cost { memory: memory * entries, set_up, step: step * entries, iterations: 0.0 }
+    }
+
     /// The cost of this preconditioner.
     pub fn cost(self, preconditioner: Preconditioner) -> Cost {
         let n = self.unknowns as f64;
         match preconditioner {
-            Preconditioner::Auto | Preconditioner::Cholesky => {
-                let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
-                Cost {
-                    memory: 8.0 * entries,
-                    set_up: self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 1.05e-9 * n * n),
-                    step: entries * self.pick(2.4e-9, 1.2e-9),
-                    iterations: 0.0,
-                }
-            }
+            Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
             Preconditioner::Gamg => {
                 let iterations =
                     self.iterations(Iterations { without: 20.0, contact: 30.0, friction: 300.0 });
@@ -115,8 +155,15 @@ mod tests {
 
     #[test]
     fn a_factor_in_space_soon_outgrows_multigrid() {
-        let service =
-            Service { dimension: 3, unknowns: 1_000_000, ranks: 1, steps: 1, contact: true, friction: false };
+        let service = Service {
+            dimension: 3,
+            unknowns: 1_000_000,
+            ranks: 1,
+            steps: 1,
+            contact: true,
+            friction: false,
+            precision: FactorPrecision::Double,
+        };
         let [factor, multigrid] =
             [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| service.cost(which));
         assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);

@@ -2,7 +2,7 @@
 
 use crate::{
     error::Result,
-    petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, require, set_default_option},
+    petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
 };
 
 /// The preconditioner a job asks for.
@@ -36,6 +36,17 @@ pub enum FrictionIteration {
     FixedPoint,
 }
 
+/// The precision of the factors of a matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FactorPrecision {
+    /// Single for large factors, where that is enough.
+    Auto,
+    /// 32 bits, where that is enough; solutions are corrected with residuals of 64 bits.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
 /// How the equations of a step are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
@@ -47,6 +58,8 @@ pub struct SolverSettings {
     pub method: Method,
     /// The preconditioner.
     pub preconditioner: Preconditioner,
+    /// The precision of factors that steps with contact are solved with.
+    pub factor_precision: FactorPrecision,
     /// Newton iterations after which a step has failed.
     pub newton_iterations: usize,
     /// Steps that one matrix is for, as far as is known.
@@ -70,6 +83,8 @@ pub struct Service {
     pub contact: bool,
     /// Whether there is friction.
     pub friction: bool,
+    /// The precision of factors that is asked for.
+    pub precision: FactorPrecision,
 }
 
 /// Bytes of a factor beyond which it is made on request only.
@@ -82,6 +97,12 @@ pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 impl Preconditioner {
     /// Replaces `Auto` by what takes less time for this service, and says why.
     pub fn resolve(self, service: Service) -> (Self, String) {
+        let (chosen, why) = self.choose(service);
+        let single = chosen == Self::Cholesky && service.factor_precision() == Precision::Single;
+        (chosen, if single { format!("{why}; factors in single precision") } else { why })
+    }
+
+    fn choose(self, service: Service) -> (Self, String) {
         if self != Self::Auto {
             return (self, "[solver] preconditioner asks for it".into());
         }
@@ -190,7 +211,8 @@ mod tests {
     use super::*;
 
     fn service(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> Service {
-        Service { dimension, unknowns, ranks, steps, contact: true, friction: false }
+        let precision = FactorPrecision::Auto;
+        Service { dimension, unknowns, ranks, steps, contact: true, friction: false, precision }
     }
 
     fn chosen(service: Service) -> Preconditioner {
@@ -201,8 +223,22 @@ mod tests {
     fn many_steps_pay_for_larger_factors() {
         assert_eq!(chosen(service(2, 500_000, 1, 64)), Preconditioner::Cholesky);
         assert_eq!(chosen(service(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
-        assert_eq!(chosen(service(3, 100_000, 1, 4)), Preconditioner::Gamg);
+        assert_eq!(chosen(service(3, 100_000, 1, 1)), Preconditioner::Gamg);
         assert_eq!(chosen(service(3, 1_000_000, 1, 1_000_000)), Preconditioner::Gamg);
+    }
+
+    #[test]
+    fn factors_in_space_are_in_single_precision_where_few_steps_share_them() {
+        let precision = |service: Service| service.factor_precision();
+        assert_eq!(precision(service(3, 100_000, 1, 16)), Precision::Single);
+        assert_eq!(precision(service(3, 100_000, 1, 1000)), Precision::Double);
+        assert_eq!(precision(service(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
+        assert_eq!(precision(service(2, 500_000, 1, 1)), Precision::Double);
+        assert_eq!(precision(Service { contact: false, ..service(3, 100_000, 1, 1) }), Precision::Double);
+        let asked = |steps| Service { precision: FactorPrecision::Single, ..service(2, 1_000, 1, steps) };
+        assert_eq!(precision(asked(1000)), Precision::Single);
+        let (_, why) = Preconditioner::Cholesky.resolve(asked(1));
+        assert!(why.ends_with("; factors in single precision"), "{why}");
     }
 
     #[test]

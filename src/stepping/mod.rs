@@ -17,6 +17,8 @@ mod implicit_euler;
 mod lagged_euler;
 mod linear_solver;
 mod newton;
+mod outcome;
+mod refined;
 mod rungs;
 mod scheme;
 mod step_clock;
@@ -27,8 +29,11 @@ mod stepper;
 pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
 pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
-pub use linear_solver::{FrictionIteration, Method, Preconditioner, Service, SolverSettings};
+pub use linear_solver::{
+    FactorPrecision, FrictionIteration, Method, Preconditioner, Service, SolverSettings,
+};
+pub use outcome::StepOutcome;
 pub use scheme::Scheme;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_length::{SNAP, next_step};
-pub use stepper::{StepOutcome, Stepper};
+pub use stepper::Stepper;

@@ -149,7 +149,7 @@ impl Preconditioner {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stepping::Service;
+    use crate::stepping::{FactorPrecision, Service};
 
     #[test]
     fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
@@ -161,7 +161,16 @@ mod tests {
     #[test]
     fn small_problems_keep_a_ladder_and_large_ones_what_they_use() {
         let kept = |unknowns: usize, ranks| {
-            let service = Service { dimension: 3, unknowns, ranks, steps: 2, contact: true, friction: false };
+            let precision = FactorPrecision::Auto;
+            let service = Service {
+                dimension: 3,
+                unknowns,
+                ranks,
+                steps: 2,
+                contact: true,
+                friction: false,
+                precision,
+            };
             Preconditioner::Auto.resolve(service).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
         };
         assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);

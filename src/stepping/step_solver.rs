@@ -1,19 +1,18 @@
 //! The matrix of a step with its solver.
 
 use super::{
-    choice,
+    StepOutcome, choice,
     condensed::Condensed,
     flow::FlowStart,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
     newton::{From, Newton, REMEDY, Task, failed},
     rungs::{self, Krylov, Rung, Rungs},
-    stepper::StepOutcome,
 };
 use crate::{
     body::Body,
     effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix},
+    petsc::{DistributedVector, Ksp, Matrix, Precision},
     session::Session,
     state::State,
 };
@@ -68,13 +67,13 @@ impl StepSolver {
         settings: SolverSettings,
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
-        let service = Service::of(session, body, settings.steps);
+        let service = Service::of(session, body, settings.steps, settings.factor_precision);
         let (preconditioner, reason) = settings.preconditioner.resolve(service);
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
             Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
         } else {
-            choice::newton(session, body, state, settings, preconditioner)?
+            choice::newton(session, body, state, settings, (preconditioner, service.factor_precision()))?
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
@@ -95,6 +94,14 @@ impl StepSolver {
     /// The preconditioner in use, and why it is that one.
     pub fn preconditioner(&self) -> (Preconditioner, &str) {
         (self.settings.preconditioner, &self.reason)
+    }
+
+    /// The precision of factors, where steps are solved on the contact alone.
+    pub fn factor_precision(&self) -> Option<Precision> {
+        match &self.solver {
+            Solver::Condensed(condensed) => Some(condensed.asked),
+            _ => None,
+        }
     }
 
     /// Whether the matrices are those of these lengths.
@@ -173,6 +180,9 @@ impl StepSolver {
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
         if let Solver::Condensed(condensed) = &mut self.solver {
             if condensed.prepare(session, body, rows)? {
+                if condensed.precision()? == Precision::Single {
+                    matrix.multiply_often()?;
+                }
                 self.rung = Some((length, matrix));
                 return Ok(true);
             }
@@ -304,7 +314,7 @@ impl StepSolver {
         (forces, tolerance): (&DistributedVector, f64),
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let Some((_, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
+        let Some((length, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
         let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };
@@ -320,7 +330,16 @@ impl StepSolver {
                 Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
             }
             Solver::Newton(newton) => newton.solve(session, body, from, task, trial),
-            Solver::Condensed(condensed) => condensed.solve(session, body, from, task, trial),
+            Solver::Condensed(condensed) => {
+                if let Some(outcome) = condensed.solve(session, body, from, task, trial)? {
+                    return Ok(outcome);
+                }
+                condensed.asked = Precision::Double;
+                let rows = session.agree(body.matrix(session, *length))?;
+                condensed.prepare(session, body, rows)?;
+                let solved = condensed.solve(session, body, from, task, trial)?;
+                solved.ok_or_else(|| Error::Internal("a factor in double precision was not enough".into()))
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A step as all schemes take it: right-hand side, contact, solution, commit, energy balance.
 
 use super::{
+    StepOutcome,
     adaptive::Norms,
     contacts::{commit_tractions, prepare_contacts},
     guesses::{is_new, other_solutions},
@@ -12,9 +13,9 @@ use super::{
 };
 use crate::{
     body::{Body, PassBytes},
-    effect::{Energy, Form, PointCount, Step},
+    effect::{Form, Step},
     error::{Error, Result},
-    petsc::DistributedVector,
+    petsc::{DistributedVector, Precision},
     session::Session,
     state::State,
 };
@@ -22,27 +23,6 @@ use std::time::Instant;
 
 /// Share of the root of the kinetic energy up to which that of the elastic energy does not matter.
 const NEGLIGIBLE: f64 = 1e-6;
-
-/// What a step cost and how well it was solved.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StepOutcome {
-    /// Newton iterations; 0 where a step is linear.
-    pub newton_iterations: usize,
-    /// Krylov iterations.
-    pub linear_iterations: usize,
-    /// Contact points that changed their branch, over all ranks.
-    pub active_changes: usize,
-    /// Contact points by what happens there, over all ranks.
-    pub points: PointCount,
-    /// Linear systems that were not positive definite, so that GMRES had to solve them.
-    pub indefinite_solves: usize,
-    /// Largest scaled distance to the contact graphs.
-    pub inclusion_residual: f64,
-    /// Different solutions that were found, where others were looked for; else 0.
-    pub solutions: usize,
-    /// Energies of the step, over all ranks.
-    pub energy: Energy,
-}
 
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
@@ -115,6 +95,11 @@ impl Stepper {
     /// The preconditioner in use, and why it is that one.
     pub fn preconditioner(&self) -> (Preconditioner, &str) {
         self.solver.preconditioner()
+    }
+
+    /// The precision of factors, where steps are solved on the contact alone.
+    pub fn factor_precision(&self) -> Option<Precision> {
+        self.solver.factor_precision()
     }
 
     /// Assembles the matrix for a first step of this length. Preconditioners will stand at this length and at powers of two
@@ -195,11 +180,7 @@ impl Stepper {
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
         let others = if self.guesses > 0 && !body.contacts.is_empty() {
-            let known = Known {
-                forces: &self.right_hand_side,
-                rounding: self.method.rounding(session),
-                start: self.method.flow_start(),
-            };
+            let known = known(session, &self.method, &self.right_hand_side);
             let (solver, trial) = (&mut self.solver, &self.trial);
             let others = other_solutions(session, (body, state), step, known, solver, trial, self.guesses)?;
             self.start(session, body, state, step)?;
@@ -223,11 +204,7 @@ impl Stepper {
         step: Step,
         others: Option<&[DistributedVector]>,
     ) -> Result<StepOutcome> {
-        let known = Known {
-            forces: &self.right_hand_side,
-            rounding: self.method.rounding(session),
-            start: self.method.flow_start(),
-        };
+        let known = known(session, &self.method, &self.right_hand_side);
         let solved = self.solver.solve(session, body, state, step, known, &mut self.trial);
         let Some(others) = others else { return solved };
         match solved {
@@ -381,6 +358,11 @@ impl Stepper {
         }
         Ok(())
     }
+}
+
+/// What the scheme brings to the solution of a step under these forces.
+fn known<'a>(session: &Session, method: &'a Method, forces: &'a DistributedVector) -> Known<'a> {
+    Known { forces, rounding: method.rounding(session), start: method.flow_start() }
 }
 
 /// Writes these values in place of the ones before.

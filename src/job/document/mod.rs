@@ -27,7 +27,9 @@ pub use material::{
 pub use memory::Memory;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
-pub use time::{Accept, Adaptive, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time};
+pub use time::{
+    Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time,
+};
 
 use std::collections::BTreeMap;
 

@@ -72,6 +72,8 @@ pub struct Solver {
     pub method: Method,
     /// How linear systems are preconditioned.
     pub preconditioner: Preconditioner,
+    /// The precision of the factors that steps with contact are solved with, where a matrix is factored whole.
+    pub factor_precision: FactorPrecision,
     /// Newton iterations after which a step counts as failed.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
@@ -96,6 +98,7 @@ impl Default for Solver {
             inclusion_tolerance: 1e-6,
             method: Method::Newton,
             preconditioner: Preconditioner::Auto,
+            factor_precision: FactorPrecision::Auto,
             max_newton_iterations: 50,
             friction: FrictionIteration::Newton,
             accept: Vec::new(),
@@ -130,6 +133,20 @@ pub enum Preconditioner {
     Gamg,
     /// Hypre's algebraic multigrid.
     Boomeramg,
+}
+
+/// The precision of the factors of a matrix, where it is factored whole for steps with contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FactorPrecision {
+    /// Single for large factors, where that is enough.
+    #[default]
+    Auto,
+    /// Half the memory and half the time of a solve; solutions are corrected until the residual in double precision is small,
+    /// and where that leads nowhere the factor is made anew in double precision.
+    Single,
+    /// As all other numbers.
+    Double,
 }
 
 /// How friction bounds that follow the contact pressure find it.

@@ -1,0 +1,22 @@
+use crate::effect::{Energy, PointCount};
+
+/// What a step cost and how well it was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepOutcome {
+    /// Newton iterations; 0 where a step is linear.
+    pub newton_iterations: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Contact points that changed their branch, over all ranks.
+    pub active_changes: usize,
+    /// Contact points by what happens there, over all ranks.
+    pub points: PointCount,
+    /// Linear systems that were not positive definite, so that GMRES had to solve them.
+    pub indefinite_solves: usize,
+    /// Largest scaled distance to the contact graphs.
+    pub inclusion_residual: f64,
+    /// Different solutions that were found, where others were looked for; else 0.
+    pub solutions: usize,
+    /// Energies of the step, over all ranks.
+    pub energy: Energy,
+}
