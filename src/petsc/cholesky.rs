@@ -319,11 +319,8 @@ mod tests {
     #[test]
     fn what_single_precision_cant_factor_is_factored_in_double() {
         let off = 1.0 - 1e-9;
-        let rows = BlockRows {
-            offsets: vec![0, 2, 4],
-            columns: vec![0, 1, 0, 1],
-            values: vec![1.0, off, off, 1.0],
-        };
+        let rows =
+            BlockRows { offsets: vec![0, 2, 4], columns: vec![0, 1, 0, 1], values: vec![1.0, off, off, 1.0] };
         let cholesky = Cholesky::new(1, &rows, &[0], None, Single).unwrap().unwrap();
         assert_eq!(cholesky.precision(), Double);
     }

@@ -3,7 +3,7 @@
 use super::{
     equations::{CellForces, ContactEquations, Effort, cycle},
     linear_solver::FrictionIteration,
-    newton::{From, Newton, STEEP, Task},
+    newton::{From, Newton, STEEP, Task, recall},
 };
 use crate::{
     body::Body,
@@ -85,11 +85,7 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<()> {
         trial.copy_from(&self.start)?;
-        if let Some(traction) = from.traction {
-            let traction = traction.owned()?;
-            body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
-        }
-        Ok(())
+        recall(body, from)
     }
 
     /// Solves once. A fixed point holds friction bounds at pressures that are brought up to date until these solve the

@@ -268,6 +268,15 @@ impl Newton {
     }
 }
 
+/// Takes the pressures of all contacts back to those of the converged state.
+pub(super) fn recall<const D: usize, const S: usize>(body: &mut Body<D, S>, from: From<'_>) -> Result<()> {
+    if let Some(traction) = from.traction {
+        let traction = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+    }
+    Ok(())
+}
+
 /// Writes the steepest fall of each contact's friction at the pressures of now, over all ranks. Collective.
 fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let falls = |contact: &Contact<D>| match contact.friction() {

@@ -8,9 +8,14 @@ use super::{
     StepOutcome,
     condensed::{Condensed, Factored, factored},
     equations::StepMatrix,
-    newton::{From, Task},
+    newton::{From, Task, recall},
 };
-use crate::{body::Body, error::Result, petsc::DistributedVector, session::Session};
+use crate::{
+    body::Body,
+    error::{Error, Result},
+    petsc::DistributedVector,
+    session::Session,
+};
 
 /// Corrections after which single precision has failed.
 const CORRECTIONS: usize = 12;
@@ -19,6 +24,7 @@ const LEAST: f64 = 0.5;
 
 /// Vectors of all nodes, and of contact nodes.
 pub(super) struct Refinement {
+    first: DistributedVector,
     residual: DistributedVector,
     correction: DistributedVector,
     start: DistributedVector,
@@ -29,6 +35,7 @@ pub(super) struct Refinement {
 impl Refinement {
     fn new(nodes: &DistributedVector, contact: &DistributedVector) -> Result<Self> {
         Ok(Self {
+            first: nodes.like()?,
             residual: nodes.like()?,
             correction: nodes.like()?,
             start: contact.like()?,
@@ -39,8 +46,8 @@ impl Refinement {
 }
 
 impl Condensed {
-    /// Solves a step from the velocity in `trial`, and leaves the new one there; `None` where single precision is not
-    /// enough. Collective.
+    /// Solves a step from the velocity in `trial`, and leaves the new one there; `None`, and all as it was, where
+    /// single precision is not enough. Collective.
     pub(super) fn refine<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -53,20 +60,42 @@ impl Condensed {
             Some(refinement) => refinement,
             None => Box::new(Refinement::new(trial, &self.trial)?),
         };
+        refinement.first.copy_from(trial)?;
+        let refined = self.refine_with(session, body, from, task, trial, &mut refinement);
+        let refined = match refined {
+            Err(Error::Failed(_)) => Ok(None),
+            other => other,
+        };
+        if matches!(refined, Ok(None)) {
+            trial.copy_from(&refinement.first)?;
+            recall(body, from)?;
+        }
+        self.refinement = Some(refinement);
+        refined
+    }
+
+    fn refine_with<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        from: From<'_>,
+        task: Task<'_>,
+        trial: &mut DistributedVector,
+        refinement: &mut Refinement,
+    ) -> Result<Option<StepOutcome>> {
         let mut outcome = StepOutcome::default();
         let mut before = f64::INFINITY;
         write_residual(task, trial, &mut refinement.residual)?;
         for _ in 0..CORRECTIONS {
-            let pass = self.correct(session, body, from, task, trial, &mut refinement)?;
+            let pass = self.correct(session, body, from, task, trial, refinement)?;
             outcome = StepOutcome {
                 newton_iterations: outcome.newton_iterations + pass.newton_iterations,
                 linear_iterations: outcome.linear_iterations + pass.linear_iterations,
                 indefinite_solves: outcome.indefinite_solves + pass.indefinite_solves,
                 ..pass
             };
-            let left = self.left::<D>(task, trial, &mut refinement)?;
+            let left = self.left::<D>(task, trial, refinement)?;
             if left <= task.tolerance {
-                self.refinement = Some(refinement);
                 trial.update_ghosts()?;
                 return Ok(Some(outcome));
             }
@@ -88,7 +117,7 @@ impl Condensed {
         trial: &mut DistributedVector,
         refinement: &mut Refinement,
     ) -> Result<StepOutcome> {
-        let Refinement { residual, correction, start, change, product } = refinement;
+        let Refinement { residual, correction, start, change, product, .. } = refinement;
         self.take_push::<D>(residual, change)?;
         self.forward(residual)?;
         self.restrict::<D>(from, trial)?;

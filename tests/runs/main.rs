@@ -17,6 +17,7 @@ mod launch;
 mod materials;
 mod outputs;
 mod partitions;
+mod precision;
 mod ranks;
 mod readers;
 mod regions;
