@@ -238,7 +238,7 @@ impl StepSolver {
     pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
         let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
         match &mut self.solver {
-            Solver::Condensed(condensed) => Ok(Some(condensed.traffic())),
+            Solver::Condensed(condensed) => Ok(Some(products + condensed.traffic())),
             Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
             Solver::Newton(newton) => {
                 let applications = newton.linear_solver.applications();
