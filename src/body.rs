@@ -9,6 +9,7 @@ pub use traffic::PassBytes;
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
+    lanes::{Pack, place},
     material::Isotropic,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
@@ -58,18 +59,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
             })?;
         }
         let Some(needs) = self.needs(|p| p.explicit) else { return Ok(energy) };
-        let (mesh, effects) = (&self.mesh, &mut self.effects);
+        let mesh = &self.mesh;
+        let mut effects: Vec<_> = self.effects.iter_mut().filter(|e| e.phases().explicit.is_some()).collect();
+        effects.sort_by_key(|effect| !effect.phases().weakens);
         with_nodal(state, |nodal| {
             Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
                 if needs.elastic_stress {
                     effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
                 }
-                for weakens in [true, false] {
-                    let called = |p: Phases| p.explicit.is_some() && p.weakens == weakens;
-                    for effect in effects.iter_mut().filter(|e| called(e.phases())) {
-                        effect.add_explicit(step, batch, &mut energy);
-                    }
-                }
+                effects.iter_mut().for_each(|effect| effect.add_explicit(step, batch, &mut energy));
                 batch.scatter(mesh, forces);
             });
         })?;
@@ -90,12 +88,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
             })?;
         }
         let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
+        let effects: Vec<_> = self.effects.iter().filter(|e| e.phases().energy.is_some()).collect();
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
                 self.weaken(batch);
-                for effect in self.effects.iter().filter(|e| e.phases().energy.is_some()) {
-                    effect.add_energy(step, batch, &mut energy);
-                }
+                effects.iter().for_each(|effect| effect.add_energy(step, batch, &mut energy));
             });
         })?;
         Ok(energy)
@@ -128,7 +125,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
                 for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
-                    *stress = add_scaled(stress, -1.0, rate);
+                    *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), -1.0, &rate.lane(lane)));
                 }
             }
             self.effects.iter().filter(|e| e.form() == Some(form)).for_each(|e| e.add_form(batch));
@@ -169,7 +166,10 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 for effect in self.effects.iter().filter(|e| e.phases().stress.is_some()) {
                     effect.add_stress(step, batch);
                 }
-                out[batch.first..][..batch.cells.len()].copy_from_slice(&batch.stress[..batch.cells.len()]);
+                for (at, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
+                    let (pack, lane) = place(at);
+                    *out = batch.stress[pack].lane(lane);
+                }
             });
         })?;
         Ok(out)

@@ -17,8 +17,7 @@ pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
     }
     let mut least = f64::INFINITY;
     for run in &body.geometry.runs {
-        let steepest =
-            body.geometry.cells[run.first..][..run.count].iter().map(steepness).fold(0.0, f64::max);
+        let steepest = body.geometry.cells_of(run).map(|cell| steepness(&cell)).fold(0.0, f64::max);
         least = least.min(bound_of_material(body, run.material, steepest));
     }
     Some(-session.largest([-least])[0])

@@ -1,17 +1,21 @@
 use super::{Blend, History};
-use crate::space::CellRun;
+use crate::{
+    lanes::{Pack, place, prefetch},
+    space::CellRun,
+};
 use std::borrow::Cow;
 
-/// Values of the cells of some materials, `W` a cell, converged and trial. Other cells take no storage.
+/// Values of the cells of some materials, `W` a cell, converged and trial, in packs as the geometry has them. Other cells take no
+/// storage.
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
     name: &'static str,
-    /// Each run of cells with the position of its first value, if its material keeps any.
+    /// Each run of cells with the position of its first pack, if its material keeps any.
     runs: Vec<(CellRun, Option<usize>)>,
-    converged: Vec<[f64; W]>,
-    trial: Vec<[f64; W]>,
+    converged: Vec<Pack<W>>,
+    trial: Vec<Pack<W>>,
     /// Name and values before the last step.
-    earlier: Option<(&'static str, Vec<[f64; W]>)>,
+    earlier: Option<(&'static str, Vec<Pack<W>>)>,
 }
 
 impl<const W: usize> CellHistory<W> {
@@ -22,11 +26,11 @@ impl<const W: usize> CellHistory<W> {
             .iter()
             .map(|run| {
                 let start = keeps(run.material).then_some(kept);
-                kept += start.map_or(0, |_| run.count);
+                kept += start.map_or(0, |_| run.packs());
                 (*run, start)
             })
             .collect();
-        Self { name, runs, converged: vec![[0.0; W]; kept], trial: vec![[0.0; W]; kept], earlier: None }
+        Self { name, runs, converged: vec![Pack::ZERO; kept], trial: vec![Pack::ZERO; kept], earlier: None }
     }
 
     /// Keeps the values before the last step, too, under this name.
@@ -37,38 +41,53 @@ impl<const W: usize> CellHistory<W> {
     /// What an implicit step starts from in a cell of a run that keeps values.
     #[inline]
     pub fn start(&self, run: usize, at: usize, blend: Blend) -> [f64; W] {
-        let place = self.runs[run].1.map_or(0, |start| start + at);
-        let recent = &self.converged[place];
+        let (pack, lane) = self.place(run, at);
+        let recent = self.converged[pack].lane(lane);
         match &self.earlier {
-            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[place][i])),
-            None => *recent,
+            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[pack].0[i][lane])),
+            None => recent,
         }
     }
 
     /// Writes the trial values of a cell of a run that keeps values.
     #[inline]
     pub fn set_trial(&mut self, run: usize, at: usize, values: [f64; W]) {
-        let place = self.runs[run].1.map_or(0, |start| start + at);
-        self.trial[place] = values;
+        let (pack, lane) = self.place(run, at);
+        self.trial[pack].set(lane, values);
+    }
+
+    #[inline]
+    fn place(&self, run: usize, at: usize) -> (usize, usize) {
+        let (pack, lane) = place(at);
+        (self.runs[run].1.map_or(0, |start| start + pack), lane)
     }
 
     /// Converged values of a run of cells that keeps some.
     #[inline]
-    pub fn converged(&self, run: usize) -> &[[f64; W]] {
+    pub fn converged(&self, run: usize) -> &[Pack<W>] {
         let (run, start) = &self.runs[run];
-        start.map_or(&[], |start| &self.converged[start..start + run.count])
+        start.map_or(&[], |start| &self.converged[start..start + run.packs()])
     }
 
     /// Converged and trial values of a run of cells that keeps some.
     #[inline]
-    pub fn both(&mut self, run: usize) -> (&[[f64; W]], &mut [[f64; W]]) {
+    pub fn both(&mut self, run: usize) -> (&[Pack<W>], &mut [Pack<W>]) {
         let (run, start) = &self.runs[run];
         match *start {
             Some(start) => {
-                let range = start..start + run.count;
+                let range = start..start + run.packs();
                 (&self.converged[range.clone()], &mut self.trial[range])
             }
             None => (&[], &mut []),
+        }
+    }
+
+    /// Asks for the values of a run of cells, if there is such a run, which are soon needed.
+    #[inline]
+    pub fn prefetch(&self, run: usize) {
+        let Some((run, Some(start))) = self.runs.get(run) else { return };
+        for values in [&self.converged, &self.trial] {
+            values[*start..][..run.packs()].iter().for_each(|pack| prefetch(pack.0.as_flattened()));
         }
     }
 
@@ -90,21 +109,20 @@ impl<const W: usize> CellHistory<W> {
         self.earlier.as_ref().map(|(name, values)| self.written(name, values, 1))
     }
 
-    fn written<'a>(&'a self, name: &'static str, values: &'a [[f64; W]], copies: usize) -> History<'a> {
+    fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
         let cells = self.runs.last().map_or(0, |(run, _)| run.first + run.count);
-        let bytes = copies * size_of_val(values);
-        let values = if values.len() == cells {
-            Cow::Borrowed(values.as_flattened())
-        } else {
-            let mut all = vec![[0.0; W]; cells];
-            for (run, start) in &self.runs {
-                if let Some(start) = *start {
-                    all[run.first..run.first + run.count].copy_from_slice(&values[start..start + run.count]);
-                }
+        let kept: usize =
+            self.runs.iter().filter(|(_, start)| start.is_some()).map(|(run, _)| run.count).sum();
+        let bytes = copies * kept * size_of::<[f64; W]>();
+        let mut all = vec![[0.0; W]; cells];
+        for (run, start) in &self.runs {
+            let Some(start) = *start else { continue };
+            for (at, values_of_cell) in all[run.first..][..run.count].iter_mut().enumerate() {
+                let (pack, lane) = place(at);
+                *values_of_cell = values[start + pack].lane(lane);
             }
-            Cow::Owned(all.into_flattened())
-        };
-        History { name, width: W, values, bytes }
+        }
+        History { name, width: W, values: Cow::Owned(all.into_flattened()), bytes }
     }
 
     /// Takes values over, if they are of this name.
@@ -115,9 +133,11 @@ impl<const W: usize> CellHistory<W> {
             _ => return,
         };
         for (run, start) in &self.runs {
-            if let Some(start) = *start {
-                let target = target[start..start + run.count].as_flattened_mut();
-                target.copy_from_slice(&values[run.first * W..][..run.count * W]);
+            let Some(start) = *start else { continue };
+            let (values, _) = values[run.first * W..][..run.count * W].as_chunks::<W>();
+            for (at, values) in values.iter().enumerate() {
+                let (pack, lane) = place(at);
+                target[start + pack].set(lane, *values);
             }
         }
     }
@@ -129,11 +149,11 @@ mod tests {
 
     #[test]
     fn values_are_kept_where_needed_and_written_for_all_cells() {
-        let run = |first, count, material| CellRun { first, count, material };
+        let run = |first, count, material| CellRun { first, count, material, pack: 0 };
         let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
         let mut history = CellHistory::<2>::new("h", &runs, |material| material == 0);
         assert_eq!(history.converged(1).len(), 0);
-        history.both(2).1[1] = [7.0, 8.0];
+        history.both(2).1[0].set(1, [7.0, 8.0]);
         history.commit();
         let written = history.history();
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
@@ -141,8 +161,8 @@ mod tests {
         let values = written.values.into_owned();
         let mut other = CellHistory::<2>::new("h", &runs, |material| material == 0);
         other.restore("another", &values);
-        assert_eq!(other.converged(2)[1], [0.0, 0.0]);
+        assert_eq!(other.converged(2)[0].lane(1), [0.0, 0.0]);
         other.restore("h", &values);
-        assert_eq!(other.converged(2)[1], [7.0, 8.0]);
+        assert_eq!(other.converged(2)[0].lane(1), [7.0, 8.0]);
     }
 }

@@ -1,5 +1,6 @@
 use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
 use crate::{
+    lanes::{LANES, Pack},
     material::{self, ByMaterial},
     space::{Batch, CellRun, Needs},
 };
@@ -24,6 +25,11 @@ impl Damage {
     }
 }
 
+/// What damage leaves.
+fn left(damage: &Pack<1>) -> [f64; LANES] {
+    damage.0[0].map(|damage| 1.0 - damage)
+}
+
 impl<const D: usize, const S: usize> Effect<D, S> for Damage {
     fn name(&self) -> &'static str {
         "damage"
@@ -41,17 +47,20 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let (converged, trial) = self.damage.both(batch.number);
-        for (at, ([before], [after])) in converged.iter().zip(trial.iter_mut()).enumerate() {
-            let release_rate = law.release_rate(&batch.elastic_stress[at]);
-            *after = law.advance(*before, release_rate, step.length);
-            energy.damage += batch.cells[at].volume * release_rate * (*after - *before);
+        for (pack, (before, after)) in converged.iter().zip(trial.iter_mut()).enumerate() {
+            let (Pack([before]), Pack([after])) = (before, after);
+            for lane in 0..LANES {
+                let release_rate = law.release_rate(&batch.elastic_stress[pack].lane(lane));
+                after[lane] = law.advance(before[lane], release_rate, step.length);
+                energy.damage += batch.cells[pack].volume[lane] * release_rate * (after[lane] - before[lane]);
+            }
         }
-        batch.integrity.weaken(trial.iter().map(|[damage]| 1.0 - damage));
+        batch.integrity.weaken(trial.iter().map(left));
     }
 
     fn weaken(&self, batch: &mut Batch<D, S>) {
         if self.laws.get(batch.material).is_some() {
-            batch.integrity.weaken(self.damage.converged(batch.number).iter().map(|[damage]| 1.0 - damage));
+            batch.integrity.weaken(self.damage.converged(batch.number).iter().map(left));
         }
     }
 

@@ -1,8 +1,10 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
+    lanes::{LANES, Pack},
     material::ByMaterial,
-    space::{Batch, CellMatrix, Needs, Simplex},
+    space::{Batch, CellMatrix, Needs, Simplex, SimplexPack},
 };
+use multiversion::multiversion;
 
 /// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
 #[derive(Debug)]
@@ -12,39 +14,65 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// `integral of density w . w` over a cell with these nodal values.
-    fn square<const D: usize>(density: f64, volume: f64, nodal: &[[f64; D]]) -> f64 {
-        let factor = density * volume / ((D + 1) * (D + 2)) as f64;
-        let mut sum = 0.0;
-        for i in 0..D {
-            let (mut total, mut squares) = (0.0, 0.0);
-            for w in nodal {
-                total += w[i];
-                squares += w[i] * w[i];
-            }
-            sum += total * total + squares;
-        }
-        factor * sum
-    }
-
     /// Adds `factor * M v` to the forces of a batch.
     fn add_mass<const D: usize, const S: usize>(&self, factor: f64, batch: &mut Batch<D, S>) {
         let Some(density) = self.density.get(batch.material) else { return };
         let factor = factor * density / ((D + 1) * (D + 2)) as f64;
-        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.force.chunks_exact_mut(D + 1));
-        for (cell, (velocity, force)) in batch.cells.iter().zip(nodal) {
-            let factor = factor * cell.volume;
-            for i in 0..D {
-                let mut total = 0.0;
-                for v in velocity {
-                    total += v[i];
+        add_mass(factor, batch.cells, &batch.velocity, &mut batch.force);
+    }
+}
+
+/// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
+#[multiversion(targets("x86_64+avx2"))]
+fn add_mass<const D: usize>(
+    factor: f64,
+    cells: &[SimplexPack<D>],
+    velocities: &[Pack<D>],
+    forces: &mut [Pack<D>],
+) {
+    let corners = velocities.chunks_exact(D + 1).zip(forces.chunks_exact_mut(D + 1));
+    for (cells, (velocity, force)) in cells.iter().zip(corners) {
+        let factor = cells.volume.map(|volume| factor * volume);
+        for i in 0..D {
+            let mut total = [0.0; LANES];
+            for lane in 0..LANES {
+                let mut sum = velocity[0].0[i][lane];
+                for a in 1..=D {
+                    sum += velocity[a].0[i][lane];
                 }
-                for (f, v) in force.iter_mut().zip(velocity) {
-                    f[i] += factor * (total + v[i]);
+                total[lane] = sum;
+            }
+            for a in 0..=D {
+                let (velocity, force) = (&velocity[a].0[i], &mut force[a].0[i]);
+                for lane in 0..LANES {
+                    force[lane] += factor[lane] * (total[lane] + velocity[lane]);
                 }
             }
         }
     }
+}
+
+/// `integral of density w . w` over cells with these nodal values.
+#[multiversion(targets("x86_64+avx2"))]
+fn square<const D: usize>(density: f64, cells: &[SimplexPack<D>], nodal: &[Pack<D>]) -> f64 {
+    let factor = density / ((D + 1) * (D + 2)) as f64;
+    let mut sums = [0.0; LANES];
+    for (cells, nodal) in cells.iter().zip(nodal.chunks_exact(D + 1)) {
+        for lane in 0..LANES {
+            let mut sum = 0.0;
+            for i in 0..D {
+                let (mut total, mut squares) = (0.0, 0.0);
+                for a in 0..=D {
+                    let w = nodal[a].0[i][lane];
+                    total += w;
+                    squares += w * w;
+                }
+                sum += total * total + squares;
+            }
+            sums[lane] += cells.volume[lane] * sum;
+        }
+    }
+    factor * sums.iter().sum::<f64>()
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
@@ -86,10 +114,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(&density) = self.density.get(batch.material) else { return };
-        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.velocity_change.chunks_exact(D + 1));
-        for (cell, (velocity, change)) in batch.cells.iter().zip(nodal) {
-            energy.kinetic += 0.5 * Self::square(density, cell.volume, velocity);
-            energy.numerical -= 0.5 * Self::square(density, cell.volume, change);
-        }
+        energy.kinetic += 0.5 * square(density, batch.cells, &batch.velocity);
+        energy.numerical -= 0.5 * square(density, batch.cells, &batch.velocity_change);
     }
 }

@@ -1,5 +1,6 @@
-use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory};
+use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory, isotropic};
 use crate::{
+    lanes::{Pack, place},
     material::{ByMaterial, Returned, Tangent, Viscoplasticity},
     space::{Batch, CellRun, Needs, OfCells},
     tensor::{Mandel, add_scaled, dot},
@@ -44,9 +45,10 @@ impl<const S: usize> ViscoplasticFlow<S> {
         let Some(law) = self.laws.get(batch.material) else { return };
         let blend = self.blend;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
-        for at in 0..batch.cells.len() {
+        for at in 0..batch.count {
             let start = self.stress.start(batch.number, at, blend);
-            let trial = add_scaled(&law.elasticity().apply(&batch.strain[at]), 1.0, &start);
+            let (pack, lane) = place(at);
+            let trial = add_scaled(&law.elasticity().apply(&batch.strain[pack].lane(lane)), 1.0, &start);
             let [before] = accumulated.as_ref().map_or([0.0], |a| a.start(batch.number, at, blend));
             let mut tangent = [[0.0; S]; S];
             let wanted = tangents.is_some().then_some(&mut tangent);
@@ -67,6 +69,13 @@ impl<const S: usize> ViscoplasticFlow<S> {
             visit(batch, at, law, &trial, found.as_ref());
         }
     }
+}
+
+/// Adds to the stress of a cell by its place in the batch.
+fn add_to<const S: usize>(stresses: &mut [Pack<S>], at: usize, added: &Mandel<S>) {
+    let (pack, lane) = place(at);
+    let sum = add_scaled(&stresses[pack].lane(lane), 1.0, added);
+    stresses[pack].set(lane, sum);
 }
 
 /// `(T - I) k' E`: what flow takes from the derivative of the stress by the strain rate.
@@ -102,9 +111,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         if self.laws.get(batch.material).is_none() {
             return;
         }
-        for at in 0..batch.cells.len() {
-            let start = self.stress.start(batch.number, at, self.blend);
-            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &start);
+        for at in 0..batch.count {
+            add_to(&mut batch.stress, at, &self.stress.start(batch.number, at, self.blend));
         }
     }
 
@@ -116,7 +124,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         let mut any = false;
         self.advance(batch, tangents, |batch, at, law, _, found| {
             if let Some(found) = found {
-                batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &law.elasticity().apply(&found.flow));
+                add_to(&mut batch.stress, at, &law.elasticity().apply(&found.flow));
                 any = true;
             }
         });
@@ -131,16 +139,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         if self.laws.get(batch.material).is_none() {
             return;
         }
-        let converged: OfCells<Mandel<S>> = self.stress.converged(batch.number).iter().copied().collect();
+        let converged: OfCells<Pack<S>> = self.stress.converged(batch.number).iter().copied().collect();
         let blend = self.blend;
         self.advance(batch, None, |batch, at, law, trial, found| {
             let elasticity = law.elasticity();
             let stress = found.map_or(*trial, |found| found.stress);
-            let before = add_scaled(&elasticity.apply(&batch.strain_before[at]), 1.0, &converged[at]);
+            let (pack, lane) = place(at);
+            let before = elasticity.apply(&batch.strain_before[pack].lane(lane));
+            let before = add_scaled(&before, 1.0, &converged[pack].lane(lane));
             let change = add_scaled(&stress, -1.0, &before);
             // k times the elastic strain rate: the step's strain without its flow.
-            let mut rate = batch.strain_rate[at].map(|rate| step.length * rate);
-            let volume = batch.cells[at].volume;
+            let mut rate = batch.strain_rate[pack].lane(lane).map(|rate| step.length * rate);
+            let volume = batch.cells[pack].volume[lane];
             if let Some(found) = found {
                 let share = step.length / blend.length;
                 rate = add_scaled(&rate, -share, &found.flow);
@@ -153,17 +163,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let elasticity = law.elasticity();
-        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
-            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
-            energy.elastic += 0.5 * batch.cells[at].volume * elasticity.inverse_square(&stress);
-        }
+        let (strains, histories) = (&batch.strain, self.stress.converged(batch.number));
+        energy.elastic += 0.5
+            * isotropic::inverse_square(law.elasticity(), batch.cells, &batch.integrity, strains, histories);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        for (stress, history) in batch.stress.iter_mut().zip(self.stress.converged(batch.number)) {
-            *stress = add_scaled(stress, 1.0, history);
-        }
+        isotropic::add_histories(self.stress.converged(batch.number), &batch.integrity, &mut batch.stress);
     }
 
     fn commit(&mut self) {

@@ -1,9 +1,11 @@
-use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
+use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory, isotropic};
 use crate::{
+    lanes::{LANES, Pack},
     material::{ByMaterial, Isotropic, Viscoplasticity},
-    space::{Batch, CellRun, Needs},
+    space::{Batch, CellRun, Integrity, Needs, SimplexPack},
     tensor::{Mandel, add_scaled, dot},
 };
+use multiversion::multiversion;
 
 /// The running sum `H_n = H_{n-1} + k G(s_{n-1})` of (24), one tensor for each cell that flows, and the viscoplastic strain
 /// that hardening cells accumulate.
@@ -28,55 +30,64 @@ impl<const S: usize> ViscoplasticHistory<S> {
             .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
         Self { laws, stress, accumulated }
     }
-
-    /// Advances a batch by the strain rates that `flow` gives for some cells of the batch from the first one on and their
-    /// stresses.
-    #[inline(always)]
-    fn advance<const D: usize>(
-        stress: &mut CellHistory<S>,
-        elasticity: &Isotropic,
-        step: Step,
-        batch: &mut Batch<D, S>,
-        energy: &mut Energy,
-        mut flow: impl FnMut(usize, &[Mandel<S>]) -> [Mandel<S>; TOGETHER],
-    ) {
-        let (converged, trial) = stress.both(batch.number);
-        for first in (0..converged.len()).step_by(TOGETHER) {
-            let cells = first..converged.len().min(first + TOGETHER);
-            let [mut lag, mut lagged] = [[[0.0; S]; TOGETHER]; 2];
-            for (i, at) in cells.clone().enumerate() {
-                lag[i] = elasticity.apply(&batch.strain_rate[at]);
-                let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, &converged[at]);
-                lagged[i] = add_scaled(&upper, -step.previous_length, &lag[i]);
-            }
-            let flow = flow(first, &lagged[..cells.len()]);
-            for (i, at) in cells.enumerate() {
-                let release = elasticity.apply(&flow[i]);
-                trial[at] = add_scaled(&converged[at], -step.length, &release);
-                let share = batch.integrity.of(at);
-                batch.stress[at] = add_scaled(&batch.stress[at], share, &trial[at]);
-                let weight = share * batch.cells[at].volume * step.length;
-                energy.viscoplastic += weight * dot(&lagged[i], &flow[i]);
-                energy.numerical += weight
-                    * (0.5 * step.length * dot(&release, &flow[i])
-                        - step.previous_length * dot(&lag[i], &flow[i]));
-            }
-        }
-    }
 }
 
-/// Cells whose flow is computed together.
-const TOGETHER: usize = 8;
+/// What advances the history of a batch.
+struct Advance<'a, const D: usize, const S: usize> {
+    elasticity: Isotropic,
+    step: Step,
+    cells: &'a [SimplexPack<D>],
+    strains: &'a [Pack<S>],
+    rates: &'a [Pack<S>],
+    integrity: &'a Integrity,
+}
 
-/// Strain rates of a law that knows one cell at a time, given its position among the stresses.
+/// Advances histories and adds them to stresses. `flow` gives the strain rates of the cells of a pack from its position and their
+/// stresses, or nothing if none flows. Gives the energies that the flow takes up and that the scheme adds.
+#[multiversion(targets("x86_64+avx2"))]
+fn advance<const D: usize, const S: usize>(
+    given: Advance<'_, D, S>,
+    (converged, trial): (&[Pack<S>], &mut [Pack<S>]),
+    stresses: &mut [Pack<S>],
+    mut flow: impl FnMut(usize, &Pack<S>) -> Option<Pack<S>>,
+) -> [f64; 2] {
+    let Advance { elasticity, step, cells, strains, rates, integrity } = given;
+    let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
+    let histories = converged.iter().zip(trial).zip(stresses);
+    for (pack, ((converged, trial), stress)) in histories.enumerate() {
+        let (strain, rate) = (&strains[pack], &rates[pack]);
+        let lagged = Pack::from_lanes(|lane| {
+            let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
+            add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
+        });
+        *trial = *converged;
+        let share = integrity.of(pack);
+        if let Some(flow) = flow(pack, &lagged) {
+            let release = Pack::from_lanes(|lane| elasticity.apply(&flow.lane(lane)));
+            *trial =
+                Pack::from_lanes(|lane| add_scaled(&converged.lane(lane), -step.length, &release.lane(lane)));
+            for lane in 0..LANES {
+                let flow = flow.lane(lane);
+                let lag = elasticity.apply(&rate.lane(lane));
+                let weight = share[lane] * cells[pack].volume[lane] * step.length;
+                dissipated[lane] += weight * dot(&lagged.lane(lane), &flow);
+                numerical[lane] += weight
+                    * (0.5 * step.length * dot(&release.lane(lane), &flow)
+                        - step.previous_length * dot(&lag, &flow));
+            }
+        }
+        *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &trial.lane(lane)));
+    }
+    [dissipated, numerical].map(|sums| sums.iter().sum())
+}
+
+/// Strain rates of a law that knows one cell at a time.
 #[inline(always)]
 fn one_by_one<const S: usize>(
-    stresses: &[Mandel<S>],
+    stresses: &Pack<S>,
     mut rate: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
-) -> [Mandel<S>; TOGETHER] {
-    let mut rates = [[0.0; S]; TOGETHER];
-    stresses.iter().enumerate().for_each(|(i, stress)| rates[i] = rate(i, stress));
-    rates
+) -> Option<Pack<S>> {
+    Some(Pack::from_lanes(|lane| rate(lane, &stresses.lane(lane))))
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
@@ -100,55 +111,58 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
-        for (stress, history) in batch.elastic_stress.iter_mut().zip(self.stress.converged(batch.number)) {
-            *stress = add_scaled(stress, 1.0, history);
-        }
+        let converged = self.stress.converged(batch.number);
+        isotropic::add_histories(converged, &Integrity::default(), &mut batch.elastic_stress);
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let (stress, elasticity) = (&mut self.stress, law.elasticity());
-        match law {
+        self.stress.prefetch(batch.number + 1);
+        let given = Advance {
+            elasticity: *law.elasticity(),
+            step,
+            cells: batch.cells,
+            strains: &batch.strain,
+            rates: &batch.strain_rate,
+            integrity: &batch.integrity,
+        };
+        let (histories, stresses) = (self.stress.both(batch.number), &mut batch.stress[..]);
+        let [dissipated, numerical] = match law {
             Viscoplasticity::Perzyna(law) => {
-                Self::advance(stress, elasticity, step, batch, energy, |_, all| law.strain_rates(all));
+                advance(given, histories, stresses, |_, all: &_| law.strain_rates(all))
             }
             Viscoplasticity::Maxwell(law) => {
-                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
-                Self::advance(stress, elasticity, step, batch, energy, flow);
+                advance(given, histories, stresses, |_, all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::DruckerPrager(law) => {
-                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
-                Self::advance(stress, elasticity, step, batch, energy, flow);
+                advance(given, histories, stresses, |_, all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::Hardening(law) => {
                 let Some(accumulated) = &mut self.accumulated else { return };
                 let (converged, trial) = accumulated.both(batch.number);
-                Self::advance(stress, elasticity, step, batch, energy, |first, all| {
-                    one_by_one(all, |i, s| {
-                        let (rate, growth) = law.strain_rate(s, converged[first + i][0]);
-                        trial[first + i][0] = converged[first + i][0] + step.length * growth;
+                advance(given, histories, stresses, |pack, all: &_| {
+                    one_by_one(all, |lane, s| {
+                        let before = converged[pack].0[0][lane];
+                        let (rate, growth) = law.strain_rate(s, before);
+                        trial[pack].0[0][lane] = before + step.length * growth;
                         rate
                     })
-                });
+                })
             }
-        }
+        };
+        energy.viscoplastic += dissipated;
+        energy.numerical += numerical;
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let elasticity = law.elasticity();
-        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
-            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
-            let volume = batch.integrity.of(at) * batch.cells[at].volume;
-            energy.elastic += 0.5 * volume * elasticity.inverse_square(&stress);
-        }
+        let (strains, histories) = (&batch.strain, self.stress.converged(batch.number));
+        energy.elastic += 0.5
+            * isotropic::inverse_square(law.elasticity(), batch.cells, &batch.integrity, strains, histories);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        let stresses = batch.stress.iter_mut().zip(self.stress.converged(batch.number));
-        for (at, (stress, history)) in stresses.enumerate() {
-            *stress = add_scaled(stress, batch.integrity.of(at), history);
-        }
+        isotropic::add_histories(self.stress.converged(batch.number), &batch.integrity, &mut batch.stress);
     }
 
     fn flow_step_bound(&self) -> Option<f64> {

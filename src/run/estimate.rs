@@ -73,7 +73,7 @@ impl Estimate {
         let mesh = &body.mesh;
         let (nodes, cells) = (mesh.total_nodes as f64, mesh.total_cells as f64);
         let own = [
-            (mesh.bytes() + size_of_val(&body.geometry.cells[..])) as f64,
+            (mesh.bytes() + size_of_val(&body.geometry.packs[..])) as f64,
             mesh.facets.len() as f64,
             ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
         ];

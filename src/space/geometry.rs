@@ -2,6 +2,7 @@
 
 use super::BATCH;
 use crate::{
+    lanes::{LANES, Pack, place, prefetch},
     mesh::{Mesh, shape},
     tensor::Vector,
 };
@@ -58,6 +59,30 @@ impl<const D: usize> Simplex<D> {
     }
 }
 
+/// Cells side by side; where there are fewer than lanes, the others have no volume and no gradients.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimplexPack<const D: usize> {
+    /// Areas or volumes in m^D.
+    pub volume: [f64; LANES],
+    /// Gradients in 1/m, as those of a [`Simplex`].
+    pub gradients: [Pack<D>; D],
+}
+
+impl<const D: usize> SimplexPack<D> {
+    const EMPTY: Self = Self { volume: [0.0; LANES], gradients: [Pack::ZERO; D] };
+
+    /// The cell of a lane.
+    #[inline(always)]
+    pub fn simplex(&self, lane: usize) -> Simplex<D> {
+        Simplex { volume: self.volume[lane], gradients: self.gradients.map(|gradient| gradient.lane(lane)) }
+    }
+
+    fn set(&mut self, lane: usize, cell: &Simplex<D>) {
+        self.volume[lane] = cell.volume;
+        self.gradients.iter_mut().zip(&cell.gradients).for_each(|(all, one)| all.set(lane, *one));
+    }
+}
+
 /// The vectors `g_a` with `g_a . e_b = 1` if `a = b`, else 0.
 fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     let mut out = [[0.0; D]; D];
@@ -89,13 +114,23 @@ pub struct CellRun {
     pub count: usize,
     /// Position among the body's materials.
     pub material: usize,
+    /// Position of its first pack of cells among those of the geometry.
+    pub pack: usize,
+}
+
+impl CellRun {
+    /// Number of its packs of cells.
+    #[inline]
+    pub fn packs(&self) -> usize {
+        self.count.div_ceil(LANES)
+    }
 }
 
 /// The cells of a rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry<const D: usize> {
-    /// One a cell, in the order of the mesh.
-    pub cells: Vec<Simplex<D>>,
+    /// The packs of all runs: each run begins with one of its own.
+    pub packs: Vec<SimplexPack<D>>,
     /// All cells in their order, cut where the material changes: the batches of every pass.
     pub runs: Vec<CellRun>,
 }
@@ -108,26 +143,63 @@ impl<const D: usize> Geometry<D> {
 
     /// Measures every cell of the mesh; `material` tells that of a region of the mesh.
     pub fn with_materials(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
-        let cells: Vec<Simplex<D>> = mesh
-            .cells
-            .chunks_exact(D + 1)
-            .map(|nodes| {
-                let mut corners = [[0.0; D]; 4];
-                for (corner, &node) in corners.iter_mut().zip(nodes) {
-                    *corner = mesh.nodes[node as usize];
-                }
-                Simplex::new(&corners[..=D])
-            })
-            .collect();
         let mut runs: Vec<CellRun> = Vec::new();
-        for cell in 0..cells.len() {
+        for cell in 0..mesh.cells.len() / (D + 1) {
             let material = mesh.cell_regions.get(cell).map_or(0, |&region| material(usize::from(region)));
             match runs.last_mut() {
                 Some(run) if run.material == material && run.count < BATCH => run.count += 1,
-                _ => runs.push(CellRun { first: cell, count: 1, material }),
+                last => {
+                    let pack = last.map_or(0, |run| run.pack + run.packs());
+                    runs.push(CellRun { first: cell, count: 1, material, pack });
+                }
             }
         }
-        Self { cells, runs }
+        let mut packs = vec![SimplexPack::EMPTY; runs.last().map_or(0, |run| run.pack + run.packs())];
+        for run in &runs {
+            for at in 0..run.count {
+                let mut corners = [[0.0; D]; 4];
+                for (corner, &node) in corners.iter_mut().zip(mesh.cell(run.first + at)) {
+                    *corner = mesh.nodes[node as usize];
+                }
+                let (pack, lane) = place(at);
+                packs[run.pack + pack].set(lane, &Simplex::new(&corners[..=D]));
+            }
+        }
+        Self { packs, runs }
+    }
+
+    /// The packs of a run.
+    #[inline]
+    pub fn of_run(&self, run: &CellRun) -> &[SimplexPack<D>] {
+        &self.packs[run.pack..][..run.packs()]
+    }
+
+    /// Asks for the packs of a run, which are soon needed.
+    #[inline]
+    pub fn prefetch(&self, run: &CellRun) {
+        for cells in self.of_run(run) {
+            prefetch(&cells.volume);
+            cells.gradients.iter().for_each(|gradient| prefetch(gradient.0.as_flattened()));
+        }
+    }
+
+    /// The cell of this local number.
+    #[inline]
+    pub fn cell(&self, number: usize) -> Simplex<D> {
+        let run = &self.runs[self.runs.partition_point(|run| run.first + run.count <= number)];
+        let (pack, lane) = place(number - run.first);
+        self.packs[run.pack + pack].simplex(lane)
+    }
+
+    /// All cells in the order of the mesh.
+    pub fn iter(&self) -> impl Iterator<Item = Simplex<D>> {
+        self.runs.iter().flat_map(|run| self.cells_of(run))
+    }
+
+    /// The cells of a run in the order of the mesh.
+    pub fn cells_of(&self, run: &CellRun) -> impl Iterator<Item = Simplex<D>> {
+        let packs = self.of_run(run);
+        (0..run.count).map(|at| packs[place(at).0].simplex(place(at).1))
     }
 }
 
@@ -163,7 +235,16 @@ mod tests {
         let runs = |geometry: Geometry<2>| -> Vec<(usize, usize, usize)> {
             geometry.runs.iter().map(|run| (run.first, run.count, run.material)).collect()
         };
-        let two = runs(Geometry::with_materials(&mesh, |region| 1 - region));
+        let geometry = Geometry::with_materials(&mesh, |region| 1 - region);
+        assert_eq!([0, 1, 2].map(|run| geometry.runs[run].pack), [0, 1, 2]);
+        assert_eq!(geometry.packs.len(), 2 + BATCH / LANES);
+        assert!(geometry.iter().all(|cell| cell.volume == 0.5) && geometry.iter().count() == BATCH + 5);
+        assert_eq!(geometry.cell(4), Simplex::new(&mesh.nodes));
+        assert_eq!(
+            geometry.packs.iter().map(|pack| pack.volume.iter().sum::<f64>()).sum::<f64>(),
+            0.5 * (BATCH + 5) as f64
+        );
+        let two = runs(geometry);
         assert_eq!(two, [(0, 3, 1), (3, 2, 0), (5, BATCH, 1)]);
         assert_eq!(runs(Geometry::new(&mesh)), [(0, BATCH, 0), (BATCH, 5, 0)]);
     }

@@ -270,9 +270,9 @@ fn allocations(session: &Session) {
 }
 
 pub fn count(session: &Session) {
-    phases::<2, 3>(session, &crossed([3, 2]));
-    phases::<2, 4>(session, &crossed([3, 2]));
-    phases::<3, 6>(session, &brick([2, 2, 2]));
+    phases::<2, 3>(session, &crossed([2, 2]));
+    phases::<2, 4>(session, &crossed([2, 2]));
+    phases::<3, 6>(session, &brick([2, 1, 1]));
     allocations(session);
 }
 
