@@ -9,14 +9,14 @@ pub use traffic::PassBytes;
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
-    lanes::{Pack, place},
+    lanes::Pack,
     material::Isotropic,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
     session::Session,
     space::{Batch, Geometry, Needs, Nodal, assemble},
     state::State,
-    tensor::{Mandel, add_scaled},
+    tensor::Mandel,
 };
 
 /// A body of `D` dimensions whose stresses have `S` components.
@@ -124,9 +124,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
-                for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
-                    *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), -1.0, &rate.lane(lane)));
-                }
+                batch.stress = Pack::from_lanes(|lane| batch.strain_rate.lane(lane).map(|rate| -rate));
             }
             self.effects.iter().filter(|e| e.form() == Some(form)).for_each(|e| e.add_form(batch));
             batch.scatter(&self.mesh, forces);
@@ -166,9 +164,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 for effect in self.effects.iter().filter(|e| e.phases().stress.is_some()) {
                     effect.add_stress(step, batch);
                 }
-                for (at, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
-                    let (pack, lane) = place(at);
-                    *out = batch.stress[pack].lane(lane);
+                for (lane, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
+                    *out = batch.stress.lane(lane);
                 }
             });
         })?;

@@ -3,7 +3,6 @@
 use super::Body;
 use crate::{
     effect::{Blend, Contact, Effect, Energy, Step, Tangents},
-    lanes::LANES,
     mesh::Mesh,
     space::{Batch, Geometry, Needs, Nodal},
     tensor::{Mandel, add_scaled, component, dot, symmetric_part},
@@ -46,15 +45,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut squares = 0.0;
         Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
-                let before = batch.stress.clone();
+                let before = batch.stress;
                 effect.add_explicit(start, batch, &mut Energy::default());
-                for ((cells, before), after) in batch.cells.iter().zip(&before).zip(&batch.stress) {
-                    for lane in 0..LANES {
-                        let cell = cells.simplex(lane);
-                        let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
-                        let added = add_scaled(&after.lane(lane), -1.0, &before.lane(lane));
-                        squares += cell.volume * cell.volume * gradients * dot(&added, &added);
-                    }
+                for lane in 0..batch.count {
+                    let cell = batch.cells.simplex(lane);
+                    let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
+                    let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
+                    squares += cell.volume * cell.volume * gradients * dot(&added, &added);
                 }
             }
             batch.scatter(mesh, forces);

@@ -26,8 +26,8 @@ impl Damage {
 }
 
 /// What damage leaves.
-fn left(damage: &Pack<1>) -> [f64; LANES] {
-    damage.0[0].map(|damage| 1.0 - damage)
+fn left(damage: &[f64; LANES]) -> [f64; LANES] {
+    damage.map(|damage| 1.0 - damage)
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Damage {
@@ -46,21 +46,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let (converged, trial) = self.damage.both(batch.number);
-        for (pack, (before, after)) in converged.iter().zip(trial.iter_mut()).enumerate() {
-            let (Pack([before]), Pack([after])) = (before, after);
-            for lane in 0..LANES {
-                let release_rate = law.release_rate(&batch.elastic_stress[pack].lane(lane));
-                after[lane] = law.advance(before[lane], release_rate, step.length);
-                energy.damage += batch.cells[pack].volume[lane] * release_rate * (after[lane] - before[lane]);
-            }
+        let Some((Pack([before]), Pack([after]))) = self.damage.both(batch.number) else { return };
+        for lane in 0..batch.count {
+            let release_rate = law.release_rate(&batch.elastic_stress.lane(lane));
+            after[lane] = law.advance(before[lane], release_rate, step.length);
+            energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
         }
-        batch.integrity.weaken(trial.iter().map(left));
+        batch.integrity.weaken(left(after));
     }
 
     fn weaken(&self, batch: &mut Batch<D, S>) {
-        if self.laws.get(batch.material).is_some() {
-            batch.integrity.weaken(self.damage.converged(batch.number).iter().map(left));
+        if let Some(Pack([damage])) = self.damage.converged(batch.number) {
+            batch.integrity.weaken(left(damage));
         }
     }
 

@@ -72,11 +72,9 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
 
     fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let strains = batch.strain.iter().zip(&batch.strain_rate);
-        let before = |(strain, rate): (&Pack<S>, &Pack<S>)| {
-            Pack::from_lanes(|lane| add_scaled(&strain.lane(lane), -step.length, &rate.lane(lane)))
-        };
-        let before: Vec<Pack<S>> = strains.map(before).collect();
+        let before = Pack::from_lanes(|lane| {
+            add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane))
+        });
         isotropic::add_stresses(&law.tensor, 1.0, &before, &batch.integrity, &mut batch.stress);
     }
 }

@@ -1,6 +1,5 @@
 use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step, isotropic};
 use crate::{
-    lanes::LANES,
     material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Needs, Simplex},
     tensor::{add_scaled, dot},
@@ -58,15 +57,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
-        for (pack, cells) in batch.cells.iter().enumerate() {
-            for lane in 0..LANES {
-                let strain = batch.strain[pack].lane(lane);
-                let change = add_scaled(&strain, -1.0, &batch.strain_before[pack].lane(lane));
-                let beside = add_scaled(&change, -step.length, &batch.strain_rate[pack].lane(lane));
-                let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
-                let work = dot(&law.tensor.apply(&strain), &beside);
-                energy.numerical += cells.volume[lane] * (work - jump);
-            }
+        for lane in 0..batch.count {
+            let strain = batch.strain.lane(lane);
+            let change = add_scaled(&strain, -1.0, &batch.strain_before.lane(lane));
+            let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
+            let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
+            let work = dot(&law.tensor.apply(&strain), &beside);
+            energy.numerical += batch.cells.volume[lane] * (work - jump);
         }
     }
 

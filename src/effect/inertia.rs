@@ -1,8 +1,8 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
-    lanes::{LANES, Pack},
+    lanes::{LANES, sum},
     material::ByMaterial,
-    space::{Batch, CellMatrix, Needs, Simplex, SimplexPack},
+    space::{Batch, CellMatrix, Corners, Needs, Simplex, SimplexPack},
 };
 use multiversion::multiversion;
 
@@ -23,56 +23,46 @@ impl Inertia {
 }
 
 /// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_mass<const D: usize>(
     factor: f64,
-    cells: &[SimplexPack<D>],
-    velocities: &[Pack<D>],
-    forces: &mut [Pack<D>],
+    cells: &SimplexPack<D>,
+    velocities: &Corners<D>,
+    forces: &mut Corners<D>,
 ) {
-    let corners = velocities.chunks_exact(D + 1).zip(forces.chunks_exact_mut(D + 1));
-    for (cells, (velocity, force)) in cells.iter().zip(corners) {
-        let factor = cells.volume.map(|volume| factor * volume);
+    for lane in 0..LANES {
+        let factor = factor * cells.volume[lane];
         for i in 0..D {
-            let mut total = [0.0; LANES];
-            for lane in 0..LANES {
-                let mut sum = velocity[0].0[i][lane];
-                for a in 1..=D {
-                    sum += velocity[a].0[i][lane];
-                }
-                total[lane] = sum;
+            let mut total = velocities[0].0[i][lane];
+            for a in 0..D {
+                total += velocities[a + 1].0[i][lane];
             }
-            for a in 0..=D {
-                let (velocity, force) = (&velocity[a].0[i], &mut force[a].0[i]);
-                for lane in 0..LANES {
-                    force[lane] += factor[lane] * (total[lane] + velocity[lane]);
-                }
+            for a in 0..D + 1 {
+                forces[a].0[i][lane] += factor * (total + velocities[a].0[i][lane]);
             }
         }
     }
 }
 
 /// `integral of density w . w` over cells with these nodal values.
-#[multiversion(targets("x86_64+avx2"))]
-fn square<const D: usize>(density: f64, cells: &[SimplexPack<D>], nodal: &[Pack<D>]) -> f64 {
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn square<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: &Corners<D>) -> f64 {
     let factor = density / ((D + 1) * (D + 2)) as f64;
-    let mut sums = [0.0; LANES];
-    for (cells, nodal) in cells.iter().zip(nodal.chunks_exact(D + 1)) {
-        for lane in 0..LANES {
-            let mut sum = 0.0;
-            for i in 0..D {
-                let (mut total, mut squares) = (0.0, 0.0);
-                for a in 0..=D {
-                    let w = nodal[a].0[i][lane];
-                    total += w;
-                    squares += w * w;
-                }
-                sum += total * total + squares;
+    let mut integrals = [0.0; LANES];
+    for lane in 0..LANES {
+        let mut sum = 0.0;
+        for i in 0..D {
+            let (mut total, mut squares) = (0.0, 0.0);
+            for a in 0..D + 1 {
+                let w = nodal[a].0[i][lane];
+                total += w;
+                squares += w * w;
             }
-            sums[lane] += cells.volume[lane] * sum;
+            sum += total * total + squares;
         }
+        integrals[lane] = cells.volume[lane] * sum;
     }
-    factor * sums.iter().sum::<f64>()
+    factor * sum(&integrals)
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Inertia {

@@ -221,6 +221,6 @@ pub struct History<'a> {
     pub width: usize,
     /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
     pub values: Cow<'a, [f64]>,
-    /// Bytes of what is kept in memory, trial values included, without the empty lanes of packs.
+    /// Bytes of what is kept in memory, trial values and the empty lanes of packs included.
     pub bytes: usize,
 }

@@ -1,6 +1,6 @@
 use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory, isotropic};
 use crate::{
-    lanes::{LANES, Pack},
+    lanes::{LANES, Pack, sum},
     material::{ByMaterial, Isotropic, Viscoplasticity},
     space::{Batch, CellRun, Integrity, Needs, SimplexPack},
     tensor::{Mandel, add_scaled, dot},
@@ -36,49 +36,46 @@ impl<const S: usize> ViscoplasticHistory<S> {
 struct Advance<'a, const D: usize, const S: usize> {
     elasticity: Isotropic,
     step: Step,
-    cells: &'a [SimplexPack<D>],
-    strains: &'a [Pack<S>],
-    rates: &'a [Pack<S>],
+    cells: &'a SimplexPack<D>,
+    strain: &'a Pack<S>,
+    rate: &'a Pack<S>,
     integrity: &'a Integrity,
 }
 
-/// Advances histories and adds them to stresses. `flow` gives the strain rates of the cells of a pack from its position and their
-/// stresses, or nothing if none flows. Gives the energies that the flow takes up and that the scheme adds.
-#[multiversion(targets("x86_64+avx2"))]
+/// Advances the history and adds it to the stress. `flow` gives the strain rates of the cells from their stresses, or nothing if
+/// none flows. Gives the energies that the flow takes up and that the scheme adds.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn advance<const D: usize, const S: usize>(
     given: Advance<'_, D, S>,
-    (converged, trial): (&[Pack<S>], &mut [Pack<S>]),
-    stresses: &mut [Pack<S>],
-    mut flow: impl FnMut(usize, &Pack<S>) -> Option<Pack<S>>,
+    (converged, trial): (&Pack<S>, &mut Pack<S>),
+    stress: &mut Pack<S>,
+    flow: impl FnOnce(&Pack<S>) -> Option<Pack<S>>,
 ) -> [f64; 2] {
-    let Advance { elasticity, step, cells, strains, rates, integrity } = given;
-    let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
-    let histories = converged.iter().zip(trial).zip(stresses);
-    for (pack, ((converged, trial), stress)) in histories.enumerate() {
-        let (strain, rate) = (&strains[pack], &rates[pack]);
-        let lagged = Pack::from_lanes(|lane| {
-            let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
-            add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
-        });
+    let Advance { elasticity, step, cells, strain, rate, integrity } = given;
+    let lagged = Pack::from_lanes(|lane| {
+        let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
+        add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
+    });
+    let share = integrity.shares();
+    let Some(flow) = flow(&lagged) else {
         *trial = *converged;
-        let share = integrity.of(pack);
-        if let Some(flow) = flow(pack, &lagged) {
-            let release = Pack::from_lanes(|lane| elasticity.apply(&flow.lane(lane)));
-            *trial =
-                Pack::from_lanes(|lane| add_scaled(&converged.lane(lane), -step.length, &release.lane(lane)));
-            for lane in 0..LANES {
-                let flow = flow.lane(lane);
-                let lag = elasticity.apply(&rate.lane(lane));
-                let weight = share[lane] * cells[pack].volume[lane] * step.length;
-                dissipated[lane] += weight * dot(&lagged.lane(lane), &flow);
-                numerical[lane] += weight
-                    * (0.5 * step.length * dot(&release.lane(lane), &flow)
-                        - step.previous_length * dot(&lag, &flow));
-            }
-        }
-        *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &trial.lane(lane)));
+        *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &converged.lane(lane)));
+        return [0.0; 2];
+    };
+    let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
+    for lane in 0..LANES {
+        let flow = flow.lane(lane);
+        let release = elasticity.apply(&flow);
+        let history = add_scaled(&converged.lane(lane), -step.length, &release);
+        trial.set(lane, history);
+        stress.set(lane, add_scaled(&stress.lane(lane), share[lane], &history));
+        let lag = elasticity.apply(&rate.lane(lane));
+        let weight = share[lane] * cells.volume[lane] * step.length;
+        dissipated[lane] = weight * dot(&lagged.lane(lane), &flow);
+        numerical[lane] =
+            weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
     }
-    [dissipated, numerical].map(|sums| sums.iter().sum())
+    [sum(&dissipated), sum(&numerical)]
 }
 
 /// Strain rates of a law that knows one cell at a time.
@@ -111,40 +108,39 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
-        let converged = self.stress.converged(batch.number);
-        isotropic::add_histories(converged, &Integrity::default(), &mut batch.elastic_stress);
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        self.stress.prefetch(batch.number + 1);
+        let Some(histories) = self.stress.both(batch.number) else { return };
         let given = Advance {
             elasticity: *law.elasticity(),
             step,
             cells: batch.cells,
-            strains: &batch.strain,
-            rates: &batch.strain_rate,
+            strain: &batch.strain,
+            rate: &batch.strain_rate,
             integrity: &batch.integrity,
         };
-        let (histories, stresses) = (self.stress.both(batch.number), &mut batch.stress[..]);
+        let stress = &mut batch.stress;
         let [dissipated, numerical] = match law {
             Viscoplasticity::Perzyna(law) => {
-                advance(given, histories, stresses, |_, all: &_| law.strain_rates(all))
+                advance(given, histories, stress, |all: &_| law.strain_rates(all))
             }
             Viscoplasticity::Maxwell(law) => {
-                advance(given, histories, stresses, |_, all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
+                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::DruckerPrager(law) => {
-                advance(given, histories, stresses, |_, all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
+                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::Hardening(law) => {
-                let Some(accumulated) = &mut self.accumulated else { return };
-                let (converged, trial) = accumulated.both(batch.number);
-                advance(given, histories, stresses, |pack, all: &_| {
+                let accumulated = self.accumulated.as_mut().and_then(|a| a.both(batch.number));
+                let Some((Pack([before]), Pack([after]))) = accumulated else { return };
+                advance(given, histories, stress, |all: &_| {
                     one_by_one(all, |lane, s| {
-                        let before = converged[pack].0[0][lane];
-                        let (rate, growth) = law.strain_rate(s, before);
-                        trial[pack].0[0][lane] = before + step.length * growth;
+                        let (rate, growth) = law.strain_rate(s, before[lane]);
+                        after[lane] = before[lane] + step.length * growth;
                         rate
                     })
                 })
@@ -156,13 +152,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let (strains, histories) = (&batch.strain, self.stress.converged(batch.number));
-        energy.elastic += 0.5
-            * isotropic::inverse_square(law.elasticity(), batch.cells, &batch.integrity, strains, histories);
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        let (strain, integrity) = (&batch.strain, &batch.integrity);
+        energy.elastic +=
+            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        isotropic::add_histories(self.stress.converged(batch.number), &batch.integrity, &mut batch.stress);
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
     fn flow_step_bound(&self) -> Option<f64> {
@@ -182,5 +180,112 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     fn restore(&mut self, name: &str, values: &[f64]) {
         self.stress.restore(name, values);
         self.accumulated.iter_mut().for_each(|history| history.restore(name, values));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        material::{Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna},
+        space::{
+            Geometry, Nodal,
+            samples::{number, row},
+        },
+    };
+
+    const STEP: Step = Step { time: 1.0, length: 0.25, previous_length: 0.125 };
+    const ELASTICITY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+
+    /// The flow of a law in a cell, and the growth of the accumulated strain.
+    fn flow<const S: usize>(law: &Viscoplasticity, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+        match law {
+            Viscoplasticity::Perzyna(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::Maxwell(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::DruckerPrager(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::Hardening(law) => law.strain_rate(s, accumulated),
+        }
+    }
+
+    /// What two steps leave, of cells whose runs are cut as `material` has it: forces, histories, energies, cells that flow.
+    /// Each history has the bits of a cell that is alone.
+    fn two_steps<const D: usize, const S: usize>(
+        law: Viscoplasticity,
+        material: fn(usize) -> usize,
+    ) -> (Vec<f64>, Vec<f64>, [f64; 2], usize) {
+        let mesh = row::<D>();
+        let geometry = Geometry::with_materials(&mesh, material);
+        let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
+        let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
+        let mut effect = ViscoplasticHistory::<S>::new(laws, &geometry.runs);
+        let values = |shift: usize| -> Vec<f64> {
+            (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
+        };
+        let [u, v] = [values(0), values(40)];
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &v, previous_velocity: &v };
+        let needs = Needs { strain: true, strain_rate: true, ..Needs::default() };
+        let (mut forces, mut energy, mut flowing) = (vec![0.0; u.len()], Energy::default(), 0);
+        for _ in 0..2 {
+            Batch::for_all(&mesh, &geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                effect.add_explicit(STEP, batch, &mut energy);
+                batch.scatter(&mesh, &mut forces);
+                for lane in 0..batch.count {
+                    let start = effect.stress.converged(batch.number).expect("a history").lane(lane);
+                    let strain = add_scaled(
+                        &batch.strain.lane(lane),
+                        -STEP.previous_length,
+                        &batch.strain_rate.lane(lane),
+                    );
+                    let stress = add_scaled(&law.elasticity().apply(&strain), 1.0, &start);
+                    let before = effect.accumulated.as_ref().and_then(|a| a.converged(batch.number));
+                    let before = before.map_or(0.0, |before| before.0[0][lane]);
+                    let (rate, _) = flow(&law, &stress, before);
+                    flowing += usize::from(rate != [0.0; S]);
+                    let expected = add_scaled(&start, -STEP.length, &law.elasticity().apply(&rate));
+                    let (_, trial) = effect.stress.both(batch.number).expect("a history");
+                    assert_eq!(trial.lane(lane), expected);
+                }
+            });
+            Effect::<D, S>::commit(&mut effect);
+        }
+        let histories = Effect::<D, S>::histories(&effect);
+        let histories = histories.iter().flat_map(|history| history.values.to_vec()).collect();
+        (forces, histories, [energy.viscoplastic, energy.numerical], flowing)
+    }
+
+    fn check<const D: usize, const S: usize>(hypothesis: Hypothesis) {
+        let elasticity = ELASTICITY.tensor(hypothesis);
+        let perzyna = Perzyna {
+            relaxation: 100.0,
+            yield_stress: 3.0,
+            exponent: 1.0,
+            elasticity,
+            metric: Metric::Elasticity,
+        };
+        let laws = [
+            Viscoplasticity::Perzyna(perzyna),
+            Viscoplasticity::Perzyna(Perzyna { exponent: 2.5, ..perzyna }),
+            Viscoplasticity::Hardening(Hardening { perzyna, modulus: 50.0 }),
+            Viscoplasticity::Maxwell(Maxwell::new(ELASTICITY, hypothesis, 0.5, None)),
+        ];
+        for law in laws {
+            let (forces, histories, energies, flowing) = two_steps::<D, S>(law, |_| 0);
+            let cells = 2 * row::<D>().cell_regions.len();
+            let all = matches!(law, Viscoplasticity::Maxwell(_));
+            assert!(flowing > cells / 4 && (flowing < cells) != all, "{flowing} of {cells}");
+            let cut = two_steps::<D, S>(law, |region| region);
+            assert_eq!((forces, histories, flowing), (cut.0, cut.1, cut.3), "other packs, the same bits");
+            for (one, other) in energies.iter().zip(&cut.2) {
+                assert!((one - other).abs() <= 1e-13 * one.abs() && *one != 0.0, "{one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_flow_alike_whatever_cells_share_their_pack() {
+        check::<2, 3>(Hypothesis::PlaneStress);
+        check::<2, 4>(Hypothesis::PlaneStrain);
+        check::<3, 6>(Hypothesis::Space);
     }
 }

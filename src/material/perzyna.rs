@@ -172,7 +172,7 @@ impl Perzyna {
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn strain_rates<const S: usize>(law: &Perzyna, stresses: &Pack<S>) -> Option<Pack<S>> {
     let yield_stress = law.yield_stress;
     let mut norms = [0.0; LANES];

@@ -1,22 +1,14 @@
-//! Passes over cells in batches that stay in cache: gather nodal values, let the effects work, scatter forces.
+//! Passes over cells, a pack of them at a time: gather nodal values, let the effects work, scatter forces.
 //!
-//! A batch is of one material, so that effects look their law up once a batch.
+//! A batch is a pack of cells of one material, so that effects look their law up once a batch.
 
-use super::{Geometry, SimplexPack, kernels};
+use super::{Geometry, SimplexPack, kernels, kernels::Corners};
 use crate::{
     lanes::{LANES, Pack},
     mesh::Mesh,
     tensor::add_scaled,
 };
-use arrayvec::ArrayVec;
-
-/// Most cells of a batch, a multiple of the lanes.
-pub const BATCH: usize = 16;
-
-/// A value for each pack of cells of a batch; nothing where it is not needed.
-pub type OfCells<T> = ArrayVec<T, { BATCH / LANES }>;
-/// A value for each node of each pack of cells of a batch; nothing where it is not needed.
-pub type OfNodes<T> = ArrayVec<T, { 4 * BATCH / LANES }>;
+use multiversion::multiversion;
 
 /// What a pass gathers for its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,32 +56,27 @@ pub struct Nodal<'a> {
 
 /// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Integrity(OfCells<[f64; LANES]>);
+pub struct Integrity(Option<[f64; LANES]>);
 
 impl Integrity {
-    /// The shares of a pack of cells, by its position in the batch.
+    /// The shares of the cells.
     #[inline(always)]
-    pub fn of(&self, pack: usize) -> [f64; LANES] {
-        self.0.get(pack).copied().unwrap_or([1.0; LANES])
+    pub fn shares(&self) -> [f64; LANES] {
+        self.0.unwrap_or([1.0; LANES])
     }
 
-    /// Multiplies the shares of the batch's cells by these, pack by pack.
-    pub fn weaken(&mut self, shares: impl Iterator<Item = [f64; LANES]>) {
-        if self.0.is_empty() {
-            self.0.extend(shares);
-        } else {
-            let all = self.0.as_flattened_mut().iter_mut();
-            all.zip(shares.flatten()).for_each(|(all, share)| *all *= share);
-        }
+    /// Multiplies the shares of the cells by these.
+    pub fn weaken(&mut self, shares: [f64; LANES]) {
+        let all = self.shares();
+        self.0 = Some(std::array::from_fn(|lane| all[lane] * shares[lane]));
     }
 }
 
-/// A run of cells in packs, with their gathered inputs and the outputs that effects add to. Fields that are needed have one pack
-/// for each pack of cells, or `D + 1` where they are of nodes; the others are empty. All is on the
-/// stack of the pass.
+/// A pack of cells, with their gathered inputs and the outputs that effects add to. Fields that nothing needs are absent
+/// ([`Pack::ABSENT`]). All is on the stack of the pass.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
-    /// Position among the runs of the geometry.
+    /// Position among the packs of the geometry.
     pub number: usize,
     /// Position among the body's materials.
     pub material: usize,
@@ -98,27 +85,27 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     /// Number of cells.
     pub count: usize,
     /// Geometry of the cells of the batch.
-    pub cells: &'g [SimplexPack<D>],
+    pub cells: &'g SimplexPack<D>,
     /// Strain of the displacement.
-    pub strain: OfCells<Pack<S>>,
+    pub strain: Pack<S>,
     /// Strain of the displacement before the step.
-    pub strain_before: OfCells<Pack<S>>,
+    pub strain_before: Pack<S>,
     /// Strain of the velocity in 1/s.
-    pub strain_rate: OfCells<Pack<S>>,
+    pub strain_rate: Pack<S>,
     /// Velocity at the nodes of cells.
-    pub velocity: OfNodes<Pack<D>>,
+    pub velocity: Corners<D>,
     /// Change of the velocity over the last step at the nodes of cells.
-    pub velocity_change: OfNodes<Pack<D>>,
+    pub velocity_change: Corners<D>,
     /// Elastic stress `E e(u) + H` in Pa before anything weakens it; effects add to it.
-    pub elastic_stress: OfCells<Pack<S>>,
+    pub elastic_stress: Pack<S>,
     /// What the cells still bear of it.
     pub integrity: Integrity,
     /// Output: stress in Pa.
-    pub stress: OfCells<Pack<S>>,
+    pub stress: Pack<S>,
     /// Output: force in N on the nodes of cells.
-    pub force: OfNodes<Pack<D>>,
+    pub force: Corners<D>,
     /// Nodal values that only strains are made of.
-    corners: OfNodes<Pack<D>>,
+    corners: [Corners<D>; 2],
 }
 
 impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
@@ -130,107 +117,103 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         needs: Needs,
         mut visit: impl FnMut(&mut Self),
     ) {
+        let Some(first) = geometry.packs.first() else { return };
         let mut batch = Self {
             number: 0,
             material: 0,
             first: 0,
             count: 0,
-            cells: &[],
-            strain: ArrayVec::new(),
-            strain_before: ArrayVec::new(),
-            strain_rate: ArrayVec::new(),
-            velocity: ArrayVec::new(),
-            velocity_change: ArrayVec::new(),
-            elastic_stress: ArrayVec::new(),
+            cells: first,
+            strain: Pack::ABSENT,
+            strain_before: Pack::ABSENT,
+            strain_rate: Pack::ABSENT,
+            velocity: [Pack::ABSENT; 4],
+            velocity_change: [Pack::ABSENT; 4],
+            elastic_stress: Pack::ABSENT,
             integrity: Integrity::default(),
-            stress: ArrayVec::new(),
-            force: ArrayVec::new(),
-            corners: ArrayVec::new(),
+            stress: Pack::ZERO,
+            force: [Pack::ZERO; 4],
+            corners: [[Pack::ZERO; 4]; 2],
         };
-        for (number, run) in geometry.runs.iter().enumerate() {
+        for (number, (run, cells)) in geometry.runs.iter().zip(&geometry.packs).enumerate() {
             (batch.number, batch.material) = (number, run.material);
             (batch.first, batch.count) = (run.first, run.count);
-            batch.cells = geometry.of_run(run);
-            geometry.runs.get(number + 1).into_iter().for_each(|next| geometry.prefetch(next));
-            batch.clear(needs);
-            batch.gather(mesh, nodal, needs);
+            batch.cells = cells;
+            batch.integrity = Integrity::default();
+            gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
             visit(&mut batch);
         }
     }
 
-    /// Fits all fields to the number of packs and makes those zero that effects add to.
-    fn clear(&mut self, needs: Needs) {
-        let packs = self.cells.len();
-        let length = |needed: bool| if needed { packs } else { 0 };
-        fit(&mut self.strain, length(needs.strain), Pack::ZERO);
-        fit(&mut self.strain_before, length(needs.strain_before), Pack::ZERO);
-        fit(&mut self.strain_rate, length(needs.strain_rate), Pack::ZERO);
-        fit(&mut self.velocity, length(needs.velocity) * (D + 1), Pack::ZERO);
-        fit(&mut self.velocity_change, length(needs.velocity_change) * (D + 1), Pack::ZERO);
-        fit(&mut self.corners, packs * (D + 1), Pack::ZERO);
-        clear(&mut self.elastic_stress, length(needs.elastic_stress), Pack::ZERO);
-        clear(&mut self.stress, packs, Pack::ZERO);
-        clear(&mut self.force, packs * (D + 1), Pack::ZERO);
-        self.integrity.0.clear();
-    }
-
+    #[inline(always)]
     fn nodes<'m>(&self, mesh: &'m Mesh<D>) -> &'m [u32] {
         &mesh.cells[self.first * (D + 1)..(self.first + self.count) * (D + 1)]
     }
 
-    fn gather(&mut self, mesh: &Mesh<D>, nodal: Nodal<'_>, needs: Needs) {
-        let nodes = self.nodes(mesh);
-        if needs.strain {
-            kernels::gather(nodes, nodal.displacement, &mut self.corners);
-            kernels::strains(self.cells, &self.corners, &mut self.strain);
-        }
-        if needs.strain_before {
-            kernels::gather(nodes, nodal.previous_displacement, &mut self.corners);
-            kernels::strains(self.cells, &self.corners, &mut self.strain_before);
-        }
-        let velocity = if needs.velocity { &mut self.velocity } else { &mut self.corners };
-        if needs.strain_rate || needs.velocity || needs.velocity_change {
-            kernels::gather(nodes, nodal.velocity, velocity);
-        }
-        if needs.strain_rate {
-            kernels::strains(self.cells, velocity, &mut self.strain_rate);
-        }
-        if needs.velocity_change {
-            kernels::gather(nodes, nodal.previous_velocity, &mut self.velocity_change);
-            for (change, velocity) in self.velocity_change.iter_mut().zip(velocity) {
-                *change = Pack::from_lanes(|lane| add_scaled(&velocity.lane(lane), -1.0, &change.lane(lane)));
-            }
-        }
-    }
-
     /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts).
     pub fn scatter(&mut self, mesh: &Mesh<D>, forces: &mut [f64]) {
-        kernels::add_divergence(self.cells, &self.stress, &mut self.force);
-        kernels::scatter(self.nodes(mesh), &self.force, forces);
+        scatter(self, self.nodes(mesh), forces);
     }
 }
 
-/// Makes a list this long; what it keeps are values of the batch before.
-fn fit<T: Copy, const MOST: usize>(list: &mut ArrayVec<T, MOST>, length: usize, zero: T) {
-    list.truncate(length);
-    list.extend(std::iter::repeat_n(zero, length - list.len()));
+/// Gathers what is needed, makes the outputs zero, and asks for the next batch's cells.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn gather<const D: usize, const S: usize>(
+    batch: &mut Batch<'_, D, S>,
+    mesh: &Mesh<D>,
+    nodal: Nodal<'_>,
+    needs: Needs,
+    next: Option<&SimplexPack<D>>,
+) {
+    let (nodes, cells) = (batch.nodes(mesh), batch.cells);
+    let [displacement, velocity] = &mut batch.corners;
+    let velocity = if needs.velocity { &mut batch.velocity } else { velocity };
+    if needs.strain {
+        kernels::gather(nodes, nodal.displacement.as_chunks().0, displacement);
+    }
+    if let Some(next) = next {
+        next.prefetch();
+    }
+    if needs.strain_rate || needs.velocity || needs.velocity_change {
+        kernels::gather(nodes, nodal.velocity.as_chunks().0, velocity);
+    }
+    if needs.velocity_change {
+        kernels::gather(nodes, nodal.previous_velocity.as_chunks().0, &mut batch.velocity_change);
+    }
+    // Only now: what was stored number by number is not read back at once.
+    if needs.strain {
+        batch.strain = kernels::strains(cells, displacement);
+    }
+    if needs.strain_rate {
+        batch.strain_rate = kernels::strains(cells, velocity);
+    }
+    if needs.velocity_change {
+        for (change, velocity) in batch.velocity_change.iter_mut().zip(&*velocity).take(D + 1) {
+            *change = Pack::from_lanes(|lane| add_scaled(&velocity.lane(lane), -1.0, &change.lane(lane)));
+        }
+    }
+    if needs.strain_before {
+        kernels::gather(nodes, nodal.previous_displacement.as_chunks().0, displacement);
+        batch.strain_before = kernels::strains(cells, displacement);
+    }
+    if needs.elastic_stress {
+        batch.elastic_stress = Pack::ZERO;
+    }
+    batch.stress = Pack::ZERO;
+    batch.force[..=D].fill(Pack::ZERO);
 }
 
-/// Makes a list this long, of zeros.
-fn clear<T: Copy, const MOST: usize>(list: &mut ArrayVec<T, MOST>, length: usize, zero: T) {
-    list.clear();
-    fit(list, length, zero);
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn scatter<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>, nodes: &[u32], forces: &mut [f64]) {
+    kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+    kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::place;
+    use crate::space::samples::{number, row};
     use crate::tensor::{Mandel, Vector, apply, symmetric_part};
-
-    fn number(i: usize) -> f64 {
-        (i as f64 * 1.7).sin()
-    }
 
     fn close<const N: usize>(found: [f64; N], expected: [f64; N]) {
         for i in 0..N {
@@ -241,60 +224,53 @@ mod tests {
         }
     }
 
-    /// Runs of one cell, of some, of two batches and a rest, and of full packs.
-    fn regions() -> Vec<u16> {
-        let lengths = [1, 5, 2 * BATCH + 3, 2 * LANES, LANES + 1];
-        lengths.iter().enumerate().flat_map(|(region, &length)| vec![region as u16; length]).collect()
+    const ALL: Needs = Needs {
+        strain: true,
+        strain_before: true,
+        strain_rate: true,
+        velocity: true,
+        velocity_change: true,
+        elastic_stress: true,
+    };
+
+    fn stress_of<const S: usize>(cell: usize) -> Mandel<S> {
+        std::array::from_fn(|c| number(S * cell + c))
+    }
+
+    fn force_of<const D: usize>(cell: usize, a: usize) -> Vector<D> {
+        std::array::from_fn(|i| number(7 * cell + a + i))
     }
 
     fn check<const D: usize, const S: usize>() {
-        let cell_regions = regions();
-        let count = cell_regions.len();
-        let total = count + D;
-        let node = |i: usize| {
-            std::array::from_fn(|j| 3.0 * number(5 * i + j) + if i % (D + 1) == j { 9.0 } else { 0.0 })
-        };
-        let mesh = Mesh::<D> {
-            nodes: (0..total).map(node).collect(),
-            cells: (0..count).flat_map(|cell| (cell..=cell + D).map(|node| node as u32)).collect(),
-            cell_regions,
-            ..Mesh::default()
-        };
+        let mesh = row::<D>();
+        let (count, total) = (mesh.cell_regions.len(), mesh.nodes.len());
         let geometry = Geometry::with_materials(&mesh, |region| region);
         let values = |shift: usize| -> Vec<f64> { (0..total * D).map(|i| number(i + shift)).collect() };
         let [u, v, w] = [values(0), values(11), values(29)];
         let nodal =
             Nodal { displacement: &u, previous_displacement: &w, velocity: &v, previous_velocity: &w };
-        let needs = Needs {
-            strain: true,
-            strain_before: true,
-            strain_rate: true,
-            velocity: true,
-            velocity_change: true,
-            elastic_stress: false,
-        };
         let [mut forces, mut expected] = [vec![0.0; total * D], vec![0.0; total * D]];
         let mut visited = 0;
-        Batch::<D, S>::for_all(&mesh, &geometry, nodal, needs, |batch| {
-            for at in 0..batch.count {
-                let (pack, lane) = place(at);
-                let (cell, nodes) = (geometry.cell(batch.first + at), mesh.cell(batch.first + at));
+        Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                let number_of_cell = batch.first + lane;
+                let (cell, nodes) = (geometry.cell(number_of_cell), mesh.cell(number_of_cell));
                 let of = |all: &[f64]| -> Vec<Vector<D>> {
                     nodes.iter().map(|&n| std::array::from_fn(|i| all[n as usize * D + i])).collect()
                 };
                 let strain = |all: &[f64]| symmetric_part(&cell.field_gradient(&of(all)));
-                close(batch.strain[pack].lane(lane), strain(&u));
-                close(batch.strain_before[pack].lane(lane), strain(&w));
-                close(batch.strain_rate[pack].lane(lane), strain(&v));
-                let stress: Mandel<S> = std::array::from_fn(|c| number(S * (batch.first + at) + c));
-                batch.stress[pack].set(lane, stress);
+                close(batch.strain.lane(lane), strain(&u));
+                close(batch.strain_before.lane(lane), strain(&w));
+                close(batch.strain_rate.lane(lane), strain(&v));
+                let stress = stress_of(number_of_cell);
+                batch.stress.set(lane, stress);
                 for a in 0..=D {
                     let (velocity, before) = (of(&v)[a], of(&w)[a]);
-                    assert_eq!(batch.velocity[pack * (D + 1) + a].lane(lane), velocity);
-                    let change = batch.velocity_change[pack * (D + 1) + a].lane(lane);
-                    assert_eq!(change, std::array::from_fn(|i| velocity[i] - before[i]));
-                    let force: Vector<D> = std::array::from_fn(|i| number(7 * at + a + i));
-                    batch.force[pack * (D + 1) + a].set(lane, force);
+                    assert_eq!(batch.velocity[a].lane(lane), velocity);
+                    let change = std::array::from_fn(|i| velocity[i] - before[i]);
+                    assert_eq!(batch.velocity_change[a].lane(lane), change);
+                    let force = force_of(number_of_cell, a);
+                    batch.force[a].set(lane, force);
                     let inner = apply::<D, S>(&stress, &cell.gradient(a));
                     for i in 0..D {
                         expected[nodes[a] as usize * D + i] += force[i] - cell.volume * inner[i];
@@ -302,10 +278,10 @@ mod tests {
                 }
                 visited += 1;
             }
-            for (pack, lane) in (batch.count..batch.cells.len() * LANES).map(place) {
-                assert_eq!(batch.strain[pack].lane(lane), [0.0; S]);
-                assert_eq!(batch.cells[pack].volume[lane], 0.0);
-                batch.stress[pack].set(lane, [1e9; S]);
+            for lane in batch.count..LANES {
+                assert_eq!(batch.strain.lane(lane), [0.0; S]);
+                assert_eq!(batch.cells.volume[lane], 0.0);
+                batch.stress.set(lane, [1e9; S]);
             }
             batch.scatter(&mesh, &mut forces);
         });
@@ -322,12 +298,73 @@ mod tests {
         check::<3, 6>();
     }
 
+    /// Strains of all cells and the forces of a pass over them, where the runs are cut as `material` has it; or, with
+    /// `portable`, from kernels compiled for any processor.
+    fn bits<const D: usize, const S: usize>(
+        material: fn(usize) -> usize,
+        portable: bool,
+    ) -> (Vec<Mandel<S>>, Vec<f64>) {
+        let mesh = row::<D>();
+        let geometry = Geometry::with_materials(&mesh, material);
+        let u: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &u, previous_velocity: &u };
+        let (mut strains, mut forces) = (Vec::new(), vec![0.0; u.len()]);
+        Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                batch.stress.set(lane, stress_of(batch.first + lane));
+                (0..=D).for_each(|a| batch.force[a].set(lane, force_of(batch.first + lane, a)));
+            }
+            let mut strain = batch.strain;
+            if portable {
+                let (nodes, mut corners) = (batch.nodes(&mesh), [Pack::ZERO; 4]);
+                kernels::gather(nodes, u.as_chunks().0, &mut corners);
+                strain = kernels::strains(batch.cells, &corners);
+                kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+                kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
+            } else {
+                batch.scatter(&mesh, &mut forces);
+            }
+            strains.extend((0..batch.count).map(|lane| strain.lane(lane)));
+        });
+        (strains, forces)
+    }
+
+    fn check_bits<const D: usize, const S: usize>() {
+        let once = bits::<D, S>(|_| 0, false);
+        assert_eq!(once, bits::<D, S>(|region| region, false), "cells in other lanes of other packs");
+        assert_eq!(once, bits::<D, S>(|_| 0, true), "narrow vectors");
+    }
+
+    #[test]
+    fn no_bit_depends_on_the_pack_of_a_cell_or_on_the_width_of_vectors() {
+        check_bits::<2, 3>();
+        check_bits::<2, 4>();
+        check_bits::<3, 6>();
+    }
+
+    #[test]
+    fn what_nobody_needs_is_absent() {
+        let mesh = row::<2>();
+        let geometry = Geometry::new(&mesh);
+        let u = vec![1.0; mesh.nodes.len() * 2];
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &u, previous_velocity: &u };
+        let needs = Needs { strain_rate: true, ..Needs::default() };
+        Batch::<2, 3>::for_all(&mesh, &geometry, nodal, needs, |batch| {
+            assert!(!batch.strain_rate.is_absent());
+            assert!(batch.strain.is_absent() && batch.strain_before.is_absent());
+            assert!(batch.velocity[0].is_absent() && batch.velocity_change[2].is_absent());
+            assert!(batch.elastic_stress.is_absent());
+        });
+    }
+
     #[test]
     fn shares_multiply_and_are_whole_where_nothing_weakens() {
         let mut integrity = Integrity::default();
-        assert_eq!(integrity.of(3), [1.0; LANES]);
-        integrity.weaken([[0.5; LANES], [0.25; LANES]].into_iter());
-        integrity.weaken([[0.5; LANES], [1.0; LANES]].into_iter());
-        assert_eq!([integrity.of(0)[0], integrity.of(1)[LANES - 1]], [0.25, 0.25]);
+        assert_eq!(integrity.shares(), [1.0; LANES]);
+        integrity.weaken([0.5; LANES]);
+        integrity.weaken(std::array::from_fn(|lane| if lane == 0 { 0.5 } else { 1.0 }));
+        assert_eq!([0, LANES - 1].map(|lane| integrity.shares()[lane]), [0.25, 0.5]);
     }
 }
