@@ -1,7 +1,10 @@
 //! What passes over the cells of a body move through memory.
 
 use super::Body;
-use crate::{effect::Effect, space::Needs};
+use crate::{
+    effect::Effect,
+    space::{Needs, Simplex},
+};
 
 /// Bytes that each pass over the cells of this rank moves at the least, if nothing stays in cache between passes: connectivity,
 /// geometry, every nodal field that is gathered once, forces that are added to twice, and histories. Surfaces are not counted.
@@ -49,8 +52,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Cells, and so many nodal fields.
     fn pass(&self, fields: usize) -> usize {
-        let cells = size_of_val(&self.mesh.cells[..]) + size_of_val(&self.geometry.packs[..]);
-        cells + self.mesh.nodes.len() * D * size_of::<f64>() * fields
+        let cell = (D + 1) * size_of::<u32>() + size_of::<Simplex<D>>();
+        self.mesh.cell_count() * cell + self.mesh.nodes.len() * D * size_of::<f64>() * fields
     }
 
     /// Histories, of each effect as far as `moved` says. They count themselves with converged and trial values.
@@ -83,7 +86,6 @@ mod tests {
     use super::*;
     use crate::{
         effect::{Load, ViscoplasticHistory},
-        lanes::LANES,
         material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Viscoplasticity},
         mesh::Mesh,
         space::Geometry,
@@ -115,8 +117,8 @@ mod tests {
 
     #[test]
     fn two_triangles_are_counted_by_hand() {
-        // Three nodes of 4 bytes; an area and two gradients of two numbers, in a pack.
-        let cells = 2 * 3 * 4 + LANES * 5 * 8;
+        // Three nodes of 4 bytes; an area and two gradients of two numbers.
+        let cells = 2 * (3 * 4 + 5 * 8);
         // Two numbers at each of four nodes.
         let field = 4 * 2 * 8;
         let (geometry, mesh) = square();
@@ -125,10 +127,10 @@ mod tests {
         let history = ViscoplasticHistory::<3>::new(ByMaterial::uniform(law), &geometry.runs);
         let with_history = body(vec![Box::new(history)], geometry.clone(), mesh.clone());
         let passes = with_history.pass_bytes();
-        // Displacement and velocity are read, forces read and written, three stresses of each lane read and written.
-        assert_eq!(passes.explicit as usize, cells + 4 * field + 2 * LANES * 3 * 8);
+        // Displacement and velocity are read, forces read and written, three stresses of each cell read and written.
+        assert_eq!(passes.explicit, cells + 4 * field + 2 * 2 * 3 * 8);
         // The energy of the elastic stress needs the displacement and the stresses.
-        assert_eq!(passes.energy as usize, cells + field + LANES * 3 * 8);
+        assert_eq!(passes.energy, cells + field + 2 * 3 * 8);
         let nothing = body(Vec::new(), geometry, mesh).pass_bytes();
         assert_eq!([nothing.explicit, nothing.energy], [0, 0]);
     }

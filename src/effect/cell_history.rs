@@ -104,7 +104,8 @@ impl<const W: usize> CellHistory<W> {
                 *all = values.lane(lane);
             }
         }
-        let bytes = copies * size_of_val(values);
+        let kept: usize = self.kept(values).map(|(run, _)| run.count).sum();
+        let bytes = copies * kept * size_of::<[f64; W]>();
         History { name, width: W, values: Cow::Owned(all.into_flattened()), bytes }
     }
 
@@ -134,7 +135,6 @@ impl<const W: usize> CellHistory<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::LANES;
 
     #[test]
     fn values_are_kept_where_needed_and_written_for_all_cells() {
@@ -147,7 +147,7 @@ mod tests {
         history.commit();
         let written = history.history();
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
-        assert_eq!(written.bytes, 2 * 2 * LANES * 2 * 8);
+        assert_eq!(written.bytes, 2 * 4 * 2 * 8);
         let values = written.values.into_owned();
         let mut other = CellHistory::<2>::new("h", &runs, |material| material == 0);
         other.restore("another", &values);

@@ -221,6 +221,7 @@ pub struct History<'a> {
     pub width: usize,
     /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
     pub values: Cow<'a, [f64]>,
-    /// Bytes of what is kept in memory, trial values and the empty lanes of packs included.
+    /// Bytes of the values that are kept, trial values included. The lanes of packs that no cell fills are not counted: how many
+    /// they are depends on the ranks.
     pub bytes: usize,
 }
