@@ -220,8 +220,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The effects for which this holds, asked once a pass.
     fn called(&self, holds: impl Fn(&dyn Effect<D, S>) -> bool) -> Called {
-        let bit = |(at, effect): (usize, &Box<dyn Effect<D, S>>)| u64::from(holds(&**effect)) << at;
-        Called(self.effects.iter().enumerate().map(bit).sum())
+        let effects = self.effects.iter().enumerate();
+        Called(effects.map(|(at, effect)| u64::from(holds(&**effect)) << at).sum())
     }
 
     fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
