@@ -54,8 +54,10 @@ fn kernels<'a, const D: usize, const S: usize>(name: &str, run: &'a mut Simulati
     // Displacement and velocity are read; forces are read and written; the history is read, its trial written.
     let history = traffic(body, 2 * S, 4 * D);
     let form = traffic(body, 0, 3 * D);
+    // Displacement, velocity and the one before, and the history are read.
+    let energies = traffic(body, S, 3 * D);
     let body = std::rc::Rc::new(std::cell::RefCell::new(body));
-    let other = body.clone();
+    let [other, another] = [body.clone(), body.clone()];
     let (mut forces, mut product) = (vec![0.0; count], vec![0.0; count]);
     let x: Vec<f64> = (0..count).map(|i| (i as f64).sin()).collect();
     vec![
@@ -65,6 +67,13 @@ fn kernels<'a, const D: usize, const S: usize>(name: &str, run: &'a mut Simulati
             run: Box::new(move || {
                 let mut body = body.borrow_mut();
                 black_box(body.add_explicit_forces(state, step, &mut forces).expect("forces"));
+            }),
+        },
+        Kernel {
+            name: format!("energies, {name}"),
+            bytes: energies,
+            run: Box::new(move || {
+                black_box(another.borrow().energy(state, step).expect("energies"));
             }),
         },
         Kernel {

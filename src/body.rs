@@ -9,13 +9,14 @@ pub use traffic::PassBytes;
 use crate::{
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
+    lanes::Pack,
     material::Isotropic,
     mesh::Mesh,
     petsc::{BlockRows, DistributedVector},
     session::Session,
     space::{Batch, Geometry, Needs, Nodal, assemble},
     state::State,
-    tensor::{Mandel, add_scaled},
+    tensor::Mandel,
 };
 
 /// A body of `D` dimensions whose stresses have `S` components.
@@ -58,17 +59,17 @@ impl<const D: usize, const S: usize> Body<D, S> {
             })?;
         }
         let Some(needs) = self.needs(|p| p.explicit) else { return Ok(energy) };
+        // Those that weaken before the others.
+        let called = [true, false]
+            .map(|weakens| self.called(|e| e.phases().explicit.is_some() && e.phases().weakens == weakens));
         let (mesh, effects) = (&self.mesh, &mut self.effects);
         with_nodal(state, |nodal| {
             Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
                 if needs.elastic_stress {
                     effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
                 }
-                for weakens in [true, false] {
-                    let called = |p: Phases| p.explicit.is_some() && p.weakens == weakens;
-                    for effect in effects.iter_mut().filter(|e| called(e.phases())) {
-                        effect.add_explicit(step, batch, &mut energy);
-                    }
+                for called in called {
+                    called.among_mut(effects).for_each(|e| e.add_explicit(step, batch, &mut energy));
                 }
                 batch.scatter(mesh, forces);
             });
@@ -90,12 +91,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
             })?;
         }
         let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
+        let [weakening, called] =
+            [self.called(|e| e.phases().weakens), self.called(|e| e.phases().energy.is_some())];
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                self.weaken(batch);
-                for effect in self.effects.iter().filter(|e| e.phases().energy.is_some()) {
-                    effect.add_energy(step, batch, &mut energy);
-                }
+                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
+                called.among(&self.effects).for_each(|effect| effect.add_energy(step, batch, &mut energy));
             });
         })?;
         Ok(energy)
@@ -125,13 +126,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if form == Form::Elasticity {
             self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
         }
+        let called = self.called(|e| e.form() == Some(form));
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
-                for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate) {
-                    *stress = add_scaled(stress, -1.0, rate);
-                }
+                batch.stress = Pack::from_lanes(|lane| batch.strain_rate.lane(lane).map(|rate| -rate));
             }
-            self.effects.iter().filter(|e| e.form() == Some(form)).for_each(|e| e.add_form(batch));
+            called.among(&self.effects).for_each(|effect| effect.add_form(batch));
             batch.scatter(&self.mesh, forces);
         });
     }
@@ -163,13 +163,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];
         let Some(needs) = self.needs(|p| p.stress) else { return Ok(out) };
         let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        let [weakening, called] =
+            [self.called(|e| e.phases().weakens), self.called(|e| e.phases().stress.is_some())];
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
-                self.weaken(batch);
-                for effect in self.effects.iter().filter(|e| e.phases().stress.is_some()) {
-                    effect.add_stress(step, batch);
+                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
+                called.among(&self.effects).for_each(|effect| effect.add_stress(step, batch));
+                for (lane, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
+                    *out = batch.stress.lane(lane);
                 }
-                out[batch.first..][..batch.cells.len()].copy_from_slice(&batch.stress[..batch.cells.len()]);
             });
         })?;
         Ok(out)
@@ -216,13 +218,32 @@ impl<const D: usize, const S: usize> Body<D, S> {
         names
     }
 
-    /// Weakens a batch as the converged histories have it.
-    fn weaken(&self, batch: &mut Batch<D, S>) {
-        self.effects.iter().filter(|e| e.phases().weakens).for_each(|effect| effect.weaken(batch));
+    /// The effects for which this holds, asked once a pass.
+    fn called(&self, holds: impl Fn(&dyn Effect<D, S>) -> bool) -> Called {
+        let effects = self.effects.iter().enumerate();
+        Called(effects.map(|(at, effect)| u64::from(holds(&**effect)) << at).sum())
     }
 
     fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
         self.effects.iter().filter_map(|e| phase(e.phases())).reduce(Needs::or)
+    }
+}
+
+/// Positions of effects, a bit for each.
+#[derive(Clone, Copy)]
+struct Called(u64);
+
+impl Called {
+    fn among<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
+        all.iter().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
+    }
+
+    fn among_mut<T>(self, all: &mut [T]) -> impl Iterator<Item = &mut T> {
+        all.iter_mut().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
+    }
+
+    fn has(self, at: usize) -> bool {
+        self.0 >> at & 1 == 1
     }
 }
 

@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod tensor;
+pub mod lanes;
 pub mod job;
 pub mod petsc;
 pub mod agreement;

@@ -45,11 +45,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut squares = 0.0;
         Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
-                let before = batch.stress.clone();
+                let before = batch.stress;
                 effect.add_explicit(start, batch, &mut Energy::default());
-                for ((cell, before), after) in batch.cells.iter().zip(&before).zip(&batch.stress) {
+                for lane in 0..batch.count {
+                    let cell = batch.cells.simplex(lane);
                     let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
-                    let added = add_scaled(after, -1.0, before);
+                    let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
                     squares += cell.volume * cell.volume * gradients * dot(&added, &added);
                 }
             }
@@ -107,7 +108,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
     /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
     pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
         for (number, tangent) in tangents.iter::<S>() {
-            let (cell, nodes) = (&self.geometry.cells[number], self.mesh.cell(number));
+            let (cell, nodes) = (self.geometry.cell(number), self.mesh.cell(number));
             let mut values = [[0.0; D]; 4];
             for (value, &node) in values.iter_mut().zip(nodes) {
                 value.copy_from_slice(&velocity[node as usize * D..][..D]);

@@ -16,9 +16,8 @@ pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
         return None;
     }
     let mut least = f64::INFINITY;
-    for run in &body.geometry.runs {
-        let steepest =
-            body.geometry.cells[run.first..][..run.count].iter().map(steepness).fold(0.0, f64::max);
+    for (run, pack) in body.geometry.runs.iter().zip(&body.geometry.packs) {
+        let steepest = (0..run.count).map(|lane| steepness(&pack.simplex(lane))).fold(0.0, f64::max);
         least = least.min(bound_of_material(body, run.material, steepest));
     }
     Some(-session.largest([-least])[0])

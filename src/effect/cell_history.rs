@@ -1,32 +1,33 @@
 use super::{Blend, History};
-use crate::space::CellRun;
+use crate::{lanes::Pack, space::CellRun};
 use std::borrow::Cow;
 
-/// Values of the cells of some materials, `W` a cell, converged and trial. Other cells take no storage.
+/// Values of the cells of some materials, `W` a cell, converged and trial, in packs as the geometry has them. Other cells take no
+/// storage.
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
     name: &'static str,
-    /// Each run of cells with the position of its first value, if its material keeps any.
-    runs: Vec<(CellRun, Option<usize>)>,
-    converged: Vec<[f64; W]>,
-    trial: Vec<[f64; W]>,
+    runs: Vec<CellRun>,
+    /// The position of the pack of each run, if its material keeps any.
+    places: Vec<Option<u32>>,
+    converged: Vec<Pack<W>>,
+    trial: Vec<Pack<W>>,
     /// Name and values before the last step.
-    earlier: Option<(&'static str, Vec<[f64; W]>)>,
+    earlier: Option<(&'static str, Vec<Pack<W>>)>,
 }
 
 impl<const W: usize> CellHistory<W> {
     /// Zeros for the cells of materials that `keeps`; nothing if there is no such material here or elsewhere.
     pub fn new(name: &'static str, runs: &[CellRun], keeps: impl Fn(usize) -> bool) -> Self {
         let mut kept = 0;
-        let runs = runs
-            .iter()
-            .map(|run| {
-                let start = keeps(run.material).then_some(kept);
-                kept += start.map_or(0, |_| run.count);
-                (*run, start)
-            })
-            .collect();
-        Self { name, runs, converged: vec![[0.0; W]; kept], trial: vec![[0.0; W]; kept], earlier: None }
+        let place = |run: &CellRun| {
+            let place = keeps(run.material).then_some(kept);
+            kept += u32::from(place.is_some());
+            place
+        };
+        let places = runs.iter().map(place).collect();
+        let zeros = vec![Pack::ZERO; kept as usize];
+        Self { name, runs: runs.to_vec(), places, converged: zeros.clone(), trial: zeros, earlier: None }
     }
 
     /// Keeps the values before the last step, too, under this name.
@@ -34,42 +35,47 @@ impl<const W: usize> CellHistory<W> {
         self.earlier = Some((name, self.converged.clone()));
     }
 
-    /// What an implicit step starts from in a cell of a run that keeps values.
+    /// What an implicit step starts from in a cell, by its run and lane; zeros where none are kept.
     #[inline]
-    pub fn start(&self, run: usize, at: usize, blend: Blend) -> [f64; W] {
-        let place = self.runs[run].1.map_or(0, |start| start + at);
-        let recent = &self.converged[place];
+    pub fn start(&self, run: usize, lane: usize, blend: Blend) -> [f64; W] {
+        let Some(place) = self.place(run) else { return [0.0; W] };
+        let recent = self.converged[place].lane(lane);
         match &self.earlier {
-            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[place][i])),
-            None => *recent,
+            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[place].0[i][lane])),
+            None => recent,
         }
     }
 
-    /// Writes the trial values of a cell of a run that keeps values.
+    /// Writes the trial values of a cell, if its run keeps any.
     #[inline]
-    pub fn set_trial(&mut self, run: usize, at: usize, values: [f64; W]) {
-        let place = self.runs[run].1.map_or(0, |start| start + at);
-        self.trial[place] = values;
-    }
-
-    /// Converged values of a run of cells that keeps some.
-    #[inline]
-    pub fn converged(&self, run: usize) -> &[[f64; W]] {
-        let (run, start) = &self.runs[run];
-        start.map_or(&[], |start| &self.converged[start..start + run.count])
-    }
-
-    /// Converged and trial values of a run of cells that keeps some.
-    #[inline]
-    pub fn both(&mut self, run: usize) -> (&[[f64; W]], &mut [[f64; W]]) {
-        let (run, start) = &self.runs[run];
-        match *start {
-            Some(start) => {
-                let range = start..start + run.count;
-                (&self.converged[range.clone()], &mut self.trial[range])
-            }
-            None => (&[], &mut []),
+    pub fn set_trial(&mut self, run: usize, lane: usize, values: [f64; W]) {
+        if let Some(place) = self.place(run) {
+            self.trial[place].set(lane, values);
         }
+    }
+
+    /// Converged values of a run of cells, if it keeps any; asks for those of the next run.
+    #[inline]
+    pub fn converged(&self, run: usize) -> Option<&Pack<W>> {
+        if let Some(next) = self.place(run + 1) {
+            self.converged[next].prefetch();
+        }
+        self.place(run).map(|place| &self.converged[place])
+    }
+
+    /// Converged and trial values of a run of cells, if it keeps any; asks for those of the next run.
+    #[inline]
+    pub fn both(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
+        if let Some(next) = self.place(run + 1) {
+            self.converged[next].prefetch();
+            self.trial[next].prefetch();
+        }
+        self.place(run).map(|place| (&self.converged[place], &mut self.trial[place]))
+    }
+
+    #[inline]
+    fn place(&self, run: usize) -> Option<usize> {
+        self.places.get(run).copied().flatten().map(|place| place as usize)
     }
 
     /// Makes the trial values the converged ones.
@@ -90,21 +96,23 @@ impl<const W: usize> CellHistory<W> {
         self.earlier.as_ref().map(|(name, values)| self.written(name, values, 1))
     }
 
-    fn written<'a>(&'a self, name: &'static str, values: &'a [[f64; W]], copies: usize) -> History<'a> {
-        let cells = self.runs.last().map_or(0, |(run, _)| run.first + run.count);
-        let bytes = copies * size_of_val(values);
-        let values = if values.len() == cells {
-            Cow::Borrowed(values.as_flattened())
-        } else {
-            let mut all = vec![[0.0; W]; cells];
-            for (run, start) in &self.runs {
-                if let Some(start) = *start {
-                    all[run.first..run.first + run.count].copy_from_slice(&values[start..start + run.count]);
-                }
+    fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
+        let cells = self.runs.last().map_or(0, |run| run.first + run.count);
+        let mut all = vec![[0.0; W]; cells];
+        for (run, values) in self.kept(values) {
+            for (lane, all) in all[run.first..][..run.count].iter_mut().enumerate() {
+                *all = values.lane(lane);
             }
-            Cow::Owned(all.into_flattened())
-        };
-        History { name, width: W, values, bytes }
+        }
+        let kept: usize = self.kept(values).map(|(run, _)| run.count).sum();
+        let bytes = copies * kept * size_of::<[f64; W]>();
+        History { name, width: W, values: Cow::Owned(all.into_flattened()), bytes }
+    }
+
+    /// The runs that keep values, with their packs.
+    fn kept<'a>(&'a self, values: &'a [Pack<W>]) -> impl Iterator<Item = (&'a CellRun, &'a Pack<W>)> {
+        let runs = self.runs.iter().zip(&self.places);
+        runs.filter_map(|(run, place)| Some((run, &values[(*place)? as usize])))
     }
 
     /// Takes values over, if they are of this name.
@@ -114,10 +122,11 @@ impl<const W: usize> CellHistory<W> {
             Some((earlier, kept)) if name == *earlier => kept,
             _ => return,
         };
-        for (run, start) in &self.runs {
-            if let Some(start) = *start {
-                let target = target[start..start + run.count].as_flattened_mut();
-                target.copy_from_slice(&values[run.first * W..][..run.count * W]);
+        let (values, _) = values.as_chunks::<W>();
+        for (run, place) in self.runs.iter().zip(&self.places) {
+            let Some(place) = *place else { continue };
+            for (lane, values) in values[run.first..][..run.count].iter().enumerate() {
+                target[place as usize].set(lane, *values);
             }
         }
     }
@@ -132,8 +141,9 @@ mod tests {
         let run = |first, count, material| CellRun { first, count, material };
         let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
         let mut history = CellHistory::<2>::new("h", &runs, |material| material == 0);
-        assert_eq!(history.converged(1).len(), 0);
-        history.both(2).1[1] = [7.0, 8.0];
+        assert_eq!(history.converged(1), None);
+        history.both(2).expect("values").1.set(1, [7.0, 8.0]);
+        history.set_trial(1, 0, [9.0, 9.0]);
         history.commit();
         let written = history.history();
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
@@ -141,8 +151,9 @@ mod tests {
         let values = written.values.into_owned();
         let mut other = CellHistory::<2>::new("h", &runs, |material| material == 0);
         other.restore("another", &values);
-        assert_eq!(other.converged(2)[1], [0.0, 0.0]);
+        assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
         other.restore("h", &values);
-        assert_eq!(other.converged(2)[1], [7.0, 8.0]);
+        assert_eq!(other.converged(2).expect("values").lane(1), [7.0, 8.0]);
+        assert_eq!(other.start(2, 1, Blend::euler(1.0)), [7.0, 8.0]);
     }
 }

@@ -1,5 +1,6 @@
 use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
 use crate::{
+    lanes::{LANES, Pack},
     material::{self, ByMaterial},
     space::{Batch, CellRun, Needs},
 };
@@ -24,6 +25,11 @@ impl Damage {
     }
 }
 
+/// What damage leaves.
+fn left(damage: &[f64; LANES]) -> [f64; LANES] {
+    damage.map(|damage| 1.0 - damage)
+}
+
 impl<const D: usize, const S: usize> Effect<D, S> for Damage {
     fn name(&self) -> &'static str {
         "damage"
@@ -40,18 +46,18 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let (converged, trial) = self.damage.both(batch.number);
-        for (at, ([before], [after])) in converged.iter().zip(trial.iter_mut()).enumerate() {
-            let release_rate = law.release_rate(&batch.elastic_stress[at]);
-            *after = law.advance(*before, release_rate, step.length);
-            energy.damage += batch.cells[at].volume * release_rate * (*after - *before);
+        let Some((Pack([before]), Pack([after]))) = self.damage.both(batch.number) else { return };
+        for lane in 0..batch.count {
+            let release_rate = law.release_rate(&batch.elastic_stress.lane(lane));
+            after[lane] = law.advance(before[lane], release_rate, step.length);
+            energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
         }
-        batch.integrity.weaken(trial.iter().map(|[damage]| 1.0 - damage));
+        batch.integrity.weaken(left(after));
     }
 
     fn weaken(&self, batch: &mut Batch<D, S>) {
-        if self.laws.get(batch.material).is_some() {
-            batch.integrity.weaken(self.damage.converged(batch.number).iter().map(|[damage]| 1.0 - damage));
+        if let Some(Pack([damage])) = self.damage.converged(batch.number) {
+            batch.integrity.weaken(left(damage));
         }
     }
 

@@ -1,8 +1,9 @@
-use super::{Effect, Energy, Form, Phases, Step};
+use super::{Effect, Energy, Form, Phases, Step, isotropic};
 use crate::{
+    lanes::Pack,
     material::{ByMaterial, Isotropic},
-    space::{Batch, Needs},
-    tensor::{add_scaled, dot},
+    space::{Batch, Integrity, Needs},
+    tensor::add_scaled,
 };
 
 /// Elastic stress of the displacement before the step: `E e(u_{n-1})` in (24).
@@ -38,30 +39,22 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        for (stress, strain) in batch.elastic_stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
-        }
+        let sound = Integrity::default();
+        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &sound, &mut batch.elastic_stress);
     }
 
     fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let stresses = batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len());
-        for (at, (stress, strain)) in stresses.enumerate() {
-            *stress = add_scaled(stress, batch.integrity.of(at), &law.tensor.apply(strain));
-        }
+        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
     fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let strains = batch.strain.iter().zip(&batch.strain_rate);
-        for (at, (cell, (strain, rate))) in batch.cells.iter().zip(strains).enumerate() {
-            let volume = batch.integrity.of(at) * cell.volume;
-            if !law.with_history {
-                energy.elastic += 0.5 * volume * dot(strain, &law.tensor.apply(strain));
-            }
-            let lag = dot(rate, &law.tensor.apply(rate));
-            energy.numerical += 0.5 * volume * step.length * step.length * lag;
+        let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
+        if !law.with_history {
+            energy.elastic += 0.5 * square(&batch.strain);
         }
+        energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
     }
 
     fn form(&self) -> Option<Form> {
@@ -74,17 +67,14 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
 
     fn add_form(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, -1.0, &law.tensor.apply(rate));
-        }
+        isotropic::add_stresses(&law.tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
     }
 
     fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let strains = batch.strain.iter().zip(&batch.strain_rate).take(batch.cells.len());
-        for (at, (stress, (strain, rate))) in batch.stress.iter_mut().zip(strains).enumerate() {
-            let before = add_scaled(strain, -step.length, rate);
-            *stress = add_scaled(stress, batch.integrity.of(at), &law.tensor.apply(&before));
-        }
+        let before = Pack::from_lanes(|lane| {
+            add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane))
+        });
+        isotropic::add_stresses(&law.tensor, 1.0, &before, &batch.integrity, &mut batch.stress);
     }
 }

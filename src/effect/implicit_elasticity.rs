@@ -1,4 +1,4 @@
-use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step};
+use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step, isotropic};
 use crate::{
     material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Needs, Simplex},
@@ -52,27 +52,24 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
 
     fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
-        for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
-        }
+        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
-        for (at, cell) in batch.cells.iter().enumerate() {
-            let change = add_scaled(&batch.strain[at], -1.0, &batch.strain_before[at]);
-            let beside = add_scaled(&change, -step.length, &batch.strain_rate[at]);
-            let stress = law.tensor.apply(&batch.strain[at]);
+        for lane in 0..batch.count {
+            let strain = batch.strain.lane(lane);
+            let change = add_scaled(&strain, -1.0, &batch.strain_before.lane(lane));
+            let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
             let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
-            energy.numerical += cell.volume * (dot(&stress, &beside) - jump);
+            let work = dot(&law.tensor.apply(&strain), &beside);
+            energy.numerical += batch.cells.volume[lane] * (work - jump);
         }
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
-        for (cell, strain) in batch.cells.iter().zip(&batch.strain) {
-            energy.elastic += 0.5 * cell.volume * dot(strain, &law.tensor.apply(strain));
-        }
+        energy.elastic += 0.5 * isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
     }
 
     fn form(&self) -> Option<Form> {
@@ -85,15 +82,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
 
     fn add_form(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, -1.0, &law.tensor.apply(rate));
-        }
+        isotropic::add_stresses(&law.tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        for (stress, strain) in batch.stress.iter_mut().zip(&batch.strain).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &law.tensor.apply(strain));
-        }
+        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 }

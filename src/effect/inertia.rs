@@ -1,8 +1,10 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
+    lanes::{LANES, sum},
     material::ByMaterial,
-    space::{Batch, CellMatrix, Needs, Simplex},
+    space::{Batch, CellMatrix, Corners, Needs, Simplex, SimplexPack},
 };
+use multiversion::multiversion;
 
 /// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
 #[derive(Debug)]
@@ -12,39 +14,55 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// `integral of density w . w` over a cell with these nodal values.
-    fn square<const D: usize>(density: f64, volume: f64, nodal: &[[f64; D]]) -> f64 {
-        let factor = density * volume / ((D + 1) * (D + 2)) as f64;
-        let mut sum = 0.0;
-        for i in 0..D {
-            let (mut total, mut squares) = (0.0, 0.0);
-            for w in nodal {
-                total += w[i];
-                squares += w[i] * w[i];
-            }
-            sum += total * total + squares;
-        }
-        factor * sum
-    }
-
     /// Adds `factor * M v` to the forces of a batch.
     fn add_mass<const D: usize, const S: usize>(&self, factor: f64, batch: &mut Batch<D, S>) {
         let Some(density) = self.density.get(batch.material) else { return };
         let factor = factor * density / ((D + 1) * (D + 2)) as f64;
-        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.force.chunks_exact_mut(D + 1));
-        for (cell, (velocity, force)) in batch.cells.iter().zip(nodal) {
-            let factor = factor * cell.volume;
-            for i in 0..D {
-                let mut total = 0.0;
-                for v in velocity {
-                    total += v[i];
-                }
-                for (f, v) in force.iter_mut().zip(velocity) {
-                    f[i] += factor * (total + v[i]);
-                }
+        add_mass(factor, batch.cells, &batch.velocity, &mut batch.force);
+    }
+}
+
+/// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_mass<const D: usize>(
+    factor: f64,
+    cells: &SimplexPack<D>,
+    velocities: &Corners<D>,
+    forces: &mut Corners<D>,
+) {
+    for lane in 0..LANES {
+        let factor = factor * cells.volume[lane];
+        for i in 0..D {
+            let mut total = velocities[0].0[i][lane];
+            for a in 0..D {
+                total += velocities[a + 1].0[i][lane];
+            }
+            for a in 0..D + 1 {
+                forces[a].0[i][lane] += factor * (total + velocities[a].0[i][lane]);
             }
         }
     }
+}
+
+/// `integral of density w . w` over cells with these nodal values.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn square<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: &Corners<D>) -> f64 {
+    let factor = density / ((D + 1) * (D + 2)) as f64;
+    let mut integrals = [0.0; LANES];
+    for lane in 0..LANES {
+        let mut sum = 0.0;
+        for i in 0..D {
+            let (mut total, mut squares) = (0.0, 0.0);
+            for a in 0..D + 1 {
+                let w = nodal[a].0[i][lane];
+                total += w;
+                squares += w * w;
+            }
+            sum += total * total + squares;
+        }
+        integrals[lane] = cells.volume[lane] * sum;
+    }
+    factor * sum(&integrals)
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
@@ -86,10 +104,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(&density) = self.density.get(batch.material) else { return };
-        let nodal = batch.velocity.chunks_exact(D + 1).zip(batch.velocity_change.chunks_exact(D + 1));
-        for (cell, (velocity, change)) in batch.cells.iter().zip(nodal) {
-            energy.kinetic += 0.5 * Self::square(density, cell.volume, velocity);
-            energy.numerical -= 0.5 * Self::square(density, cell.volume, change);
-        }
+        energy.kinetic += 0.5 * square(density, batch.cells, &batch.velocity);
+        energy.numerical -= 0.5 * square(density, batch.cells, &batch.velocity_change);
     }
 }

@@ -66,7 +66,7 @@ impl Load {
             }
         }
         for body_force in &self.body_forces {
-            for (number, cell) in geometry.cells.iter().enumerate() {
+            for (number, cell) in geometry.iter().enumerate() {
                 let nodes = mesh.cell(number);
                 let mut corners = [[0.0; D]; 4];
                 for (corner, &node) in corners.iter_mut().zip(nodes) {

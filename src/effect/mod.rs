@@ -11,6 +11,7 @@ mod elastic_stress;
 mod energy;
 mod implicit_elasticity;
 mod inertia;
+mod isotropic;
 mod load;
 mod node_history;
 mod support;
@@ -126,7 +127,7 @@ pub trait Effect<const D: usize, const S: usize> {
     }
 
     /// Adds its part of the elastic stress of the converged displacement and history, to `elastic_stress` of the batch;
-    /// called where some effect needs that.
+    /// called where some effect needs that, if it takes part in the explicit phase.
     fn add_elastic_stress(&self, _batch: &mut Batch<D, S>) {}
 
     /// Weakens the batch's cells as the converged history has it; called in the phases energy and stress if it weakens.
@@ -220,6 +221,7 @@ pub struct History<'a> {
     pub width: usize,
     /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
     pub values: Cow<'a, [f64]>,
-    /// Bytes that are kept in memory, trial values included.
+    /// Bytes of the values that are kept, trial values included. The lanes of packs that no cell fills are not counted: how many
+    /// they are depends on the ranks.
     pub bytes: usize,
 }

@@ -1,7 +1,8 @@
-use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory};
+use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory, isotropic};
 use crate::{
+    lanes::Pack,
     material::{ByMaterial, Returned, Tangent, Viscoplasticity},
-    space::{Batch, CellRun, Needs, OfCells},
+    space::{Batch, CellRun, Needs},
     tensor::{Mandel, add_scaled, dot},
 };
 
@@ -32,7 +33,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         Self { laws, stress, accumulated, blend: Blend::euler(0.0) }
     }
 
-    /// Lets each cell of the batch flow; `visit` gets the cell's place in the batch, the history `H~` of the start, its law,
+    /// Lets each cell of the batch flow; `visit` gets the cell's lane, the history `H~` of the start, its law,
     /// the stress without flow and what the mapping found.
     #[inline(always)]
     fn advance<const D: usize>(
@@ -44,10 +45,10 @@ impl<const S: usize> ViscoplasticFlow<S> {
         let Some(law) = self.laws.get(batch.material) else { return };
         let blend = self.blend;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
-        for at in 0..batch.cells.len() {
-            let start = self.stress.start(batch.number, at, blend);
-            let trial = add_scaled(&law.elasticity().apply(&batch.strain[at]), 1.0, &start);
-            let [before] = accumulated.as_ref().map_or([0.0], |a| a.start(batch.number, at, blend));
+        for lane in 0..batch.count {
+            let start = self.stress.start(batch.number, lane, blend);
+            let trial = add_scaled(&law.elasticity().apply(&batch.strain.lane(lane)), 1.0, &start);
+            let [before] = accumulated.as_ref().map_or([0.0], |a| a.start(batch.number, lane, blend));
             let mut tangent = [[0.0; S]; S];
             let wanted = tangents.is_some().then_some(&mut tangent);
             let found = law.return_stress(&trial, blend.length, before, wanted);
@@ -57,16 +58,22 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 history = add_scaled(&start, -1.0, &law.elasticity().apply(&found.flow));
                 after = found.accumulated;
                 if let Some(tangents) = &mut tangents {
-                    tangents.push(batch.first + at, &loss(law, &tangent, blend.length));
+                    tangents.push(batch.first + lane, &loss(law, &tangent, blend.length));
                 }
             }
-            self.stress.set_trial(batch.number, at, history);
+            self.stress.set_trial(batch.number, lane, history);
             if let Some(accumulated) = &mut accumulated {
-                accumulated.set_trial(batch.number, at, [after]);
+                accumulated.set_trial(batch.number, lane, [after]);
             }
-            visit(batch, at, law, &trial, found.as_ref());
+            visit(batch, lane, law, &trial, found.as_ref());
         }
     }
+}
+
+/// Adds to the stress of a cell by its lane.
+fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, added: &Mandel<S>) {
+    let sum = add_scaled(&stresses.lane(lane), 1.0, added);
+    stresses.set(lane, sum);
 }
 
 /// `(T - I) k' E`: what flow takes from the derivative of the stress by the strain rate.
@@ -102,9 +109,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         if self.laws.get(batch.material).is_none() {
             return;
         }
-        for at in 0..batch.cells.len() {
-            let start = self.stress.start(batch.number, at, self.blend);
-            batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &start);
+        for lane in 0..batch.count {
+            add_to(&mut batch.stress, lane, &self.stress.start(batch.number, lane, self.blend));
         }
     }
 
@@ -114,9 +120,9 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_flow(&mut self, batch: &mut Batch<D, S>, tangents: Option<&mut Tangents>) -> bool {
         let mut any = false;
-        self.advance(batch, tangents, |batch, at, law, _, found| {
+        self.advance(batch, tangents, |batch, lane, law, _, found| {
             if let Some(found) = found {
-                batch.stress[at] = add_scaled(&batch.stress[at], 1.0, &law.elasticity().apply(&found.flow));
+                add_to(&mut batch.stress, lane, &law.elasticity().apply(&found.flow));
                 any = true;
             }
         });
@@ -128,19 +134,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     }
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
-        if self.laws.get(batch.material).is_none() {
-            return;
-        }
-        let converged: OfCells<Mandel<S>> = self.stress.converged(batch.number).iter().copied().collect();
+        let Some(&converged) = self.stress.converged(batch.number) else { return };
         let blend = self.blend;
-        self.advance(batch, None, |batch, at, law, trial, found| {
+        self.advance(batch, None, |batch, lane, law, trial, found| {
             let elasticity = law.elasticity();
             let stress = found.map_or(*trial, |found| found.stress);
-            let before = add_scaled(&elasticity.apply(&batch.strain_before[at]), 1.0, &converged[at]);
+            let before = elasticity.apply(&batch.strain_before.lane(lane));
+            let before = add_scaled(&before, 1.0, &converged.lane(lane));
             let change = add_scaled(&stress, -1.0, &before);
             // k times the elastic strain rate: the step's strain without its flow.
-            let mut rate = batch.strain_rate[at].map(|rate| step.length * rate);
-            let volume = batch.cells[at].volume;
+            let mut rate = batch.strain_rate.lane(lane).map(|rate| step.length * rate);
+            let volume = batch.cells.volume[lane];
             if let Some(found) = found {
                 let share = step.length / blend.length;
                 rate = add_scaled(&rate, -share, &found.flow);
@@ -153,17 +157,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let elasticity = law.elasticity();
-        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
-            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
-            energy.elastic += 0.5 * batch.cells[at].volume * elasticity.inverse_square(&stress);
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        let (strain, integrity) = (&batch.strain, &batch.integrity);
+        energy.elastic +=
+            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        for (stress, history) in batch.stress.iter_mut().zip(self.stress.converged(batch.number)) {
-            *stress = add_scaled(stress, 1.0, history);
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
     fn commit(&mut self) {

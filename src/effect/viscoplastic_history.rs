@@ -1,9 +1,11 @@
-use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
+use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory, isotropic};
 use crate::{
+    lanes::{LANES, Pack, sum},
     material::{ByMaterial, Isotropic, Viscoplasticity},
-    space::{Batch, CellRun, Needs},
+    space::{Batch, CellRun, Integrity, Needs, SimplexPack},
     tensor::{Mandel, add_scaled, dot},
 };
+use multiversion::multiversion;
 
 /// The running sum `H_n = H_{n-1} + k G(s_{n-1})` of (24), one tensor for each cell that flows, and the viscoplastic strain
 /// that hardening cells accumulate.
@@ -28,55 +30,61 @@ impl<const S: usize> ViscoplasticHistory<S> {
             .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
         Self { laws, stress, accumulated }
     }
-
-    /// Advances a batch by the strain rates that `flow` gives for some cells of the batch from the first one on and their
-    /// stresses.
-    #[inline(always)]
-    fn advance<const D: usize>(
-        stress: &mut CellHistory<S>,
-        elasticity: &Isotropic,
-        step: Step,
-        batch: &mut Batch<D, S>,
-        energy: &mut Energy,
-        mut flow: impl FnMut(usize, &[Mandel<S>]) -> [Mandel<S>; TOGETHER],
-    ) {
-        let (converged, trial) = stress.both(batch.number);
-        for first in (0..converged.len()).step_by(TOGETHER) {
-            let cells = first..converged.len().min(first + TOGETHER);
-            let [mut lag, mut lagged] = [[[0.0; S]; TOGETHER]; 2];
-            for (i, at) in cells.clone().enumerate() {
-                lag[i] = elasticity.apply(&batch.strain_rate[at]);
-                let upper = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, &converged[at]);
-                lagged[i] = add_scaled(&upper, -step.previous_length, &lag[i]);
-            }
-            let flow = flow(first, &lagged[..cells.len()]);
-            for (i, at) in cells.enumerate() {
-                let release = elasticity.apply(&flow[i]);
-                trial[at] = add_scaled(&converged[at], -step.length, &release);
-                let share = batch.integrity.of(at);
-                batch.stress[at] = add_scaled(&batch.stress[at], share, &trial[at]);
-                let weight = share * batch.cells[at].volume * step.length;
-                energy.viscoplastic += weight * dot(&lagged[i], &flow[i]);
-                energy.numerical += weight
-                    * (0.5 * step.length * dot(&release, &flow[i])
-                        - step.previous_length * dot(&lag[i], &flow[i]));
-            }
-        }
-    }
 }
 
-/// Cells whose flow is computed together.
-const TOGETHER: usize = 8;
+/// What advances the history of a batch.
+struct Advance<'a, const D: usize, const S: usize> {
+    elasticity: Isotropic,
+    step: Step,
+    cells: &'a SimplexPack<D>,
+    strain: &'a Pack<S>,
+    rate: &'a Pack<S>,
+    integrity: &'a Integrity,
+}
 
-/// Strain rates of a law that knows one cell at a time, given its position among the stresses.
+/// Advances the history and adds it to the stress. `flow` gives the strain rates of the cells from their stresses, or nothing if
+/// none flows. Gives the energies that the flow takes up and that the scheme adds.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn advance<const D: usize, const S: usize>(
+    given: Advance<'_, D, S>,
+    (converged, trial): (&Pack<S>, &mut Pack<S>),
+    stress: &mut Pack<S>,
+    flow: impl FnOnce(&Pack<S>) -> Option<Pack<S>>,
+) -> [f64; 2] {
+    let Advance { elasticity, step, cells, strain, rate, integrity } = given;
+    let lagged = Pack::from_lanes(|lane| {
+        let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
+        add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
+    });
+    let share = integrity.shares();
+    let Some(flow) = flow(&lagged) else {
+        *trial = *converged;
+        *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &converged.lane(lane)));
+        return [0.0; 2];
+    };
+    let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
+    for lane in 0..LANES {
+        let flow = flow.lane(lane);
+        let release = elasticity.apply(&flow);
+        let history = add_scaled(&converged.lane(lane), -step.length, &release);
+        trial.set(lane, history);
+        stress.set(lane, add_scaled(&stress.lane(lane), share[lane], &history));
+        let lag = elasticity.apply(&rate.lane(lane));
+        let weight = share[lane] * cells.volume[lane] * step.length;
+        dissipated[lane] = weight * dot(&lagged.lane(lane), &flow);
+        numerical[lane] =
+            weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
+    }
+    [sum(&dissipated), sum(&numerical)]
+}
+
+/// Strain rates of a law that knows one cell at a time.
 #[inline(always)]
 fn one_by_one<const S: usize>(
-    stresses: &[Mandel<S>],
+    stresses: &Pack<S>,
     mut rate: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
-) -> [Mandel<S>; TOGETHER] {
-    let mut rates = [[0.0; S]; TOGETHER];
-    stresses.iter().enumerate().for_each(|(i, stress)| rates[i] = rate(i, stress));
-    rates
+) -> Option<Pack<S>> {
+    Some(Pack::from_lanes(|lane| rate(lane, &stresses.lane(lane))))
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
@@ -100,55 +108,59 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
-        for (stress, history) in batch.elastic_stress.iter_mut().zip(self.stress.converged(batch.number)) {
-            *stress = add_scaled(stress, 1.0, history);
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
     }
 
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let (stress, elasticity) = (&mut self.stress, law.elasticity());
-        match law {
+        let Some(histories) = self.stress.both(batch.number) else { return };
+        let given = Advance {
+            elasticity: *law.elasticity(),
+            step,
+            cells: batch.cells,
+            strain: &batch.strain,
+            rate: &batch.strain_rate,
+            integrity: &batch.integrity,
+        };
+        let stress = &mut batch.stress;
+        let [dissipated, numerical] = match law {
             Viscoplasticity::Perzyna(law) => {
-                Self::advance(stress, elasticity, step, batch, energy, |_, all| law.strain_rates(all));
+                advance(given, histories, stress, |all: &_| law.strain_rates(all))
             }
             Viscoplasticity::Maxwell(law) => {
-                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
-                Self::advance(stress, elasticity, step, batch, energy, flow);
+                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::DruckerPrager(law) => {
-                let flow = |_, all: &[_]| one_by_one(all, |_, s| law.strain_rate(s));
-                Self::advance(stress, elasticity, step, batch, energy, flow);
+                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
             Viscoplasticity::Hardening(law) => {
-                let Some(accumulated) = &mut self.accumulated else { return };
-                let (converged, trial) = accumulated.both(batch.number);
-                Self::advance(stress, elasticity, step, batch, energy, |first, all| {
-                    one_by_one(all, |i, s| {
-                        let (rate, growth) = law.strain_rate(s, converged[first + i][0]);
-                        trial[first + i][0] = converged[first + i][0] + step.length * growth;
+                let accumulated = self.accumulated.as_mut().and_then(|a| a.both(batch.number));
+                let Some((Pack([before]), Pack([after]))) = accumulated else { return };
+                advance(given, histories, stress, |all: &_| {
+                    one_by_one(all, |lane, s| {
+                        let (rate, growth) = law.strain_rate(s, before[lane]);
+                        after[lane] = before[lane] + step.length * growth;
                         rate
                     })
-                });
+                })
             }
-        }
+        };
+        energy.viscoplastic += dissipated;
+        energy.numerical += numerical;
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let elasticity = law.elasticity();
-        for (at, history) in self.stress.converged(batch.number).iter().enumerate() {
-            let stress = add_scaled(&elasticity.apply(&batch.strain[at]), 1.0, history);
-            let volume = batch.integrity.of(at) * batch.cells[at].volume;
-            energy.elastic += 0.5 * volume * elasticity.inverse_square(&stress);
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        let (strain, integrity) = (&batch.strain, &batch.integrity);
+        energy.elastic +=
+            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        let stresses = batch.stress.iter_mut().zip(self.stress.converged(batch.number));
-        for (at, (stress, history)) in stresses.enumerate() {
-            *stress = add_scaled(stress, batch.integrity.of(at), history);
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
     fn flow_step_bound(&self) -> Option<f64> {
@@ -168,5 +180,112 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     fn restore(&mut self, name: &str, values: &[f64]) {
         self.stress.restore(name, values);
         self.accumulated.iter_mut().for_each(|history| history.restore(name, values));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        material::{Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna},
+        space::{
+            Geometry, Nodal,
+            samples::{number, row},
+        },
+    };
+
+    const STEP: Step = Step { time: 1.0, length: 0.25, previous_length: 0.125 };
+    const ELASTICITY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+
+    /// The flow of a law in a cell, and the growth of the accumulated strain.
+    fn flow<const S: usize>(law: &Viscoplasticity, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+        match law {
+            Viscoplasticity::Perzyna(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::Maxwell(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::DruckerPrager(law) => (law.strain_rate(s), 0.0),
+            Viscoplasticity::Hardening(law) => law.strain_rate(s, accumulated),
+        }
+    }
+
+    /// What two steps leave, of cells whose runs are cut as `material` has it: forces, histories, energies, cells that flow.
+    /// Each history has the bits of a cell that is alone.
+    fn two_steps<const D: usize, const S: usize>(
+        law: Viscoplasticity,
+        material: fn(usize) -> usize,
+    ) -> (Vec<f64>, Vec<f64>, [f64; 2], usize) {
+        let mesh = row::<D>();
+        let geometry = Geometry::with_materials(&mesh, material);
+        let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
+        let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
+        let mut effect = ViscoplasticHistory::<S>::new(laws, &geometry.runs);
+        let values = |shift: usize| -> Vec<f64> {
+            (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
+        };
+        let [u, v] = [values(0), values(40)];
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &v, previous_velocity: &v };
+        let needs = Needs { strain: true, strain_rate: true, ..Needs::default() };
+        let (mut forces, mut energy, mut flowing) = (vec![0.0; u.len()], Energy::default(), 0);
+        for _ in 0..2 {
+            Batch::for_all(&mesh, &geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                effect.add_explicit(STEP, batch, &mut energy);
+                batch.scatter(&mesh, &mut forces);
+                for lane in 0..batch.count {
+                    let start = effect.stress.converged(batch.number).expect("a history").lane(lane);
+                    let strain = add_scaled(
+                        &batch.strain.lane(lane),
+                        -STEP.previous_length,
+                        &batch.strain_rate.lane(lane),
+                    );
+                    let stress = add_scaled(&law.elasticity().apply(&strain), 1.0, &start);
+                    let before = effect.accumulated.as_ref().and_then(|a| a.converged(batch.number));
+                    let before = before.map_or(0.0, |before| before.0[0][lane]);
+                    let (rate, _) = flow(&law, &stress, before);
+                    flowing += usize::from(rate != [0.0; S]);
+                    let expected = add_scaled(&start, -STEP.length, &law.elasticity().apply(&rate));
+                    let (_, trial) = effect.stress.both(batch.number).expect("a history");
+                    assert_eq!(trial.lane(lane), expected);
+                }
+            });
+            Effect::<D, S>::commit(&mut effect);
+        }
+        let histories = Effect::<D, S>::histories(&effect);
+        let histories = histories.iter().flat_map(|history| history.values.to_vec()).collect();
+        (forces, histories, [energy.viscoplastic, energy.numerical], flowing)
+    }
+
+    fn check<const D: usize, const S: usize>(hypothesis: Hypothesis) {
+        let elasticity = ELASTICITY.tensor(hypothesis);
+        let perzyna = Perzyna {
+            relaxation: 100.0,
+            yield_stress: 3.0,
+            exponent: 1.0,
+            elasticity,
+            metric: Metric::Elasticity,
+        };
+        let laws = [
+            Viscoplasticity::Perzyna(perzyna),
+            Viscoplasticity::Perzyna(Perzyna { exponent: 2.5, ..perzyna }),
+            Viscoplasticity::Hardening(Hardening { perzyna, modulus: 50.0 }),
+            Viscoplasticity::Maxwell(Maxwell::new(ELASTICITY, hypothesis, 0.5, None)),
+        ];
+        for law in laws {
+            let (forces, histories, energies, flowing) = two_steps::<D, S>(law, |_| 0);
+            let cells = 2 * row::<D>().cell_regions.len();
+            let all = matches!(law, Viscoplasticity::Maxwell(_));
+            assert!(flowing > cells / 4 && (flowing < cells) != all, "{flowing} of {cells}");
+            let cut = two_steps::<D, S>(law, |region| region);
+            assert_eq!((forces, histories, flowing), (cut.0, cut.1, cut.3), "other packs, the same bits");
+            for (one, other) in energies.iter().zip(&cut.2) {
+                assert!((one - other).abs() <= 1e-13 * one.abs() && *one != 0.0, "{one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_flow_alike_whatever_cells_share_their_pack() {
+        check::<2, 3>(Hypothesis::PlaneStress);
+        check::<2, 4>(Hypothesis::PlaneStrain);
+        check::<3, 6>(Hypothesis::Space);
     }
 }

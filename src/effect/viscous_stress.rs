@@ -1,8 +1,7 @@
-use super::{Effect, Energy, Form, Phases, Step};
+use super::{Effect, Energy, Form, Phases, Step, isotropic};
 use crate::{
     material::{ByMaterial, Viscosity},
-    space::{Batch, CellMatrix, Needs, Simplex},
-    tensor::{add_scaled, dot},
+    space::{Batch, CellMatrix, Integrity, Needs, Simplex},
 };
 
 /// Viscous stress `A e(v_n)` in (25), implicit.
@@ -34,9 +33,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
-        for (cell, rate) in batch.cells.iter().zip(&batch.strain_rate) {
-            energy.viscous += step.length * cell.volume * dot(rate, &tensor.apply(rate));
-        }
+        let whole = Integrity::default();
+        energy.viscous += step.length * isotropic::square(tensor, batch.cells, &whole, &batch.strain_rate);
     }
 
     fn form(&self) -> Option<Form> {
@@ -49,9 +47,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn add_form(&self, batch: &mut Batch<D, S>) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
-        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, -1.0, &tensor.apply(rate));
-        }
+        let whole = Integrity::default();
+        isotropic::add_stresses(tensor, -1.0, &batch.strain_rate, &whole, &mut batch.stress);
     }
 
     fn viscosity_modulus(&self) -> Option<f64> {
@@ -61,8 +58,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
 
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
-        for (stress, rate) in batch.stress.iter_mut().zip(&batch.strain_rate).take(batch.cells.len()) {
-            *stress = add_scaled(stress, 1.0, &tensor.apply(rate));
-        }
+        let whole = Integrity::default();
+        isotropic::add_stresses(tensor, 1.0, &batch.strain_rate, &whole, &mut batch.stress);
     }
 }

@@ -55,7 +55,9 @@ impl Isotropic {
     /// `t : T^-1(t)`.
     #[inline(always)]
     pub fn inverse_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
-        crate::tensor::dot(t, &self.solve(t))
+        let (n, trace) = (normal_components::<S>() as f64, trace(t));
+        let pressure = self.volumetric / (self.shear + n * self.volumetric) * trace;
+        (crate::tensor::dot(t, t) - pressure * trace) / self.shear
     }
 
     /// Smallest eigenvalue over the stored components, `m_A` of assumption H(A)(iv) for a viscosity.

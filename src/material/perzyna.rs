@@ -16,7 +16,11 @@
 //! chapter 11), with a viscosity that does not depend on `n` at `f = yield stress`.
 
 use super::{Isotropic, plane_projection::Surface};
-use crate::tensor::{Mandel, dot, normal_components, trace, von_mises};
+use crate::{
+    lanes::{LANES, Pack},
+    tensor::{Mandel, dot, normal_components, trace, von_mises},
+};
+use multiversion::multiversion;
 use std::{array, f64::consts::FRAC_1_SQRT_2};
 
 /// The norm in which the projection is orthogonal.
@@ -87,6 +91,11 @@ impl Perzyna {
         if S == 3 {
             return self.project_plane_stress(s, norm);
         }
+        self.scale_deviator(s, norm)
+    }
+
+    #[inline(always)]
+    fn scale_deviator<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
         let n = normal_components::<S>();
         let mean = trace(s) / n as f64;
         let scale = self.yield_stress / norm;
@@ -98,56 +107,41 @@ impl Perzyna {
         out
     }
 
-    /// The strain rates of at most `N` stresses, as [`strain_rate`](Self::strain_rate) gives them one by one.
-    #[inline]
-    pub fn strain_rates<const S: usize, const N: usize>(&self, stresses: &[Mandel<S>]) -> [Mandel<S>; N] {
-        let mut rates = [[0.0; S]; N];
-        let norms: [f64; N] = array::from_fn(|i| stresses.get(i).map_or(0.0, von_mises));
-        let largest = norms.iter().fold(0.0, |most: f64, norm| if *norm > most { *norm } else { most });
-        if S != 3 || self.exponent != 1.0 || self.yield_stress <= NO_YIELD_STRESS * largest {
-            rates.iter_mut().zip(stresses).for_each(|(rate, stress)| *rate = self.strain_rate(stress));
-        } else if largest > self.yield_stress {
-            let all: [Mandel<S>; N] = array::from_fn(|i| stresses.get(i).copied().unwrap_or([0.0; S]));
-            let projected = self.project_plane_stresses(&all, &norms);
-            let factor = 0.5 / self.relaxation;
-            for i in (0..N).filter(|&i| norms[i] > self.yield_stress) {
-                rates[i] = array::from_fn(|c| factor * (all[i][c] - projected[i][c]));
-            }
-        }
-        rates
+    /// The strain rates of stresses side by side, as [`strain_rate`](Self::strain_rate) gives them one by one; `None` if all are
+    /// zero.
+    pub fn strain_rates<const S: usize>(&self, stresses: &Pack<S>) -> Option<Pack<S>> {
+        strain_rates(self, stresses)
     }
 
     fn project_plane_stress<const S: usize>(&self, s: &Mandel<S>, norm: f64) -> Mandel<S> {
-        if self.yield_stress <= NO_YIELD_STRESS * norm {
-            return [0.0; S];
+        let mut out = [0.0; S];
+        if self.yield_stress > NO_YIELD_STRESS * norm {
+            let projected = self.project_plane_stresses([&[s[0]], &[s[1]], &[s[2]]], &[norm]);
+            out[..3].copy_from_slice(projected.as_flattened());
         }
-        let [projected] = self.project_plane_stresses(&[*s], &[norm]);
-        projected
+        out
     }
 
+    /// The projections of plane stresses, component by component.
     #[inline(always)]
-    fn project_plane_stresses<const S: usize, const N: usize>(
-        &self,
-        stresses: &[Mandel<S>; N],
-        norms: &[f64; N],
-    ) -> [Mandel<S>; N] {
+    fn project_plane_stresses<const N: usize>(&self, s: [&[f64; N]; 3], norms: &[f64; N]) -> [[f64; N]; 3] {
         let (along, across) = self.inverse_metric();
         let surface = Surface { along, across: 3.0 * across, yield_stress: self.yield_stress };
         let [mut p, mut q] = [[0.0; N]; 2];
         let [mut volumetric, mut deviatoric] = [[0.0; N]; 2];
-        for (i, s) in stresses.iter().enumerate() {
-            (p[i], q[i]) = ((s[0] + s[1]) * FRAC_1_SQRT_2, (s[0] - s[1]) * FRAC_1_SQRT_2);
-            (volumetric[i], deviatoric[i]) = (0.5 * p[i] * p[i], 1.5 * (q[i] * q[i] + s[2] * s[2]));
+        for i in 0..N {
+            (p[i], q[i]) = ((s[0][i] + s[1][i]) * FRAC_1_SQRT_2, (s[0][i] - s[1][i]) * FRAC_1_SQRT_2);
+            (volumetric[i], deviatoric[i]) = (0.5 * p[i] * p[i], 1.5 * (q[i] * q[i] + s[2][i] * s[2][i]));
         }
         let multipliers = surface.multipliers(&volumetric, &deviatoric, norms);
-        array::from_fn(|i| {
+        let mut out = [[0.0; N]; 3];
+        for i in 0..N {
             let p = p[i] / (1.0 + surface.along * multipliers[i]) * FRAC_1_SQRT_2;
             let b = 1.0 / (1.0 + surface.across * multipliers[i]);
             let q = q[i] * b * FRAC_1_SQRT_2;
-            let mut out = [0.0; S];
-            (out[0], out[1], out[2]) = (p + q, p - q, stresses[i][2] * b);
-            out
-        })
+            (out[0][i], out[1][i], out[2][i]) = (p + q, p - q, s[2][i] * b);
+        }
+        out
     }
 
     /// Inverse eigenvalues of the metric in plane stress: on `p`, and on `q` and `r`.
@@ -176,6 +170,39 @@ impl Perzyna {
             Metric::Frobenius => dot(t, t),
         }
     }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn strain_rates<const S: usize>(law: &Perzyna, stresses: &Pack<S>) -> Option<Pack<S>> {
+    let yield_stress = law.yield_stress;
+    let mut norms = [0.0; LANES];
+    for lane in 0..LANES {
+        norms[lane] = von_mises(&stresses.lane(lane));
+    }
+    let largest = norms.iter().fold(0.0, |most: f64, norm| if *norm > most { *norm } else { most });
+    if largest <= yield_stress {
+        return None;
+    }
+    let factor = 0.5 / law.relaxation;
+    let rates = if law.exponent != 1.0 || (S == 3 && yield_stress <= NO_YIELD_STRESS * largest) {
+        Pack::from_lanes(|lane| law.strain_rate(&stresses.lane(lane)))
+    } else {
+        let projected = if S == 3 {
+            let columns = [&stresses.0[0], &stresses.0[1], &stresses.0[2]];
+            let projected = law.project_plane_stresses(columns, &norms);
+            Pack::from_lanes(|lane| array::from_fn(|c| projected[c.min(2)][lane]))
+        } else {
+            Pack::from_lanes(|lane| law.scale_deviator(&stresses.lane(lane), norms[lane]))
+        };
+        Pack::from_lanes(|lane| {
+            let factor = if norms[lane] > yield_stress { factor } else { 0.0 };
+            array::from_fn(|c| {
+                let rate = factor * (stresses.0[c][lane] - projected.0[c][lane]);
+                if factor > 0.0 { rate } else { 0.0 }
+            })
+        })
+    };
+    Some(rates)
 }
 
 #[cfg(test)]
@@ -209,11 +236,16 @@ mod tests {
         let stresses = [[40.0, -3.0, 7.0], [0.0; 3], [1e6, 1e6, 0.0], [12.0, 3.0, 1.0], [-25.0, 20.0, 30.0]];
         for (metric, exponent) in [(METRICS[0], 1.0), (METRICS[1], 1.0), (METRICS[2], 2.5)] {
             let law = Perzyna { exponent, ..law(metric, Hypothesis::PlaneStress) };
-            let rates: [Mandel<3>; 8] = law.strain_rates(&stresses);
-            for (rate, stress) in rates.iter().zip(&stresses) {
-                assert_eq!(*rate, law.strain_rate(stress));
-            }
-            assert!(rates[5..].iter().all(|rate| *rate == [0.0; 3]));
+            let side_by_side = Pack::from_lanes(|lane| stresses.get(lane).copied().unwrap_or([0.0; 3]));
+            let rates = law.strain_rates(&side_by_side).expect("flow");
+            assert!((0..LANES).all(|lane| rates.lane(lane) == law.strain_rate(&side_by_side.lane(lane))));
+            assert!((5..LANES).all(|lane| rates.lane(lane) == [0.0; 3]));
+            let space = Perzyna { exponent, ..self::law(metric, Hypothesis::Space) };
+            let side_by_side =
+                Pack::from_lanes(|lane| array::from_fn(|c| side_by_side.0[c % 3][lane] * (1.0 + c as f64)));
+            let rates: Pack<6> = space.strain_rates(&side_by_side).expect("flow");
+            assert!((0..LANES).all(|lane| rates.lane(lane) == space.strain_rate(&side_by_side.lane(lane))));
+            assert_eq!(law.strain_rates(&Pack::from_lanes(|lane| [lane as f64, 0.0, 0.0])), None);
         }
     }
 

@@ -67,7 +67,7 @@ impl<const S: usize> ErrorIndicator<S> {
             self.means.update_ghosts()?;
             let means = self.means.local()?;
             for cell in of_material(body, material) {
-                let volume = body.geometry.cells[cell].volume;
+                let volume = body.geometry.cell(cell).volume;
                 let square = |t: &Mandel<S>| volume * elasticity.inverse_square(t);
                 let (mut sum, mut each) = ([0.0; S], 0.0);
                 for &node in body.mesh.cell(cell) {
@@ -98,7 +98,7 @@ impl<const S: usize> ErrorIndicator<S> {
         let mut sums = self.means.local_mut()?;
         sums.fill(0.0);
         for cell in of_material(body, material) {
-            let volume = body.geometry.cells[cell].volume;
+            let volume = body.geometry.cell(cell).volume;
             for &node in body.mesh.cell(cell) {
                 let sum = &mut sums[node as usize * (S + 1)..][..=S];
                 sum.iter_mut().zip(&stress[cell]).for_each(|(sum, value)| *sum += volume * value);

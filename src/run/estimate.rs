@@ -59,7 +59,7 @@ const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
 /// Seconds of stress, history, forces and energies, a cell and step.
-const CELL: [f64; 2] = [60e-9, 100e-9];
+const CELL: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {
     /// For a body and so many steps. Collective.
@@ -73,7 +73,7 @@ impl Estimate {
         let mesh = &body.mesh;
         let (nodes, cells) = (mesh.total_nodes as f64, mesh.total_cells as f64);
         let own = [
-            (mesh.bytes() + size_of_val(&body.geometry.cells[..])) as f64,
+            (mesh.bytes() + size_of_val(&body.geometry.packs[..])) as f64,
             mesh.facets.len() as f64,
             ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
         ];

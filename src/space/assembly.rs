@@ -57,9 +57,9 @@ pub fn assemble<const D: usize>(
     mut fill: impl FnMut(usize, &Simplex<D>, &mut CellMatrix<D>),
 ) -> Result<BlockRows> {
     let mut rows = LocalRows::pattern(mesh);
-    for (number, cell) in geometry.cells.iter().enumerate() {
+    for (number, cell) in geometry.iter().enumerate() {
         let mut matrix = CellMatrix { blocks: [[[[0.0; D]; D]; 4]; 4] };
-        fill(number, cell, &mut matrix);
+        fill(number, &cell, &mut matrix);
         let nodes = mesh.cell(number);
         for (a, &row) in nodes.iter().enumerate() {
             for (b, &column) in nodes.iter().enumerate() {

@@ -1,21 +1,14 @@
-//! Passes over cells in batches that stay in cache: gather nodal values, let the effects work, scatter forces.
+//! Passes over cells, a pack of them at a time: gather nodal values, let the effects work, scatter forces.
 //!
-//! A batch is of one material, so that effects look their law up once a batch.
+//! A batch is a pack of cells of one material, so that effects look their law up once a batch.
 
-use super::{Geometry, Simplex};
+use super::{Geometry, SimplexPack, kernels, kernels::Corners};
 use crate::{
+    lanes::{LANES, Pack},
     mesh::Mesh,
-    tensor::{Mandel, Vector, component, symmetric_part},
+    tensor::add_scaled,
 };
-use arrayvec::ArrayVec;
-
-/// Most cells of a batch.
-pub const BATCH: usize = 128;
-
-/// A value for each cell of a batch; nothing where it is not needed.
-pub type OfCells<T> = ArrayVec<T, BATCH>;
-/// A value for each node of each cell of a batch; nothing where it is not needed.
-pub type OfNodes<T> = ArrayVec<T, { 4 * BATCH }>;
+use multiversion::multiversion;
 
 /// What a pass gathers for its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,54 +56,56 @@ pub struct Nodal<'a> {
 
 /// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Integrity(OfCells<f64>);
+pub struct Integrity(Option<[f64; LANES]>);
 
 impl Integrity {
-    /// The share of a cell, by its position in the batch.
+    /// The shares of the cells.
     #[inline(always)]
-    pub fn of(&self, at: usize) -> f64 {
-        self.0.get(at).copied().unwrap_or(1.0)
+    pub fn shares(&self) -> [f64; LANES] {
+        self.0.unwrap_or([1.0; LANES])
     }
 
-    /// Multiplies the shares of the batch's cells by these.
-    pub fn weaken(&mut self, shares: impl Iterator<Item = f64>) {
-        if self.0.is_empty() {
-            self.0.extend(shares);
-        } else {
-            self.0.iter_mut().zip(shares).for_each(|(all, share)| *all *= share);
-        }
+    /// Multiplies the shares of the cells by these.
+    pub fn weaken(&mut self, shares: [f64; LANES]) {
+        let all = self.shares();
+        self.0 = Some(std::array::from_fn(|lane| all[lane] * shares[lane]));
     }
 }
 
-/// A run of cells with their gathered inputs and the outputs that effects add to; all on the stack of the pass.
+/// A pack of cells, with their gathered inputs and the outputs that effects add to. Fields that nothing needs are absent
+/// ([`Pack::ABSENT`]). All is on the stack of the pass.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
-    /// Position among the runs of the geometry.
+    /// Position among the packs of the geometry.
     pub number: usize,
     /// Position among the body's materials.
     pub material: usize,
     /// Local number of the first cell.
     pub first: usize,
+    /// Number of cells.
+    pub count: usize,
     /// Geometry of the cells of the batch.
-    pub cells: &'g [Simplex<D>],
-    /// Strain of the displacement, one a cell, if needed.
-    pub strain: OfCells<Mandel<S>>,
-    /// Strain of the displacement before the step, one a cell, if needed.
-    pub strain_before: OfCells<Mandel<S>>,
-    /// Strain of the velocity in 1/s, one a cell, if needed.
-    pub strain_rate: OfCells<Mandel<S>>,
-    /// Velocity, `D + 1` nodes a cell, if needed.
-    pub velocity: OfNodes<Vector<D>>,
-    /// Change of the velocity over the last step, `D + 1` nodes a cell, if needed.
-    pub velocity_change: OfNodes<Vector<D>>,
-    /// Elastic stress `E e(u) + H` in Pa before anything weakens it, one a cell, if needed; effects add to it.
-    pub elastic_stress: OfCells<Mandel<S>>,
+    pub cells: &'g SimplexPack<D>,
+    /// Strain of the displacement.
+    pub strain: Pack<S>,
+    /// Strain of the displacement before the step.
+    pub strain_before: Pack<S>,
+    /// Strain of the velocity in 1/s.
+    pub strain_rate: Pack<S>,
+    /// Velocity at the nodes of cells.
+    pub velocity: Corners<D>,
+    /// Change of the velocity over the last step at the nodes of cells.
+    pub velocity_change: Corners<D>,
+    /// Elastic stress `E e(u) + H` in Pa before anything weakens it; effects add to it.
+    pub elastic_stress: Pack<S>,
     /// What the cells still bear of it.
     pub integrity: Integrity,
-    /// Output: stress in Pa, one a cell.
-    pub stress: OfCells<Mandel<S>>,
-    /// Output: force in N on the cell's nodes, `D + 1` a cell.
-    pub force: OfNodes<Vector<D>>,
+    /// Output: stress in Pa.
+    pub stress: Pack<S>,
+    /// Output: force in N on the nodes of cells.
+    pub force: Corners<D>,
+    /// Nodal values that only strains are made of.
+    corners: [Corners<D>; 2],
 }
 
 impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
@@ -122,107 +117,254 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         needs: Needs,
         mut visit: impl FnMut(&mut Self),
     ) {
+        let Some(first) = geometry.packs.first() else { return };
         let mut batch = Self {
             number: 0,
             material: 0,
             first: 0,
-            cells: &[],
-            strain: zeros(needs.strain, BATCH),
-            strain_before: zeros(needs.strain_before, BATCH),
-            strain_rate: zeros(needs.strain_rate, BATCH),
-            velocity: zeros(needs.velocity, BATCH * (D + 1)),
-            velocity_change: zeros(needs.velocity_change, BATCH * (D + 1)),
-            elastic_stress: zeros(needs.elastic_stress, BATCH),
+            count: 0,
+            cells: first,
+            strain: Pack::ABSENT,
+            strain_before: Pack::ABSENT,
+            strain_rate: Pack::ABSENT,
+            velocity: [Pack::ABSENT; 4],
+            velocity_change: [Pack::ABSENT; 4],
+            elastic_stress: Pack::ABSENT,
             integrity: Integrity::default(),
-            stress: zeros(true, BATCH),
-            force: zeros(true, BATCH * (D + 1)),
+            stress: Pack::ZERO,
+            force: [Pack::ZERO; 4],
+            corners: [[Pack::ZERO; 4]; 2],
         };
-        for (number, run) in geometry.runs.iter().enumerate() {
-            (batch.number, batch.material, batch.first) = (number, run.material, run.first);
-            batch.cells = &geometry.cells[run.first..run.first + run.count];
-            batch.stress[..run.count].fill([0.0; S]);
-            batch.force[..run.count * (D + 1)].fill([0.0; D]);
-            batch.elastic_stress.fill([0.0; S]);
-            batch.integrity.0.clear();
-            batch.gather(mesh, nodal, needs);
+        for (number, (run, cells)) in geometry.runs.iter().zip(&geometry.packs).enumerate() {
+            (batch.number, batch.material) = (number, run.material);
+            (batch.first, batch.count) = (run.first, run.count);
+            batch.cells = cells;
+            batch.integrity = Integrity::default();
+            gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
             visit(&mut batch);
         }
     }
 
-    fn gather(&mut self, mesh: &Mesh<D>, nodal: Nodal<'_>, needs: Needs) {
-        let nodes = &mesh.cells[self.first * (D + 1)..(self.first + self.cells.len()) * (D + 1)];
-        for (at, (cell, nodes)) in self.cells.iter().zip(nodes.chunks_exact(D + 1)).enumerate() {
-            if needs.strain {
-                let values = values_at::<D>(nodal.displacement, nodes);
-                self.strain[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
-            }
-            if needs.strain_before {
-                let values = values_at::<D>(nodal.previous_displacement, nodes);
-                self.strain_before[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
-            }
-            if !(needs.strain_rate || needs.velocity || needs.velocity_change) {
-                continue;
-            }
-            let values = values_at::<D>(nodal.velocity, nodes);
-            if needs.strain_rate {
-                self.strain_rate[at] = symmetric_part(&cell.field_gradient(&values[..=D]));
-            }
-            if needs.velocity {
-                self.velocity[at * (D + 1)..][..=D].copy_from_slice(&values[..=D]);
-            }
-            if needs.velocity_change {
-                let before = values_at::<D>(nodal.previous_velocity, nodes);
-                for a in 0..=D {
-                    self.velocity_change[at * (D + 1) + a] =
-                        std::array::from_fn(|i| values[a][i] - before[a][i]);
-                }
-            }
-        }
+    #[inline(always)]
+    fn nodes<'m>(&self, mesh: &'m Mesh<D>) -> &'m [u32] {
+        &mesh.cells[self.first * (D + 1)..(self.first + self.count) * (D + 1)]
     }
 
     /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts).
-    pub fn scatter(&self, mesh: &Mesh<D>, forces: &mut [f64]) {
-        let nodes = &mesh.cells[self.first * (D + 1)..(self.first + self.cells.len()) * (D + 1)];
-        for (at, (cell, nodes)) in self.cells.iter().zip(nodes.chunks_exact(D + 1)).enumerate() {
-            let mut matrix = [[0.0; D]; D];
-            for c in 0..S {
-                let (i, j, factor) = component::<S>(c);
-                if i < D && j < D {
-                    matrix[i][j] = self.stress[at][c] / factor;
-                    matrix[j][i] = matrix[i][j];
-                }
-            }
-            let mut first = [0.0; D];
-            for a in 1..=D {
-                let gradient = &cell.gradients[a - 1];
-                let target = &mut forces[nodes[a] as usize * D..][..D];
-                for i in 0..D {
-                    let mut inner = 0.0;
-                    for j in 0..D {
-                        inner += matrix[i][j] * gradient[j];
-                    }
-                    inner *= cell.volume;
-                    first[i] += inner;
-                    target[i] += self.force[at * (D + 1) + a][i] - inner;
-                }
-            }
-            let target = &mut forces[nodes[0] as usize * D..][..D];
-            for i in 0..D {
-                target[i] += self.force[at * (D + 1)][i] + first[i];
-            }
+    pub fn scatter(&mut self, mesh: &Mesh<D>, forces: &mut [f64]) {
+        scatter(self, self.nodes(mesh), forces);
+    }
+}
+
+/// Gathers what is needed, makes the outputs zero, and asks for the next batch's cells.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn gather<const D: usize, const S: usize>(
+    batch: &mut Batch<'_, D, S>,
+    mesh: &Mesh<D>,
+    nodal: Nodal<'_>,
+    needs: Needs,
+    next: Option<&SimplexPack<D>>,
+) {
+    let (nodes, cells) = (batch.nodes(mesh), batch.cells);
+    let [displacement, velocity] = &mut batch.corners;
+    let velocity = if needs.velocity { &mut batch.velocity } else { velocity };
+    if needs.strain {
+        kernels::gather(nodes, nodal.displacement.as_chunks().0, displacement);
+    }
+    if let Some(next) = next {
+        next.prefetch();
+    }
+    if needs.strain_rate || needs.velocity || needs.velocity_change {
+        kernels::gather(nodes, nodal.velocity.as_chunks().0, velocity);
+    }
+    if needs.velocity_change {
+        kernels::gather(nodes, nodal.previous_velocity.as_chunks().0, &mut batch.velocity_change);
+    }
+    // Only now: what was stored number by number is not read back at once.
+    if needs.strain {
+        batch.strain = kernels::strains(cells, displacement);
+    }
+    if needs.strain_rate {
+        batch.strain_rate = kernels::strains(cells, velocity);
+    }
+    if needs.velocity_change {
+        for (change, velocity) in batch.velocity_change.iter_mut().zip(&*velocity).take(D + 1) {
+            *change = Pack::from_lanes(|lane| add_scaled(&velocity.lane(lane), -1.0, &change.lane(lane)));
         }
     }
-}
-
-fn zeros<const W: usize, const MOST: usize>(needed: bool, count: usize) -> ArrayVec<[f64; W], MOST> {
-    std::iter::repeat_n([0.0; W], if needed { count } else { 0 }).collect()
-}
-
-#[inline(always)]
-fn values_at<const D: usize>(nodal: &[f64], nodes: &[u32]) -> [Vector<D>; 4] {
-    let mut out = [[0.0; D]; 4];
-    for a in 0..=D {
-        out[a].copy_from_slice(&nodal[nodes[a] as usize * D..][..D]);
+    if needs.strain_before {
+        kernels::gather(nodes, nodal.previous_displacement.as_chunks().0, displacement);
+        batch.strain_before = kernels::strains(cells, displacement);
     }
-    out
+    if needs.elastic_stress {
+        batch.elastic_stress = Pack::ZERO;
+    }
+    batch.stress = Pack::ZERO;
+    batch.force[..=D].fill(Pack::ZERO);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn scatter<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>, nodes: &[u32], forces: &mut [f64]) {
+    kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+    kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::samples::{number, row};
+    use crate::tensor::{Mandel, Vector, apply, symmetric_part};
+
+    fn close<const N: usize>(found: [f64; N], expected: [f64; N]) {
+        for i in 0..N {
+            assert!(
+                (found[i] - expected[i]).abs() <= 1e-12 * (1.0 + expected[i].abs()),
+                "{found:?} {expected:?}"
+            );
+        }
+    }
+
+    const ALL: Needs = Needs {
+        strain: true,
+        strain_before: true,
+        strain_rate: true,
+        velocity: true,
+        velocity_change: true,
+        elastic_stress: true,
+    };
+
+    fn stress_of<const S: usize>(cell: usize) -> Mandel<S> {
+        std::array::from_fn(|c| number(S * cell + c))
+    }
+
+    fn force_of<const D: usize>(cell: usize, a: usize) -> Vector<D> {
+        std::array::from_fn(|i| number(7 * cell + a + i))
+    }
+
+    fn check<const D: usize, const S: usize>() {
+        let mesh = row::<D>();
+        let (count, total) = (mesh.cell_regions.len(), mesh.nodes.len());
+        let geometry = Geometry::with_materials(&mesh, |region| region);
+        let values = |shift: usize| -> Vec<f64> { (0..total * D).map(|i| number(i + shift)).collect() };
+        let [u, v, w] = [values(0), values(11), values(29)];
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &w, velocity: &v, previous_velocity: &w };
+        let [mut forces, mut expected] = [vec![0.0; total * D], vec![0.0; total * D]];
+        let mut visited = 0;
+        Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                let number_of_cell = batch.first + lane;
+                let (cell, nodes) = (geometry.cell(number_of_cell), mesh.cell(number_of_cell));
+                let of = |all: &[f64]| -> Vec<Vector<D>> {
+                    nodes.iter().map(|&n| std::array::from_fn(|i| all[n as usize * D + i])).collect()
+                };
+                let strain = |all: &[f64]| symmetric_part(&cell.field_gradient(&of(all)));
+                close(batch.strain.lane(lane), strain(&u));
+                close(batch.strain_before.lane(lane), strain(&w));
+                close(batch.strain_rate.lane(lane), strain(&v));
+                let stress = stress_of(number_of_cell);
+                batch.stress.set(lane, stress);
+                for a in 0..=D {
+                    let (velocity, before) = (of(&v)[a], of(&w)[a]);
+                    assert_eq!(batch.velocity[a].lane(lane), velocity);
+                    let change = std::array::from_fn(|i| velocity[i] - before[i]);
+                    assert_eq!(batch.velocity_change[a].lane(lane), change);
+                    let force = force_of(number_of_cell, a);
+                    batch.force[a].set(lane, force);
+                    let inner = apply::<D, S>(&stress, &cell.gradient(a));
+                    for i in 0..D {
+                        expected[nodes[a] as usize * D + i] += force[i] - cell.volume * inner[i];
+                    }
+                }
+                visited += 1;
+            }
+            for lane in batch.count..LANES {
+                assert_eq!(batch.strain.lane(lane), [0.0; S]);
+                assert_eq!(batch.cells.volume[lane], 0.0);
+                batch.stress.set(lane, [1e9; S]);
+            }
+            batch.scatter(&mesh, &mut forces);
+        });
+        assert_eq!(visited, count);
+        for (found, expected) in forces.iter().zip(&expected) {
+            close([*found], [*expected]);
+        }
+    }
+
+    #[test]
+    fn cells_side_by_side_are_what_they_are_one_by_one() {
+        check::<2, 3>();
+        check::<2, 4>();
+        check::<3, 6>();
+    }
+
+    /// Strains of all cells and the forces of a pass over them, where the runs are cut as `material` has it; or, with
+    /// `portable`, from kernels compiled for any processor.
+    fn bits<const D: usize, const S: usize>(
+        material: fn(usize) -> usize,
+        portable: bool,
+    ) -> (Vec<Mandel<S>>, Vec<f64>) {
+        let mesh = row::<D>();
+        let geometry = Geometry::with_materials(&mesh, material);
+        let u: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &u, previous_velocity: &u };
+        let (mut strains, mut forces) = (Vec::new(), vec![0.0; u.len()]);
+        Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                batch.stress.set(lane, stress_of(batch.first + lane));
+                (0..=D).for_each(|a| batch.force[a].set(lane, force_of(batch.first + lane, a)));
+            }
+            let mut strain = batch.strain;
+            if portable {
+                let (nodes, mut corners) = (batch.nodes(&mesh), [Pack::ZERO; 4]);
+                kernels::gather(nodes, u.as_chunks().0, &mut corners);
+                strain = kernels::strains(batch.cells, &corners);
+                kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
+                kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
+            } else {
+                batch.scatter(&mesh, &mut forces);
+            }
+            strains.extend((0..batch.count).map(|lane| strain.lane(lane)));
+        });
+        (strains, forces)
+    }
+
+    fn check_bits<const D: usize, const S: usize>() {
+        let once = bits::<D, S>(|_| 0, false);
+        assert_eq!(once, bits::<D, S>(|region| region, false), "cells in other lanes of other packs");
+        assert_eq!(once, bits::<D, S>(|_| 0, true), "narrow vectors");
+    }
+
+    #[test]
+    fn no_bit_depends_on_the_pack_of_a_cell_or_on_the_width_of_vectors() {
+        check_bits::<2, 3>();
+        check_bits::<2, 4>();
+        check_bits::<3, 6>();
+    }
+
+    #[test]
+    fn what_nobody_needs_is_absent() {
+        let mesh = row::<2>();
+        let geometry = Geometry::new(&mesh);
+        let u = vec![1.0; mesh.nodes.len() * 2];
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &u, previous_velocity: &u };
+        let needs = Needs { strain_rate: true, ..Needs::default() };
+        Batch::<2, 3>::for_all(&mesh, &geometry, nodal, needs, |batch| {
+            assert!(!batch.strain_rate.is_absent());
+            assert!(batch.strain.is_absent() && batch.strain_before.is_absent());
+            assert!(batch.velocity[0].is_absent() && batch.velocity_change[2].is_absent());
+            assert!(batch.elastic_stress.is_absent());
+        });
+    }
+
+    #[test]
+    fn shares_multiply_and_are_whole_where_nothing_weakens() {
+        let mut integrity = Integrity::default();
+        assert_eq!(integrity.shares(), [1.0; LANES]);
+        integrity.weaken([0.5; LANES]);
+        integrity.weaken(std::array::from_fn(|lane| if lane == 0 { 0.5 } else { 1.0 }));
+        assert_eq!([0, LANES - 1].map(|lane| integrity.shares()[lane]), [0.25, 0.5]);
+    }
 }

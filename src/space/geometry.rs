@@ -1,7 +1,7 @@
 //! Volumes and shape function gradients of cells, computed once.
 
-use super::BATCH;
 use crate::{
+    lanes::{LANES, Pack, prefetch},
     mesh::{Mesh, shape},
     tensor::Vector,
 };
@@ -58,6 +58,37 @@ impl<const D: usize> Simplex<D> {
     }
 }
 
+/// Cells side by side; where there are fewer than lanes, the others have no volume and no gradients.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimplexPack<const D: usize> {
+    /// Areas or volumes in m^D.
+    pub volume: [f64; LANES],
+    /// Gradients in 1/m, as those of a [`Simplex`].
+    pub gradients: [Pack<D>; D],
+}
+
+impl<const D: usize> SimplexPack<D> {
+    const EMPTY: Self = Self { volume: [0.0; LANES], gradients: [Pack::ZERO; D] };
+
+    /// The cell of a lane.
+    #[inline(always)]
+    pub fn simplex(&self, lane: usize) -> Simplex<D> {
+        Simplex { volume: self.volume[lane], gradients: self.gradients.map(|gradient| gradient.lane(lane)) }
+    }
+
+    fn set(&mut self, lane: usize, cell: &Simplex<D>) {
+        self.volume[lane] = cell.volume;
+        self.gradients.iter_mut().zip(&cell.gradients).for_each(|(all, one)| all.set(lane, *one));
+    }
+
+    /// Asks for them, as they are soon needed.
+    #[inline(always)]
+    pub(super) fn prefetch(&self) {
+        prefetch(&self.volume);
+        self.gradients.iter().for_each(Pack::prefetch);
+    }
+}
+
 /// The vectors `g_a` with `g_a . e_b = 1` if `a = b`, else 0.
 fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     let mut out = [[0.0; D]; D];
@@ -80,7 +111,7 @@ fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     out
 }
 
-/// Cells of one material that follow each other, at most a batch of them.
+/// Cells of one material that follow each other, at most a pack of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CellRun {
     /// Local number of the first cell.
@@ -94,8 +125,8 @@ pub struct CellRun {
 /// The cells of a rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry<const D: usize> {
-    /// One a cell, in the order of the mesh.
-    pub cells: Vec<Simplex<D>>,
+    /// The pack of each run.
+    pub packs: Vec<SimplexPack<D>>,
     /// All cells in their order, cut where the material changes: the batches of every pass.
     pub runs: Vec<CellRun>,
 }
@@ -108,26 +139,48 @@ impl<const D: usize> Geometry<D> {
 
     /// Measures every cell of the mesh; `material` tells that of a region of the mesh.
     pub fn with_materials(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
-        let cells: Vec<Simplex<D>> = mesh
-            .cells
-            .chunks_exact(D + 1)
-            .map(|nodes| {
-                let mut corners = [[0.0; D]; 4];
-                for (corner, &node) in corners.iter_mut().zip(nodes) {
-                    *corner = mesh.nodes[node as usize];
-                }
-                Simplex::new(&corners[..=D])
-            })
-            .collect();
         let mut runs: Vec<CellRun> = Vec::new();
-        for cell in 0..cells.len() {
+        for cell in 0..mesh.cells.len() / (D + 1) {
             let material = mesh.cell_regions.get(cell).map_or(0, |&region| material(usize::from(region)));
             match runs.last_mut() {
-                Some(run) if run.material == material && run.count < BATCH => run.count += 1,
+                Some(run) if run.material == material && run.count < LANES => run.count += 1,
                 _ => runs.push(CellRun { first: cell, count: 1, material }),
             }
         }
-        Self { cells, runs }
+        let measure = |run: &CellRun| {
+            let mut pack = SimplexPack::EMPTY;
+            for lane in 0..run.count {
+                let mut corners = [[0.0; D]; 4];
+                for (corner, &node) in corners.iter_mut().zip(mesh.cell(run.first + lane)) {
+                    *corner = mesh.nodes[node as usize];
+                }
+                pack.set(lane, &Simplex::new(&corners[..=D]));
+            }
+            pack
+        };
+        Self { packs: runs.iter().map(measure).collect(), runs }
+    }
+
+    /// The cell of this local number.
+    #[inline]
+    pub fn cell(&self, number: usize) -> Simplex<D> {
+        let run = self.run_of(number);
+        self.packs[run].simplex(number - self.runs[run].first)
+    }
+
+    /// The run of a cell: no run is longer than a pack, so that it is not before this one, and it is this one where no run is
+    /// shorter.
+    #[inline]
+    fn run_of(&self, cell: usize) -> usize {
+        let least = cell / LANES;
+        let behind = |run: &CellRun| run.first + run.count <= cell;
+        least + if behind(&self.runs[least]) { self.runs[least..].partition_point(behind) } else { 0 }
+    }
+
+    /// All cells in the order of the mesh.
+    pub fn iter(&self) -> impl Iterator<Item = Simplex<D>> {
+        let packs = self.runs.iter().zip(&self.packs);
+        packs.flat_map(|(run, pack)| (0..run.count).map(|lane| pack.simplex(lane)))
     }
 }
 
@@ -152,20 +205,37 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_visited_in_runs_of_one_material_and_of_at_most_a_batch() {
-        let cell_regions: Vec<u16> = (0..BATCH + 5).map(|cell| u16::from((3..5).contains(&cell))).collect();
+    fn cells_are_kept_in_runs_of_one_material_and_of_at_most_a_pack() {
+        let cell_regions: Vec<u16> =
+            (0..2 * LANES + 5).map(|cell| u16::from((3..5).contains(&cell))).collect();
         let mesh = Mesh::<2> {
-            nodes: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
-            cells: [0, 1, 2].repeat(cell_regions.len()),
+            nodes: (0..=LANES + 8).flat_map(|i| [[i as f64, 0.0], [i as f64, 1.0 + i as f64]]).collect(),
+            cells: (0..cell_regions.len() as u32).flat_map(|cell| [cell, cell + 2, cell + 1]).collect(),
             cell_regions,
             ..Mesh::default()
         };
-        let runs = |geometry: Geometry<2>| -> Vec<(usize, usize, usize)> {
+        let runs = |geometry: &Geometry<2>| -> Vec<(usize, usize, usize)> {
             geometry.runs.iter().map(|run| (run.first, run.count, run.material)).collect()
         };
-        let two = runs(Geometry::with_materials(&mesh, |region| 1 - region));
-        assert_eq!(two, [(0, 3, 1), (3, 2, 0), (5, BATCH, 1)]);
-        assert_eq!(runs(Geometry::new(&mesh)), [(0, BATCH, 0), (BATCH, 5, 0)]);
+        let two = Geometry::with_materials(&mesh, |region| 1 - region);
+        let rest = 5 + LANES;
+        assert_eq!(runs(&two), [(0, 3, 1), (3, 2, 0), (5, LANES, 1), (rest, LANES, 1)]);
+        let one = Geometry::new(&mesh);
+        assert_eq!(runs(&one), [(0, LANES, 0), (LANES, LANES, 0), (2 * LANES, 5, 0)]);
+        assert_eq!([two.packs.len(), one.packs.len()], [4, 3]);
+        assert_eq!(one.packs[2].volume[5..], [0.0; LANES - 5]);
+        let measured = |number: usize| {
+            let corners: Vec<[f64; 2]> =
+                mesh.cell(number).iter().map(|&node| mesh.nodes[node as usize]).collect();
+            Simplex::new(&corners)
+        };
+        for geometry in [two, one] {
+            assert_eq!(geometry.iter().count(), 2 * LANES + 5);
+            for (number, cell) in geometry.iter().enumerate() {
+                assert_eq!(cell, measured(number));
+                assert_eq!(geometry.cell(number), cell);
+            }
+        }
     }
 
     #[test]

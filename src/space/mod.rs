@@ -3,11 +3,15 @@
 mod assembly;
 mod batch;
 mod geometry;
+mod kernels;
 mod quadrature;
+#[cfg(test)]
+pub mod samples;
 mod surface;
 
 pub use assembly::{CellMatrix, assemble};
-pub use batch::{BATCH, Batch, Integrity, Needs, Nodal, OfCells, OfNodes};
-pub use geometry::{CellRun, Geometry, Simplex};
+pub use batch::{Batch, Integrity, Needs, Nodal};
+pub use geometry::{CellRun, Geometry, Simplex, SimplexPack};
+pub use kernels::Corners;
 pub use quadrature::{CellRule, FacetRule, cell_rule, facet_rule};
 pub use surface::{SurfacePoint, surface_points};

@@ -75,7 +75,7 @@ impl Effect<2, 3> for Faulty {
         }
         assert!(!now || self.fault != Fault::Panic, "this law panicked at t = {} s", step.time);
         if now && self.fault == Fault::Law {
-            batch.stress.iter_mut().for_each(|stress| stress.fill(f64::NAN));
+            batch.stress.0.as_flattened_mut().fill(f64::NAN);
         }
     }
 }

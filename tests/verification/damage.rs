@@ -55,7 +55,7 @@ fn held<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mes
             format!("threshold = {threshold}, viscosity = {viscosity}, exponent = {exponent}, largest = 0.6");
         let mut run = simulation::<D, S>(session, &job::<D>(hypothesis, &law, steps), mesh);
         let (mut expected, mut dissipated) = (0.0f64, 0.0);
-        let volume: f64 = run.body.geometry.cells.iter().map(|cell| cell.volume).sum();
+        let volume: f64 = run.body.geometry.iter().map(|cell| cell.volume).sum();
         let [volume] = session.sum([volume]);
         while run.advance(session).expect("a step").is_some() {
             let grown = expected + END / steps as f64 * rate * (1.0 - expected).powi(exponent);

@@ -8,6 +8,7 @@ use clarke::{
         ViscousStress,
     },
     job::Job,
+    lanes::LANES,
     material::{self, ByMaterial, Isotropic, Metric, Perzyna, Viscoplasticity},
     run::{Inventory, Simulation},
     session::Session,
@@ -36,13 +37,13 @@ impl<E> Watched<E> {
     fn note_batch<const D: usize, const S: usize>(&self, phase: &'static str, batch: &Batch<D, S>) {
         self.note(phase);
         let fields = [
-            ("strain", batch.strain.is_empty()),
-            ("strain_rate", batch.strain_rate.is_empty()),
-            ("velocity", batch.velocity.is_empty()),
-            ("velocity_change", batch.velocity_change.is_empty()),
-            ("elastic_stress", batch.elastic_stress.is_empty()),
+            ("strain", batch.strain.is_absent()),
+            ("strain_rate", batch.strain_rate.is_absent()),
+            ("velocity", batch.velocity[0].is_absent()),
+            ("velocity_change", batch.velocity_change[0].is_absent()),
+            ("elastic_stress", batch.elastic_stress.is_absent()),
         ];
-        let present = fields.into_iter().filter(|(_, empty)| !empty).map(|(name, _)| name).collect();
+        let present = fields.into_iter().filter(|(_, absent)| !absent).map(|(name, _)| name).collect();
         self.seen.borrow_mut().gathered.insert(phase, present);
     }
 }
@@ -97,12 +98,12 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
     }
 }
 
-/// What a body that feels these effects sees in all phases of a step; its cells fit in one batch.
+/// What a body that feels these effects sees in all phases of a step, the number of its cells, and that of its batches.
 fn seen_by<const D: usize, const S: usize>(
     session: &Session,
     whole: &clarke::mesh::GlobalMesh<D>,
     watch: impl Fn(&Rc<RefCell<Seen>>) -> Vec<Box<dyn Effect<D, S>>>,
-) -> (Seen, usize) {
+) -> (Seen, usize, usize) {
     let seen = Rc::default();
     let (mut body, state) = body::<D, S>(session, whole, &[], watch(&seen));
     let step = Step { time: 0.1, length: 0.1, previous_length: 0.1 };
@@ -112,25 +113,24 @@ fn seen_by<const D: usize, const S: usize>(
     body.energy(&state, step).expect("energy");
     body.stress(&state).expect("stress");
     let cells = body.mesh.cell_count();
-    assert!(cells <= clarke::space::BATCH);
     drop(body);
-    (Rc::try_unwrap(seen).expect("the only one").into_inner(), cells)
+    (Rc::try_unwrap(seen).expect("the only one").into_inner(), cells, cells.div_ceil(LANES))
 }
 
 fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
-    let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, cells, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: Inertia { density: ByMaterial::uniform(1.0) }, seen: seen.clone() })]
     });
     assert_eq!(
         seen.calls,
-        BTreeMap::from([("matrix", cells), ("explicit", 1), ("energy", 1)]),
+        BTreeMap::from([("matrix", cells), ("explicit", batches), ("energy", batches)]),
         "inertia alone"
     );
     assert_eq!(seen.gathered["explicit"], ["velocity"]);
     assert_eq!(seen.gathered["energy"], ["velocity", "velocity_change"]);
 
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
-    let (seen, cells) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, cells, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched {
             inner: ViscousStress { tensor: ByMaterial::uniform(tensor) },
             seen: seen.clone(),
@@ -138,12 +138,12 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     });
     assert_eq!(
         seen.calls,
-        BTreeMap::from([("matrix", cells), ("energy", 1), ("stress", 1)]),
+        BTreeMap::from([("matrix", cells), ("energy", batches), ("stress", batches)]),
         "viscosity alone"
     );
     assert!(seen.gathered.values().all(|fields| *fields == ["strain_rate"]), "{:?}", seen.gathered);
 
-    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
             Box::new(Watched {
                 inner: ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) },
@@ -152,7 +152,11 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
         ]
     });
-    assert_eq!(seen.calls, BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]), "elasticity");
+    assert_eq!(
+        seen.calls,
+        BTreeMap::from([("explicit", batches), ("energy", batches), ("stress", batches)]),
+        "elasticity"
+    );
     assert_eq!(seen.gathered["explicit"], ["strain"], "viscosity has no part in the explicit pass");
     assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"]);
 
@@ -165,7 +169,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     };
     let laws = || ByMaterial::uniform(Viscoplasticity::Perzyna(law));
     let runs = Geometry::new(&part(session, whole)).runs;
-    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
             Box::new(Watched { inner: ViscoplasticHistory::<S>::new(laws(), &runs), seen: seen.clone() }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
@@ -173,7 +177,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     });
     assert_eq!(
         seen.calls,
-        BTreeMap::from([("explicit", 1), ("energy", 1), ("stress", 1)]),
+        BTreeMap::from([("explicit", batches), ("energy", batches), ("stress", batches)]),
         "viscoplasticity"
     );
     assert_eq!(seen.gathered["explicit"], ["strain", "strain_rate"]);
@@ -182,15 +186,16 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let law =
         material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9, elasticity: tensor };
     let damage = || Damage::new(ByMaterial::uniform(law), &runs);
-    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
     });
-    let calls = [("elastic stress", 1), ("explicit", 1), ("energy", 1), ("stress", 1)];
+    let calls =
+        [("elastic stress", batches), ("explicit", batches), ("energy", batches), ("stress", batches)];
     assert_eq!(seen.calls, BTreeMap::from(calls), "elasticity with damage beside it");
-    let (seen, _) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(elastic()), Box::new(Watched { inner: damage(), seen: seen.clone() })]
     });
-    let calls = [("elastic stress", 1), ("explicit", 1), ("weaken", 2)];
+    let calls = [("elastic stress", batches), ("explicit", batches), ("weaken", 2 * batches)];
     assert_eq!(seen.calls, BTreeMap::from(calls), "damage");
     assert_eq!(seen.gathered["explicit"], ["strain", "elastic_stress"]);
 }

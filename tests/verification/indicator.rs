@@ -181,7 +181,7 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
     };
     let mesh = &run.body.mesh;
     let mut square = 0.0;
-    for (number, cell) in run.body.geometry.cells.iter().enumerate() {
+    for (number, cell) in run.body.geometry.iter().enumerate() {
         let corners: Vec<[f64; 2]> =
             mesh.cell(number).iter().map(|&node| mesh.nodes[node as usize]).collect();
         for (place, weight) in &rule::<2>() {

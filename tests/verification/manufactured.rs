@@ -242,7 +242,7 @@ fn errors<const D: usize, const S: usize>(
     let (field, mesh, rule) = (motion::<D>(), &run.body.mesh, rule::<D>());
     let scale = if D == 2 { 2.0 } else { 6.0 };
     let mut squares = [0.0; 2];
-    for (number, cell) in run.body.geometry.cells.iter().enumerate() {
+    for (number, cell) in run.body.geometry.iter().enumerate() {
         let nodes = mesh.cell(number);
         let values: Vec<[f64; D]> =
             nodes.iter().map(|&n| std::array::from_fn(|i| nodal[n as usize * D + i])).collect();
