@@ -2,11 +2,14 @@
 //!
 //! A panel is read once, column after column, beside a vector that stays in the fastest cache.
 
+use multiversion::multiversion;
+
 /// Numbers that are added up side by side.
 const LANES: usize = 16;
 
 /// Solves with the triangle: `values` holds the right-hand side of its rows, and takes the solution; from the others it takes
 /// the product of the rectangle with the solution off.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn forward(panel: &[f32], columns: usize, values: &mut [f32]) {
     let rows = values.len();
     assert_eq!(panel.len(), columns * rows);
@@ -19,6 +22,7 @@ pub(super) fn forward(panel: &[f32], columns: usize, values: &mut [f32]) {
 
 /// Solves with the transpose of the triangle, after the product of the rectangle's transpose with the values of its rows was
 /// taken off.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn backward(panel: &[f32], columns: usize, values: &mut [f32]) {
     let rows = values.len();
     assert_eq!(panel.len(), columns * rows);
@@ -28,6 +32,7 @@ pub(super) fn backward(panel: &[f32], columns: usize, values: &mut [f32]) {
 }
 
 /// From the end on: columns are read from the last one on, and memory is fetched ahead where addresses go one way.
+#[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let (a_rest, a) = a.as_rchunks::<LANES>();
     let (b_rest, b) = b.as_rchunks::<LANES>();

@@ -104,7 +104,7 @@ impl Service {
             Precision::Single => [
                 4.0,
                 self.pick(5e-6 * n + 3e-9 * n.powf(1.5), 5e-6 * n + 0.25e-9 * n * n),
-                self.pick(8.0e-9, 2.0e-9),
+                self.pick(8.0e-9, 1.7e-9),
             ],
         };
         Cost { memory: memory * entries, set_up, step: step * entries, iterations: 0.0 }
