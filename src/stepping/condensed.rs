@@ -25,8 +25,8 @@ use mpi::topology::SimpleCommunicator;
 pub(super) struct Condensed {
     newton: Newton,
     pub(super) factored: Option<Factored>,
-    /// The precision that factors are made in.
-    pub asked: Precision,
+    /// The precision that factors are made in: double once single was not enough.
+    pub precision: Precision,
     /// Contact nodes of this rank, and their numbers on this rank.
     pub(super) motions: Vec<Motion>,
     pub(super) nodes: Vec<usize>,
@@ -121,7 +121,7 @@ impl Condensed {
         session: &Session,
         body: &Body<D, S>,
         has_traction: bool,
-        asked: Precision,
+        precision: Precision,
     ) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;
@@ -163,7 +163,7 @@ impl Condensed {
             whole: vec![0.0; body.mesh.total_nodes * D],
             gathering: Gathering::new(world, body.mesh.owned * D)?,
             halves: 0,
-            asked,
+            precision,
             refinement: None,
         })
     }
@@ -183,9 +183,10 @@ impl Condensed {
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
         self.factored = None;
-        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref(), self.asked);
+        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref(), self.precision);
         let Some(cholesky) = session.agree(factored)? else { return Ok(false) };
         self.order.get_or_insert_with(|| cholesky.order().to_vec());
+        self.precision = cholesky.precision();
         drop(rows);
         let mut place = vec![0; body.mesh.total_nodes * D];
         cholesky.last_unknowns().iter().enumerate().for_each(|(at, &unknown)| place[unknown as usize] = at);
@@ -207,7 +208,7 @@ impl Condensed {
     }
 
     /// The precision of the factor in use.
-    pub fn precision(&mut self) -> Result<Precision> {
+    pub fn precision_in_use(&mut self) -> Result<Precision> {
         Ok(factored(&mut self.factored)?.cholesky.precision())
     }
 
@@ -268,7 +269,7 @@ impl Condensed {
         task: Task<'_>,
         trial: &mut DistributedVector,
     ) -> Result<Option<StepOutcome>> {
-        if self.precision()? == Precision::Single {
+        if self.precision_in_use()? == Precision::Single {
             return self.refine(session, body, from, task, trial);
         }
         self.forward(task.right_hand_side)?;

@@ -1,8 +1,9 @@
 //! Steps with a factor in single precision, whose solutions are corrected until the residual in double precision is small.
 //!
-//! With `K = L L^T + E`, the correction `d` of a velocity `v` solves `L L^T d + C(v + d) = b - K v`, for which the contact
-//! alone is solved as with an exact factor: `S (v + d) + C(v + d) = L_c y_c + S v`. What is left is `-E d`, and steps start so
-//! near to their solution that one correction mostly is enough.
+//! With `K = L L^T + E`, the correction `d` of a velocity `v` solves `L L^T d + C(v + d) = r` with `r = b - K v`. The residual
+//! `r_c` along the motions that laws see, where the forces of contact are large, is left as it is; `L y = r - r_c` takes the rest half
+//! through, and the contact alone solves `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. What is left is `-E d`: it is measured, and
+//! corrected in the same way until it is small.
 
 use super::{
     StepOutcome,

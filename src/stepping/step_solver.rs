@@ -99,7 +99,7 @@ impl StepSolver {
     /// The precision of factors, where steps are solved on the contact alone.
     pub fn factor_precision(&self) -> Option<Precision> {
         match &self.solver {
-            Solver::Condensed(condensed) => Some(condensed.asked),
+            Solver::Condensed(condensed) => Some(condensed.precision),
             _ => None,
         }
     }
@@ -180,7 +180,7 @@ impl StepSolver {
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
         if let Solver::Condensed(condensed) = &mut self.solver {
             if condensed.prepare(session, body, rows)? {
-                if condensed.precision()? == Precision::Single {
+                if condensed.precision_in_use()? == Precision::Single {
                     matrix.multiply_often()?;
                 }
                 self.rung = Some((length, matrix));
@@ -334,7 +334,7 @@ impl StepSolver {
                 if let Some(outcome) = condensed.solve(session, body, from, task, trial)? {
                     return Ok(outcome);
                 }
-                condensed.asked = Precision::Double;
+                condensed.precision = Precision::Double;
                 let rows = session.agree(body.matrix(session, *length))?;
                 condensed.prepare(session, body, rows)?;
                 let solved = condensed.solve(session, body, from, task, trial)?;
