@@ -80,3 +80,9 @@ fn where_single_precision_is_not_enough_double_takes_its_place() {
     let log = case.results().text("run.log");
     assert!(log.contains("factors in single precision"), "{log}");
 }
+
+#[test]
+fn corrections_keep_velocity_and_pressure_on_the_graph_at_loose_tolerances() {
+    let case = Case::cube(6).set("time.step", "0.0625").set("time.end", "1").set("solver.tolerance", "3e-8");
+    assert!(run(case, "single", 1).results().number("max_inclusion_residual") < 1e-7);
+}
