@@ -70,7 +70,7 @@ impl Service {
         }
     }
 
-    /// The precision of factors: single where that is asked for, or where it takes less time. In space some three corrections
+    /// The precision of factors: single where that is asked for, or where it takes less time. In space two or three corrections
     /// reach what one solve in double precision does, in the plane four to seven (docs/speed.md).
     pub fn factor_precision(self) -> Precision {
         let served = self.contact
