@@ -76,10 +76,7 @@ impl Service {
         let served = self.contact
             && (self.ranks == 1 || Preconditioner::Cholesky.is_redundant(self.ranks, self.unknowns));
         let pays = || {
-            let time = |precision| {
-                let cost = self.factor(precision);
-                cost.set_up + self.steps as f64 * cost.step
-            };
+            let time = |precision| self.work(self.factor(precision));
             self.dimension == 3
                 && self.factor(Precision::Double).memory > BEYOND_CACHES
                 && time(Precision::Single) < time(Precision::Double)
@@ -138,10 +135,15 @@ impl Service {
         }
     }
 
+    /// Seconds of set-up and of the steps that one matrix is for, on one rank.
+    fn work(self, cost: Cost) -> f64 {
+        cost.set_up + self.steps as f64 * cost.step
+    }
+
     /// Seconds of set-up and of the steps that one matrix is for: work that every rank does, or that they share with messages.
     pub(super) fn seconds(self, preconditioner: Preconditioner) -> f64 {
         let (cost, steps) = (self.cost(preconditioner), self.steps as f64);
-        let work = cost.set_up + steps * cost.step;
+        let work = self.work(cost);
         if self.ranks == 1 || preconditioner.is_redundant(self.ranks, self.unknowns) {
             return work;
         }
