@@ -37,7 +37,7 @@ help:
 	@echo 'make test      deps, then every test'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make check64   only whether it compiles there'
-	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost'
+	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost; ARGS=--write puts the tables into docs'
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
@@ -82,13 +82,14 @@ hard: deps
 	cargo build --release --locked
 	tests/slurm/run.sh $(binary)
 
-# Kernels against the memory bandwidth of this machine; checkpoints and field files by parts, on one rank and on two.
+# Kernels against the memory bandwidth of this machine (ARGS=--write puts the tables into docs); checkpoints and field files by parts, on one rank and on two.
 bench: deps
-	cargo bench --locked --bench kernels
-	cargo bench --locked --bench output
-	cargo --config "target.'cfg(all())'.runner='mpirun -n 2'" bench --locked --bench output
+	cargo bench --locked --bench kernels -- $(ARGS)
+	cargo bench --locked --bench output -- $(ARGS)
+	cargo --config "target.'cfg(all())'.runner='mpirun -n 2'" bench --locked --bench output -- $(ARGS)
 
-# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' holds them against another program.
+# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' holds them against another program,
+# --write puts the tables into docs/speed.md.
 bench-runs: deps
 	cargo bench --locked --bench whole_runs -- $(ARGS)
 

@@ -2,8 +2,9 @@
 //!
 //! Each kernel's traffic is what it has to read and write once if nothing stays in cache between passes: nodes of cells,
 //! geometry, histories, nodal values. The last lines are ratios to the triad `a = b + s c`, whose traffic is counted
-//! without what the cache fetches before it writes.
+//! without what the cache fetches before it writes. `--write` puts them into docs/speed.md.
 
+mod table;
 mod triad;
 
 use clarke::{
@@ -19,7 +20,7 @@ use clarke::{
     space::Simplex,
 };
 use criterion::{Criterion, Throughput};
-use std::{hint::black_box, mem::size_of, path::Path, time::Duration};
+use std::{fmt::Write, hint::black_box, mem::size_of, path::Path, time::Duration};
 use triad::{BYTES, Triad, fastest};
 
 /// A kernel with the bytes that it has to move.
@@ -103,7 +104,7 @@ fn main() {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))
         .measurement_time(Duration::from_secs(2))
-        .configure_from_args();
+        .without_plots();
     let mut group = criterion.benchmark_group("kernels");
     for kernel in &mut all {
         group.throughput(Throughput::Bytes(kernel.bytes as u64));
@@ -113,8 +114,13 @@ fn main() {
     let rate = |kernel: &mut Kernel| kernel.bytes as f64 / fastest(&mut kernel.run) / 1e9;
     let bandwidth = rate(&mut all[0]);
     println!("\n{:<55} {:>8} {:>8}", "kernel", "GB/s", "of triad");
+    let mut rows = String::from("| kernel | GB/s | of triad |\n|---|---|---|\n");
     for kernel in &mut all {
         let rate = rate(kernel);
         println!("{:<55} {rate:>8.2} {:>8.2}", kernel.name, rate / bandwidth);
+        writeln!(rows, "| {} | {rate:.2} | {:.2} |", kernel.name, rate / bandwidth).expect("text");
+    }
+    if std::env::args().any(|word| word == "--write") {
+        table::write("docs/speed.md", "kernels", "make bench ARGS=--write", 1e9 * bandwidth, &rows);
     }
 }

@@ -7,7 +7,10 @@
 //!
 //! The files go to the folder that `CLARKE_BENCH_FOLDER` names, or to that of the system for files of short life. Each number is the
 //! fastest and the median of seven, of the slowest rank. The tables are those of the paper's problem; their numbers are smooth in
-//! space, with last digits that look random, as those of a run.
+//! space, with last digits that look random, as those of a run. `-- --write` puts them into docs/io.md.
+
+mod table;
+mod triad;
 
 use clarke::{
     output::{
@@ -24,8 +27,10 @@ use std::{
     fs::{File, OpenOptions},
     io::Write,
     path::{Path, PathBuf},
+    sync::Mutex,
     time::Instant,
 };
+use triad::{BYTES, Triad};
 
 /// Squares along a side, two triangles each.
 const SQUARES: u64 = 707;
@@ -34,6 +39,9 @@ const FEW_SQUARES: u64 = 8;
 const REPETITIONS: usize = 7;
 /// Times in the file of the small mesh.
 const MANY_TIMES: usize = 2000;
+
+/// What was measured so far, as rows of a table.
+static ROWS: Mutex<String> = Mutex::new(String::new());
 
 /// Nodes and cells of one rank with their numbers.
 struct Part {
@@ -122,6 +130,9 @@ fn measure(session: &Session, name: &str, bytes: usize, mut run: impl FnMut(usiz
             1e3 * median,
             megabytes / median
         );
+        let row =
+            format!("| {} | {megabytes:.0} | {:.1} | {:.1} |\n", name.trim(), 1e3 * fastest, 1e3 * median);
+        ROWS.lock().expect("rows").push_str(&row);
     }
 }
 
@@ -274,4 +285,12 @@ fn main() {
     fields(&session, &folder, &part);
     many_times(&session, &folder);
     on_first(&session, || std::fs::remove_dir_all(&folder).expect("removed"));
+    if std::env::args().any(|word| word == "--write") && session.is_first() {
+        let mut triad = Triad::new();
+        let bandwidth = BYTES as f64 / triad::fastest(&mut || triad.run());
+        let name = if session.ranks() == 1 { "one rank" } else { "two ranks" };
+        let rows = ROWS.lock().expect("rows");
+        let body = format!("| | MB | ms, fastest of {REPETITIONS} | median |\n|---|---|---|---|\n{rows}");
+        table::write("docs/io.md", name, "make bench ARGS=--write", bandwidth, &body);
+    }
 }

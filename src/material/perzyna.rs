@@ -276,6 +276,25 @@ mod tests {
     }
 
     #[test]
+    fn uniaxial_rates_just_beyond_yield_in_plane_stress_by_hand() {
+        // The share of the overstress over 2 lambda that docs/conventions.md states; 2/3 in space.
+        let k = 0.4;
+        for (metric, share) in [
+            (Metric::Elasticity, (1.0 + k / 2.0) / (1.25 + k)),
+            (Metric::Frobenius, 0.8),
+            (Metric::Compliance, (4.0 - 2.0 * k) / (5.0 - 4.0 * k)),
+        ] {
+            let law = Perzyna {
+                elasticity: Elasticity { youngs_modulus: 1000.0, poisson_ratio: k }
+                    .tensor(Hypothesis::PlaneStress),
+                ..law(metric, Hypothesis::PlaneStress)
+            };
+            let rate = law.strain_rate(&[19.0 + 1e-5, 0.0, 0.0])[0] / (1e-5 / 200.0);
+            assert!((rate - share).abs() < 1e-5, "{metric:?}: {rate} for {share}");
+        }
+    }
+
+    #[test]
     fn power_law_rate_by_hand() {
         // Overstress 12 of 19: the linear law's 8 / 200 is scaled by (12 / 19)^(n - 1).
         let stress = [31.0, 0.0, 0.0, 0.0, 0.0, 0.0];

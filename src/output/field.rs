@@ -53,8 +53,16 @@ pub(super) fn file_width(shape: Shape) -> usize {
     }
 }
 
-/// Which stored component each component of VTK is. Tensors are stored as XDMF wants them, xx xy xz yy yz zz; VTK wants
-/// xx yy zz xy yz xz.
+/// Names of the stored components, in their order; none of a scalar. Tensors are stored as XDMF wants them.
+pub(super) fn component_names(shape: Shape) -> &'static [&'static str] {
+    match shape {
+        Shape::Scalar => &[],
+        Shape::Vector => &["x", "y", "z"],
+        Shape::Tensor => &["xx", "xy", "xz", "yy", "yz", "zz"],
+    }
+}
+
+/// Which stored component each component of VTK is: VTK wants tensors as xx yy zz xy yz xz.
 pub(super) fn view_columns(shape: Shape) -> &'static [usize] {
     match shape {
         Shape::Scalar => &[0],

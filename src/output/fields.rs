@@ -18,7 +18,8 @@
 //! all steps before.
 
 use super::field::{
-    FieldKind, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread, view_columns,
+    FieldKind, component_names, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread,
+    view_columns,
 };
 use super::field_slab::Slab;
 use super::hyperslab::Element;
@@ -229,6 +230,12 @@ impl<const D: usize> FieldFile<D> {
                 rows,
                 view_columns(field.shape),
             )?;
+            let names = component_names(field.shape);
+            if !names.is_empty() {
+                let seen: Vec<&str> = view_columns(field.shape).iter().map(|column| names[*column]).collect();
+                self.file.set_text(&folder, "components", &names.join(" "))?;
+                self.file.set_text(&view, "components", &seen.join(" "))?;
+            }
             self.file.create_series::<i64>(&offsets_name(field.place, field.name), 1, STEPS_PER_CHUNK)?;
         }
         self.kinds = fields.iter().map(kind_of).collect();

@@ -3,6 +3,7 @@
 use crate::{mpirun, owner};
 use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
 use clarke::output::inspect::inspect;
+use hdf5::{Location, types::FixedAscii};
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
@@ -159,6 +160,19 @@ fn check(folder: &Path, times: &[f64]) {
         assert_eq!(found, corners(cells[row] as u64));
     }
     assert_eq!(whole("VTKHDF/Offsets"), (0..=2 * SQUARES as i64).map(|cell| 3 * cell).collect::<Vec<_>>());
+    let components =
+        |of: &Location| of.attr("components").and_then(|a| a.read_scalar::<FixedAscii<64>>()).expect("text");
+    let named = |group: &str| components(&file.group(group).expect("a group")).to_string();
+    let seen = |set: &str| components(&file.dataset(set).expect("a dataset")).to_string();
+    assert_eq!(
+        [
+            named("Fields/displacement"),
+            named("Fields/stress"),
+            seen("VTKHDF/PointData/displacement"),
+            seen("VTKHDF/CellData/stress")
+        ],
+        ["x y z", "xx xy xz yy yz zz", "x y z", "xx yy zz xy yz xz"]
+    );
     let all = (floats("VTKHDF/PointData/displacement"), floats("VTKHDF/CellData/stress"));
     assert_eq!(all.0.len(), 3 * NODES as usize * times.len());
     let indicators = floats("VTKHDF/CellData/indicator");
