@@ -9,8 +9,8 @@ pub(super) trait Quotient {
     /// Number of forms.
     fn forms(&self) -> usize;
 
-    /// `y = F_f x`. Collective.
-    fn apply(&mut self, form: usize, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
+    /// `y = F_f x`; brings the ghost values of `x` up to date. Collective.
+    fn apply(&mut self, form: usize, x: &mut DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
     /// An approximate inverse of the denominator. Collective.
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()>;
@@ -37,11 +37,11 @@ struct Direction {
 }
 
 impl Direction {
-    fn new(quotient: &mut dyn Quotient, vector: DistributedVector) -> Result<Self> {
+    fn new(quotient: &mut dyn Quotient, mut vector: DistributedVector) -> Result<Self> {
         let mut images = Vec::new();
         for form in 0..quotient.forms() {
             let mut image = vector.like()?;
-            quotient.apply(form, &vector, &mut image)?;
+            quotient.apply(form, &mut vector, &mut image)?;
             images.push(image);
         }
         Ok(Self { vector, images })

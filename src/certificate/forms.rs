@@ -41,7 +41,7 @@ pub(super) fn add_trace<const D: usize>(
 /// `y = F x` with `x` and `y` zero at held components, for a form that adds to nodal forces. Collective.
 pub(super) fn apply<const D: usize, const S: usize>(
     body: &Body<D, S>,
-    x: &DistributedVector,
+    x: &mut DistributedVector,
     y: &mut DistributedVector,
     add: impl FnOnce(&[f64], &mut [f64]),
 ) -> Result<()> {

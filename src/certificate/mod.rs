@@ -283,7 +283,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
         if matches!(self.kind, Kind::ExplicitStep | Kind::UniqueStep | Kind::SlipPressure) { 3 } else { 2 }
     }
 
-    fn apply(&mut self, form: usize, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+    fn apply(&mut self, form: usize, x: &mut DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let body = self.body;
         let interior = match (self.kind, form) {
             (Kind::ExplicitStep, 0) => Form::Elasticity,

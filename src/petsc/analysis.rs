@@ -58,6 +58,12 @@ impl<'a> Supernodes<'a> {
     }
 }
 
+/// Whether each of these is below `size` and there once.
+fn is_choice(mut unknowns: impl Iterator<Item = usize>, size: usize) -> bool {
+    let mut seen = vec![false; size];
+    unknowns.all(|unknown| unknown < size && !std::mem::replace(&mut seen[unknown], true))
+}
+
 /// Nodes from which on nested dissection leaves less to factor than minimum degree.
 const DISSECTED: usize = 2_000;
 
@@ -72,6 +78,9 @@ impl Analysis {
         known: Option<&[u32]>,
     ) -> Result<Option<Self>> {
         let size = (rows.offsets.len() - 1) * block;
+        if !is_choice(last.iter().copied(), size) {
+            return Err(Error::Internal("unknowns that are eliminated last twice, or not there".into()));
+        }
         let mut common = Box::new(MaybeUninit::<sys::cholmod_common>::zeroed());
         // SAFETY: CHOLMOD fills the struct, which stays in its box.
         let common = unsafe {
@@ -87,6 +96,9 @@ impl Analysis {
         let mut is_last = vec![false; size];
         last.iter().for_each(|&unknown| is_last[unknown] = true);
         let mut order: Vec<sys::PetscInt> = match known {
+            Some(order) if order.len() != size || !is_choice(order.iter().map(|&at| at as usize), size) => {
+                return Err(Error::Internal("an order of elimination that is none of the matrix".into()));
+            }
             Some(order) => order.iter().map(|&unknown| unknown as sys::PetscInt).collect(),
             None => {
                 let nodes = analysis.node_order(block, rows)?.into_iter().map(|node| node as usize);
@@ -95,7 +107,7 @@ impl Analysis {
                 first.chain(last.iter().copied()).map(|unknown| unknown as sys::PetscInt).collect()
             }
         };
-        // SAFETY: the order has as many entries as the matrix rows; the handle owns the factor.
+        // SAFETY: the order names each row of the matrix once, whose indices were checked; the handle owns the factor.
         unsafe {
             analysis.factor = cholmod::cholmod_analyze_p(
                 matrix,

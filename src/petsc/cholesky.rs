@@ -2,7 +2,7 @@ use super::{
     BlockRows, analysis::Analysis, double_factor::DoubleFactor, lower_half::Lower,
     single_factor::SingleFactor,
 };
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last: by CHOLMOD, or
 /// in single precision on its analysis.
@@ -51,6 +51,7 @@ impl Cholesky {
         known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Option<Self>> {
+        rows.check(block, rows.offsets.len().saturating_sub(1))?;
         let mut lower = Lower::of(block, rows)?;
         let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
         let Some(mut analysis) = analysed else { return Ok(None) };
@@ -75,6 +76,7 @@ impl Cholesky {
 
     /// Takes a right-hand side half through: `L y = b`.
     pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
+        self.fits(right_hand_side)?;
         match &mut self.numbers {
             Numbers::Double(factor) => factor.forward(&mut self.analysis, right_hand_side),
             Numbers::Single(factor) => {
@@ -105,6 +107,7 @@ impl Cholesky {
 
     /// Takes `y` the other half of the way: `L^T x = y`.
     pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
+        self.fits(solution)?;
         match &mut self.numbers {
             Numbers::Double(factor) => factor.backward(&mut self.analysis, solution),
             Numbers::Single(factor) => {
@@ -112,6 +115,13 @@ impl Cholesky {
                 Ok(())
             }
         }
+    }
+
+    fn fits(&self, values: &[f64]) -> Result<()> {
+        if values.len() == self.order().len() {
+            return Ok(());
+        }
+        Err(Error::Internal(format!("{} values for a factor of {} rows", values.len(), self.order().len())))
     }
 
     /// Bytes that half a solve reads at the least: the entries of the factor, and the rows of each of its supernodes once.
@@ -197,6 +207,54 @@ mod tests {
                 assert!((found - known).abs() < error, "{x:?}");
             }
         }
+    }
+
+    #[test]
+    fn vectors_of_another_length_are_refused() {
+        for precision in [Double, Single] {
+            let mut cholesky = Cholesky::new(1, &chain(5), &[2], None, precision).unwrap().unwrap();
+            for length in [4, 6, 1_000_000] {
+                assert!(cholesky.forward(&vec![2.0; length]).is_err());
+                cholesky.forward(&[2.0; 5]).unwrap();
+                assert!(cholesky.backward(&mut vec![2.0; length]).is_err());
+            }
+        }
+    }
+
+    #[test]
+    fn a_half_that_nothing_came_before_is_an_error_or_the_start_from_zero() {
+        for precision in [Double, Single] {
+            let mut cholesky = Cholesky::new(1, &chain(5), &[2], None, precision).unwrap().unwrap();
+            let mut x = [1.0; 5];
+            assert!(cholesky.backward(&mut x).is_err() || x == [0.0; 5]);
+        }
+    }
+
+    #[test]
+    fn rows_and_orders_that_dont_fit_are_refused() {
+        let refused = |rows: &BlockRows, last: &[usize], known: Option<&[u32]>| {
+            Cholesky::new(1, rows, last, known, Double).is_err()
+        };
+        let rows = chain(3);
+        for known in [&[0_u32, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 3]] {
+            assert!(refused(&rows, &[2], Some(known)), "{known:?}");
+        }
+        assert!(
+            refused(&rows, &[3], None)
+                && refused(&rows, &[2, 2], None)
+                && refused(&rows, &[2, 1, 0, 1], None)
+        );
+        let broken = |change: &dyn Fn(&mut BlockRows)| {
+            let mut rows = chain(3);
+            change(&mut rows);
+            refused(&rows, &[2], None)
+        };
+        assert!(broken(&|rows| rows.columns[6] = 3), "a column that is not there");
+        assert!(broken(&|rows| rows.columns.swap(0, 1)), "columns that don't ascend");
+        assert!(broken(&|rows| rows.values.truncate(6)), "missing values");
+        assert!(broken(&|rows| rows.offsets[3] = 9), "an end beyond the entries");
+        assert!(broken(&|rows| rows.offsets.swap(1, 2)), "starts that don't ascend");
+        assert!(broken(&|rows| rows.offsets.clear()), "no starts");
     }
 
     #[test]

@@ -7,14 +7,15 @@ use std::{marker::PhantomData, ptr};
 pub struct DenseCholesky {
     factor: sys::Mat,
     vectors: [sys::Vec; 2],
+    size: usize,
     not_send: PhantomData<*mut ()>,
 }
 
 impl DenseCholesky {
     /// Factors a symmetric positive definite matrix, given column after column.
     pub fn new(size: usize, columns: &[f64]) -> Result<Self> {
-        let mut dense =
-            Self { factor: sequential(size, columns)?, vectors: [ptr::null_mut(); 2], not_send: PhantomData };
+        let (factor, vectors) = (sequential(size, columns)?, [ptr::null_mut(); 2]);
+        let mut dense = Self { factor, vectors, size, not_send: PhantomData };
         // SAFETY: live objects that the handle owns; without a row permutation none is read.
         unsafe {
             check(sys::MatSetOption(dense.factor, sys::MAT_SPD, 1))?;
@@ -27,7 +28,14 @@ impl DenseCholesky {
     /// Replaces a right-hand side by the solution.
     pub fn solve(&mut self, values: &mut [f64]) -> Result<()> {
         let [given, found] = self.vectors;
-        // SAFETY: live vectors of the matrix' size; arrays are given back before the next call.
+        if values.len() != self.size {
+            return Err(Error::Internal(format!(
+                "{} values for a factor of {} rows",
+                values.len(),
+                self.size
+            )));
+        }
+        // SAFETY: live vectors of the matrix' size, which is that of the values; arrays are given back before the next call.
         unsafe {
             let mut array = ptr::null_mut();
             check(sys::VecGetArray(given, &mut array))?;

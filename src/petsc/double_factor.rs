@@ -49,7 +49,7 @@ impl DoubleFactor {
     pub fn forward(&mut self, analysis: &mut Analysis, right_hand_side: &[f64]) -> Result<()> {
         // SAFETY: the handle owns as many numbers as unknowns there.
         let given =
-            unsafe { std::slice::from_raw_parts_mut((*self.given).x.cast::<f64>(), right_hand_side.len()) };
+            unsafe { std::slice::from_raw_parts_mut((*self.given).x.cast::<f64>(), analysis.order.len()) };
         let values = analysis.order.iter().map(|&at| right_hand_side[at as usize]);
         given.iter_mut().zip(values).for_each(|(given, value)| *given = value);
         self.half(analysis, sys::CHOLMOD_L as c_int, true)
@@ -70,7 +70,8 @@ impl DoubleFactor {
     pub fn backward(&mut self, analysis: &mut Analysis, solution: &mut [f64]) -> Result<()> {
         self.half(analysis, sys::CHOLMOD_Lt as c_int, false)?;
         // SAFETY: as in `forward`.
-        let found = unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), solution.len()) };
+        let found =
+            unsafe { std::slice::from_raw_parts((*self.given).x.cast::<f64>(), analysis.order.len()) };
         analysis.order.iter().zip(found).for_each(|(&at, value)| solution[at as usize] = *value);
         Ok(())
     }

@@ -1,7 +1,7 @@
 use super::{
     DistributedVector, block_product::BlockProduct, check, index, library::communicator, shell::Shell, sys,
 };
-use crate::error::Result;
+use crate::error::{Error, Result};
 use std::{cell::Cell, marker::PhantomData, mem::MaybeUninit, ptr, rc::Rc};
 
 /// The rows this rank owns of a sparse matrix of dense blocks.
@@ -13,6 +13,23 @@ pub struct BlockRows {
     pub columns: Vec<u32>,
     /// `block * block` values for each column, row by row.
     pub values: Vec<f64>,
+}
+
+impl BlockRows {
+    /// Fails unless these are rows of a matrix of so many block columns.
+    pub(super) fn check(&self, block: usize, block_columns: usize) -> Result<()> {
+        let starts = self.offsets.first() == Some(&0) && self.offsets.is_sorted();
+        let sizes = self.offsets.last() == Some(&self.columns.len())
+            && self.values.len() == self.columns.len() * block * block;
+        let row = |range: &[usize]| {
+            let columns = &self.columns[range[0]..range[1]];
+            columns.is_sorted_by(|a, b| a < b) && columns.last().is_none_or(|&c| (c as usize) < block_columns)
+        };
+        if starts && sizes && self.offsets.windows(2).all(row) {
+            return Ok(());
+        }
+        Err(Error::Internal(format!("{} block rows that are none of a matrix", self.offsets.len())))
+    }
 }
 
 /// A sparse matrix spread over the ranks by rows.
@@ -71,6 +88,15 @@ impl Matrix {
 
     /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
     pub fn attach_rigid_motions(&mut self, block: usize, coordinates: &[f64]) -> Result<()> {
+        let (mut rows, mut columns, mut size) = (0, 0, 0);
+        // SAFETY: live matrix and live numbers.
+        unsafe {
+            check(sys::MatGetLocalSize(self.raw, &mut rows, &mut columns))?;
+            check(sys::MatGetBlockSize(self.raw, &mut size))?;
+        }
+        if usize::try_from(rows) != Ok(coordinates.len()) || usize::try_from(size) != Ok(block) {
+            return Err(Error::Internal(format!("{} coordinates for {rows} unknowns", coordinates.len())));
+        }
         let mut points = ptr::null_mut();
         let mut motions = ptr::null_mut();
         // SAFETY: the coordinate vector borrows `coordinates` and is destroyed before this returns; the matrix takes

@@ -94,11 +94,10 @@ impl ReducedMatrix {
         }
         // SAFETY: live matrices of one pattern.
         check(unsafe { sys::MatCopy(constant.raw, self.raw, sys::SAME_NONZERO_PATTERN) })?;
-        let mut locals = Vec::new();
-        for column in &self.columns {
+        for column in &mut self.columns {
             column.update_ghosts()?;
-            locals.push(column.local()?);
         }
+        let locals = self.columns.iter().map(DistributedVector::local).collect::<Result<Vec<_>>>()?;
         let (block, square) = (self.block, self.block * self.block);
         let projection = |node: usize| -> Vec<f64> {
             locals.iter().flat_map(|column| column[node * block..][..block].iter().copied()).collect()
@@ -205,12 +204,18 @@ fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, 
     for i in 0..block {
         let row = index(node * block + i, "global unknown")?;
         let (mut count, mut columns, mut values) = (0, ptr::null(), ptr::null());
-        // SAFETY: an owned row of a live matrix; PETSc's arrays are read before the row is given back.
+        // SAFETY: a live matrix, whose rows PETSc refuses to show on other ranks; its arrays hold `length` numbers and are
+        // read before the row is given back.
         unsafe {
             check(sys::MatGetRow(matrix.raw, row, &mut count, &mut columns, &mut values))?;
             let length = usize::try_from(count).unwrap_or(0);
-            let (of, found) =
-                (std::slice::from_raw_parts(columns, length), std::slice::from_raw_parts(values, length));
+            // PETSc shows no arrays of a row without entries.
+            let (of, found) = match length {
+                0 => (&[][..], &[][..]),
+                _ => {
+                    (std::slice::from_raw_parts(columns, length), std::slice::from_raw_parts(values, length))
+                }
+            };
             if i == 0 {
                 let firsts = of.iter().step_by(block);
                 blocks = firsts.map(|&column| usize::try_from(column).unwrap_or(0) / block).collect();

@@ -31,7 +31,7 @@ impl fmt::Debug for Shell {
 type Callback = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
 
 impl Shell {
-    /// A shell laid out like `matrix`. PETSc must not multiply with it once this handle is dropped. Collective.
+    /// A shell laid out like `matrix`. Once this handle is dropped, products with it are errors. Collective.
     pub fn new(matrix: sys::Mat, action: Box<dyn Action>) -> Result<Self> {
         let mut shell = Self { raw: ptr::null_mut(), action: Box::new(action) };
         let (mut rows, mut columns, mut blocks) = (0, 0, [0; 2]);
@@ -63,8 +63,14 @@ impl Shell {
 
 impl Drop for Shell {
     fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::MatDestroy(&mut self.raw) };
+        if self.raw.is_null() {
+            return;
+        }
+        // SAFETY: this handle owns one reference; a matrix that PETSc keeps beyond it has no context to multiply with.
+        unsafe {
+            sys::MatShellSetContext(self.raw, ptr::null_mut());
+            sys::MatDestroy(&mut self.raw);
+        }
     }
 }
 

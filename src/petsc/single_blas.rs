@@ -6,6 +6,7 @@ use std::ffi::{c_char, c_int};
 /// Replaces a panel of so many columns by its factor; `None` where its triangle is not positive definite.
 pub(super) fn factor(panel: &mut [f32], columns: usize) -> Option<()> {
     let rows = panel.len() / columns;
+    assert!(panel.len() == rows * columns && columns <= rows);
     let below = rows - columns;
     let (height, width, below_count) = (rows as c_int, columns as c_int, below as c_int);
     let mut outcome = 0;

@@ -1,5 +1,5 @@
 use super::{check, index, library::communicator, sys};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use std::{
     marker::PhantomData,
     mem::ManuallyDrop,
@@ -34,7 +34,7 @@ impl DistributedVector {
                 &mut raw,
             )
         })?;
-        let vector = Self { raw, not_send: PhantomData };
+        let mut vector = Self { raw, not_send: PhantomData };
         vector.fill(0.0)?;
         vector.update_ghosts()?;
         Ok(vector)
@@ -45,7 +45,7 @@ impl DistributedVector {
         let mut raw = ptr::null_mut();
         // SAFETY: `self.raw` is alive; `raw` receives one reference that the new handle owns.
         check(unsafe { sys::VecDuplicate(self.raw, &mut raw) })?;
-        let vector = Self { raw, not_send: PhantomData };
+        let mut vector = Self { raw, not_send: PhantomData };
         vector.fill(0.0)?;
         Ok(vector)
     }
@@ -82,21 +82,25 @@ impl DistributedVector {
         let mut form = ptr::null_mut();
         // SAFETY: `self.raw` is alive; the form is given back when the guard is dropped.
         check(unsafe { sys::VecGhostGetLocalForm(self.raw, &mut form) })?;
+        if form.is_null() {
+            return Err(Error::Internal("a vector without ghost values was asked for them".into()));
+        }
         Ok(form)
     }
 
     /// Copies owned values to their ghost copies on other ranks. Collective.
-    pub fn update_ghosts(&self) -> Result<()> {
+    pub fn update_ghosts(&mut self) -> Result<()> {
         self.exchange(sys::INSERT_VALUES, sys::SCATTER_FORWARD)
     }
 
     /// Adds ghost values to their owners. Collective; ghost values here stay as they are.
-    pub fn add_ghosts_to_owners(&self) -> Result<()> {
+    pub fn add_ghosts_to_owners(&mut self) -> Result<()> {
         self.exchange(sys::ADD_VALUES, sys::SCATTER_REVERSE)
     }
 
-    fn exchange(&self, mode: sys::InsertMode, direction: sys::ScatterMode) -> Result<()> {
-        // SAFETY: `self.raw` is a live ghosted vector; no array of it is borrowed (guards borrow `self`).
+    fn exchange(&mut self, mode: sys::InsertMode, direction: sys::ScatterMode) -> Result<()> {
+        // SAFETY: `self.raw` is a live ghosted vector; no array of it is borrowed: guards borrow the handle, which is
+        // borrowed mutably here.
         unsafe {
             check(sys::VecGhostUpdateBegin(self.raw, mode, direction))?;
             check(sys::VecGhostUpdateEnd(self.raw, mode, direction))
@@ -104,8 +108,8 @@ impl DistributedVector {
     }
 
     /// Sets every owned value.
-    pub fn fill(&self, value: f64) -> Result<()> {
-        // SAFETY: live vector, as in all calls below.
+    pub fn fill(&mut self, value: f64) -> Result<()> {
+        // SAFETY: live vector, no array of which is borrowed, as in all calls below that write.
         check(unsafe { sys::VecSet(self.raw, value) })
     }
 

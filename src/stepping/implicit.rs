@@ -113,7 +113,7 @@ impl Implicit {
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
-        solved: &DistributedVector,
+        solved: &mut DistributedVector,
         step: Step,
     ) -> Result<()> {
         solved.update_ghosts()?;

@@ -219,7 +219,7 @@ impl Newton {
         session: &Session,
         body: &Body<D, S>,
         step: Step,
-        trial: &DistributedVector,
+        trial: &mut DistributedVector,
         settings: SolverSettings,
         (newton_iterations, effort): (usize, &Effort),
     ) -> Result<StepOutcome> {

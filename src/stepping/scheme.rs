@@ -118,7 +118,7 @@ impl Method {
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
-        solved: &DistributedVector,
+        solved: &mut DistributedVector,
         step: Step,
     ) -> Result<()> {
         match self {

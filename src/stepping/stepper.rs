@@ -230,7 +230,7 @@ impl Stepper {
     ) -> Result<()> {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
-        self.method.finish(body, state, &self.trial, step)?;
+        self.method.finish(body, state, &mut self.trial, step)?;
         if self.scheme.is_implicit() {
             self.traffic.add_solve(Some(self.passes.finish));
         }
