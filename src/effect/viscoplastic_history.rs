@@ -194,7 +194,10 @@ mod tests {
         },
     };
 
-    const STEP: Step = Step { time: 1.0, length: 0.25, previous_length: 0.125 };
+    const STEPS: [Step; 2] = [
+        Step { time: 1.0, length: 0.25, previous_length: 0.125 },
+        Step { time: 1.5, length: 0.5, previous_length: 0.25 },
+    ];
     const ELASTICITY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
 
     /// The flow of a law in a cell, and the growth of the accumulated strain.
@@ -226,25 +229,29 @@ mod tests {
             Nodal { displacement: &u, previous_displacement: &u, velocity: &v, previous_velocity: &v };
         let needs = Needs { strain: true, strain_rate: true, ..Needs::default() };
         let (mut forces, mut energy, mut flowing) = (vec![0.0; u.len()], Energy::default(), 0);
-        for _ in 0..2 {
+        for step in STEPS {
             Batch::for_all(&mesh, &geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                effect.add_explicit(STEP, batch, &mut energy);
+                effect.add_explicit(step, batch, &mut energy);
                 batch.scatter(&mesh, &mut forces);
                 for lane in 0..batch.count {
                     let start = effect.stress.converged(batch.number).expect("a history").lane(lane);
                     let strain = add_scaled(
                         &batch.strain.lane(lane),
-                        -STEP.previous_length,
+                        -step.previous_length,
                         &batch.strain_rate.lane(lane),
                     );
                     let stress = add_scaled(&law.elasticity().apply(&strain), 1.0, &start);
                     let before = effect.accumulated.as_ref().and_then(|a| a.converged(batch.number));
                     let before = before.map_or(0.0, |before| before.0[0][lane]);
-                    let (rate, _) = flow(&law, &stress, before);
+                    let (rate, growth) = flow(&law, &stress, before);
                     flowing += usize::from(rate != [0.0; S]);
-                    let expected = add_scaled(&start, -STEP.length, &law.elasticity().apply(&rate));
+                    let expected = add_scaled(&start, -step.length, &law.elasticity().apply(&rate));
                     let (_, trial) = effect.stress.both(batch.number).expect("a history");
                     assert_eq!(trial.lane(lane), expected);
+                    if let Some(accumulated) = &mut effect.accumulated {
+                        let (_, trial) = accumulated.both(batch.number).expect("a history");
+                        assert_eq!(trial.lane(lane), [before + step.length * growth]);
+                    }
                 }
             });
             Effect::<D, S>::commit(&mut effect);

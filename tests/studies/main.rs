@@ -11,3 +11,4 @@ mod resume;
 mod results;
 mod scene;
 mod steps;
+mod table_1;
