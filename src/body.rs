@@ -16,7 +16,7 @@ use crate::{
     session::Session,
     space::{Batch, Geometry, Needs, Nodal, assemble},
     state::State,
-    tensor::Mandel,
+    tensor::{Mandel, larger},
 };
 
 /// A body of `D` dimensions whose stresses have `S` components.
@@ -155,7 +155,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             return Ok(None);
         }
         let velocity = state.velocity.local()?;
-        Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(f64::max))
+        Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
     /// Total stress in Pa after a committed step, one a cell.

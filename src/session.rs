@@ -87,7 +87,9 @@ impl Session<'_> {
 
     /// Sum over all ranks of each entry. Collective.
     pub fn sum<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
-        self.reduce(mine, SystemOperation::sum())
+        let mut all = [0.0; N];
+        self.world.all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
+        all
     }
 
     /// Sum over all ranks of each entry of lists of one length. Collective.
@@ -97,15 +99,12 @@ impl Session<'_> {
         all
     }
 
-    /// Largest of each entry over all ranks. Collective.
+    /// Largest of each entry over all ranks; NaN where it is NaN on any rank. Collective.
     pub fn largest<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
-        self.reduce(mine, SystemOperation::max())
-    }
-
-    fn reduce<const N: usize>(&self, mine: [f64; N], operation: SystemOperation) -> [f64; N] {
-        let mut all = [0.0; N];
-        self.world.all_reduce_into(&mine[..], &mut all[..], operation);
-        all
+        // What MPI makes of NaN in a maximum is not specified, so that integers in the same order are compared.
+        let mut all = [0; N];
+        self.world.all_reduce_into(&mine.map(ordered)[..], &mut all[..], SystemOperation::max());
+        all.map(number)
     }
 
     /// Sum over all ranks of a count. Collective.
@@ -129,6 +128,23 @@ impl Session<'_> {
         self.world.all_reduce_into(&seen, &mut any, SystemOperation::max());
         Signal::ALL.into_iter().find(|s| s.number() == any)
     }
+}
+
+/// An integer that is the larger the larger the number is, largest for NaN.
+fn ordered(number: f64) -> i64 {
+    let number = if number.is_nan() { f64::NAN.copysign(1.0) } else { number };
+    flipped(number.to_bits().cast_signed())
+}
+
+/// The number that this integer stands for.
+fn number(ordered: i64) -> f64 {
+    f64::from_bits(flipped(ordered).cast_unsigned())
+}
+
+/// Bits of negative numbers, sign aside, turned over: integers grow with their bits, floating-point numbers below zero
+/// fall. Its own inverse.
+fn flipped(bits: i64) -> i64 {
+    if bits < 0 { bits ^ i64::MAX } else { bits }
 }
 
 /// A request to write a checkpoint and stop.
@@ -175,4 +191,35 @@ fn watch_signals() -> Result<Arc<AtomicUsize>> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
         .map_err(|e| Error::Internal(format!("cannot watch SIGXFSZ: {e}")))?;
     Ok(seen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_stand_in_the_order_of_the_numbers_they_stand_for_and_nan_above_all() {
+        let rising = [
+            f64::NEG_INFINITY,
+            -1e300,
+            -2.0,
+            -1.0,
+            -1e-310,
+            -0.0,
+            0.0,
+            5e-324,
+            1.0,
+            1.5,
+            f64::MAX,
+            f64::INFINITY,
+        ];
+        for pair in rising.windows(2) {
+            assert!(ordered(pair[0]) < ordered(pair[1]), "{pair:?}");
+        }
+        for x in rising {
+            assert_eq!(number(ordered(x)).to_bits(), x.to_bits());
+            assert!(ordered(f64::NAN) > ordered(x) && ordered(-f64::NAN) > ordered(x), "{x}");
+        }
+        assert!(number(ordered(-f64::NAN)).is_nan());
+    }
 }

@@ -1,4 +1,4 @@
-//! Vectors and symmetric tensors.
+//! Vectors and symmetric tensors, and a maximum of numbers.
 //!
 //! Symmetric tensors are kept in Mandel form: shear components are multiplied by the square root of two, so that the
 //! tensor product `s : t` is the plain dot product of the components. `S` is the number of stored components:
@@ -41,6 +41,13 @@ pub fn add_scaled<const N: usize>(a: &[f64; N], factor: f64, b: &[f64; N]) -> [f
         out[i] += factor * b[i];
     }
     out
+}
+
+/// The larger of two numbers, NaN if either is: what went wrong somewhere shows in a maximum, which it does not in that of
+/// [`f64::max`].
+#[inline(always)]
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
 }
 
 /// The tensor indices and the Mandel factor of component `c` among `S`.
@@ -121,6 +128,17 @@ pub fn von_mises<const S: usize>(t: &Mandel<S>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_maximum_keeps_what_is_not_a_number() {
+        assert_eq!(
+            [larger(1.0, 2.0), larger(2.0, -1.0), larger(f64::INFINITY, 0.0)],
+            [2.0, 2.0, f64::INFINITY]
+        );
+        for numbers in [[f64::NAN, 1.0, 2.0], [1.0, f64::NAN, 2.0], [1.0, 2.0, f64::NAN]] {
+            assert!(numbers.into_iter().fold(0.0, larger).is_nan());
+        }
+    }
 
     #[test]
     fn mandel_product_is_the_tensor_product() {

@@ -7,7 +7,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clarke::job::{Expected, Job};
+use clarke::{
+    job::{Expected, Job},
+    tensor::larger,
+};
 
 /// All jobs of the repository; studies are no jobs.
 fn jobs() -> Vec<PathBuf> {
@@ -68,8 +71,8 @@ fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) 
 
 fn extreme(side: &str, values: impl Iterator<Item = f64>) -> Option<f64> {
     match side {
-        "max" => values.reduce(f64::max),
-        "min" => values.reduce(f64::min),
+        "max" => values.reduce(larger),
+        "min" => values.reduce(|a, b| -larger(-a, -b)),
         _ => None,
     }
 }

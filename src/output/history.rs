@@ -5,6 +5,7 @@ use crate::{
     effect::Energy,
     error::Result,
     stepping::{Pace, StepOutcome},
+    tensor::larger,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -109,7 +110,7 @@ impl Totals {
         self.adhesion_dissipation += energy.debonding;
         self.external_work += energy.work;
         self.numerical_dissipation -= energy.numerical;
-        self.supplied += energy.work.abs() + (-energy.contact).max(0.0);
+        self.supplied += energy.work.abs() + larger(-energy.contact, 0.0);
         let sizes = [
             self.kinetic_energy,
             self.elastic_energy,
@@ -122,10 +123,10 @@ impl Totals {
             self.adhesion_dissipation,
             self.external_work,
         ];
-        self.turnover = sizes.iter().fold(self.turnover, |m, s| m.max(s.abs()));
-        self.energy_imbalance = if self.turnover > 0.0 { open.abs() / self.turnover } else { 0.0 };
-        self.max_energy_imbalance = self.max_energy_imbalance.max(self.energy_imbalance);
-        self.max_inclusion_residual = self.max_inclusion_residual.max(outcome.inclusion_residual);
+        self.turnover = sizes.iter().fold(self.turnover, |most, size| larger(most, size.abs()));
+        self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
+        self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
+        self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
         self.guessed_steps += u64::from(outcome.solutions > 0);
@@ -135,10 +136,17 @@ impl Totals {
 }
 
 impl Totals {
+    /// Whether all that was added up is finite: what is not in a step stays in the maxima.
+    pub fn are_finite(&self) -> bool {
+        [self.turnover, self.max_energy_imbalance, self.max_inclusion_residual]
+            .iter()
+            .all(|most| most.is_finite())
+    }
+
     /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
     pub fn made_by_scheme(&self) -> f64 {
-        let made = (-self.numerical_dissipation).max(0.0);
-        if made > 0.0 { made / self.supplied } else { 0.0 }
+        let made = larger(-self.numerical_dissipation, 0.0);
+        if made == 0.0 { 0.0 } else { made / self.supplied }
     }
 }
 
@@ -216,5 +224,28 @@ mod tests {
         let mut wrong = Totals::default();
         wrong.add(&StepOutcome { energy: Energy { work: -6.5, ..energy }, ..StepOutcome::default() });
         assert_eq!(wrong.energy_imbalance, 2.0);
+    }
+
+    #[test]
+    fn what_is_not_finite_in_one_step_shows_ever_after() {
+        let good = StepOutcome {
+            energy: Energy { kinetic: 1.0, work: 1.0, ..Energy::default() },
+            ..StepOutcome::default()
+        };
+        let mut energy = good.energy.to_array();
+        for (at, bad) in (0..energy.len()).flat_map(|at| [(at, f64::NAN), (at, f64::INFINITY)]) {
+            energy = good.energy.to_array();
+            energy[at] = bad;
+            let mut totals = Totals::default();
+            totals.add(&good);
+            assert!(totals.are_finite());
+            totals.add(&StepOutcome { energy: Energy::from_array(energy), ..good });
+            assert!(!totals.are_finite() && !totals.max_energy_imbalance.is_finite(), "{energy:?}");
+            totals.add(&good);
+            assert!(!totals.are_finite(), "{energy:?}");
+        }
+        let mut totals = Totals::default();
+        totals.add(&StepOutcome { inclusion_residual: f64::NAN, ..good });
+        assert!(totals.max_inclusion_residual.is_nan() && !totals.are_finite());
     }
 }

@@ -173,6 +173,7 @@ impl Drop for Cholesky {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tensor::larger;
     use Precision::{Double, Single};
 
     /// A chain of masses between springs, the last one held by one: 2 on the diagonal, -1 beside it.
@@ -350,8 +351,8 @@ mod tests {
         });
         assert_eq!(double.2, single.2);
         let worst = |a: &[f64], b: &[f64]| {
-            let largest = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
+            let largest = a.iter().fold(0.0, |m, x| larger(m, x.abs()));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, larger) / largest
         };
         let errors = [worst(&double.0, &single.0), worst(&double.1, &single.1)];
         assert!(errors.iter().all(|error| (1e-9..1e-5).contains(error)), "{errors:?}");

@@ -2,6 +2,7 @@
 //! number for a whole block.
 
 use super::sys;
+use crate::tensor::larger;
 use std::array;
 
 /// How a number is stored; products are summed in double precision.
@@ -75,7 +76,7 @@ struct SymmetricBlocks<const B: usize, T> {
 
 /// A power of two near the largest of these numbers: multiples of it don't overflow in a small format.
 pub(super) fn unit_of(values: &[f64]) -> f64 {
-    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let largest = values.iter().fold(0.0, |largest, value| larger(largest, value.abs()));
     if largest > 0.0 && largest.is_finite() { largest.log2().round().exp2() } else { 1.0 }
 }
 
@@ -200,7 +201,7 @@ mod tests {
         let mut y = vec![f64::NAN; x.len()];
         product::<T>(B, rows).unwrap().multiply(&x, &mut y);
         let known = dense.iter().map(|row| row.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>());
-        known.zip(&y).map(|(known, y)| (known - y).abs()).fold(0.0, f64::max) / size
+        known.zip(&y).map(|(known, y)| (known - y).abs()).fold(0.0, larger) / size
     }
 
     #[test]

@@ -16,6 +16,7 @@ use crate::{
     session::Session,
     state::State,
     stepping::{Adaptive, StepOutcome, Stepper, next_step},
+    tensor::larger,
 };
 
 /// A body with its state and scheme, for programs that look at fields after each step.
@@ -77,7 +78,8 @@ pub(super) fn watch_slip<const D: usize, const S: usize>(
 ) -> Result<()> {
     if let Some(mine) = session.agree(body.slip_pressure(state))? {
         let [largest] = session.largest([mine]);
-        totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(largest, |most| most.max(largest)));
+        totals.max_slip_pressure =
+            Some(totals.max_slip_pressure.map_or(largest, |most| larger(most, largest)));
     }
     Ok(())
 }

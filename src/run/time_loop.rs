@@ -23,6 +23,7 @@ use crate::{
     session::Session,
     state::State,
     stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
+    tensor::{larger, von_mises},
 };
 use std::{
     fmt::Write,
@@ -146,6 +147,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             let steps_left = steps_between(self.state.time, end, self.state.step_length);
             let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
+            self.refuse_overflow()?;
             self.refuse_growth()?;
             let wish = self.wish(saved_at);
             if let Some(reason) = wish.stop
@@ -188,6 +190,18 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             )),
             (error, _) => error,
         }
+    }
+
+    /// Fails where a step has left what is no finite number.
+    fn refuse_overflow(&self) -> Result<()> {
+        if self.totals.are_finite() {
+            return Ok(());
+        }
+        Err(Error::Failed(format!(
+            "at t = {:.6e} s energies or residuals are not finite numbers: see whether loads, velocities and the [time] step, in \
+             SI units, are of sensible size",
+            self.state.time
+        )))
     }
 
     /// Fails where the explicit scheme has made so much energy by itself that nothing of the answer is left.
@@ -267,7 +281,11 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             }
             Err(error) => Err(error),
         };
-        if result != Ok(Exit::Done) || self.job.checkpoint.is_some() {
+        if !self.totals.are_finite() {
+            self.log.line(
+                "no checkpoint is written of a state that is not finite; earlier ones are left as they are",
+            );
+        } else if result != Ok(Exit::Done) || self.job.checkpoint.is_some() {
             let saved = self.save();
             self.keep_first(&mut result, saved);
         }
@@ -308,7 +326,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         restarted_from: Option<String>,
     ) -> Result<Summary> {
         let stress = self.body.stress(&self.state)?;
-        let von_mises = stress.iter().map(crate::tensor::von_mises).fold(0.0, f64::max);
+        let von_mises = stress.iter().map(von_mises).fold(0.0, larger);
         let indicated = self.outputs.indicated(self.session, &self.body, &stress)?;
         let mesh = &self.body.mesh;
         Ok(Summary {

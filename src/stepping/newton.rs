@@ -14,6 +14,7 @@ use crate::{
     error::{Error, Result},
     petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
     session::Session,
+    tensor::larger,
 };
 
 /// Newton's method with what it needs.
@@ -262,7 +263,7 @@ impl Newton {
         for contact in &body.contacts {
             let range = session.largest(contact.range(&velocity));
             let distance = contact.inclusion_residual(&velocity, &residual, range);
-            largest = if distance.is_nan() { f64::NAN } else { f64::max(largest, distance) };
+            largest = larger(largest, distance);
         }
         Ok(session.largest([largest])[0])
     }

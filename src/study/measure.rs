@@ -9,6 +9,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     session::Session,
+    tensor::larger,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -145,7 +146,8 @@ fn measured(over: Over, all: &[Squares], times: &[[f64; 2]]) -> Measured {
     for (squares, [time, _]) in all.iter().zip(times) {
         match over {
             Over::Max => {
-                sum = Squares { error: sum.error.max(squares.error), size: sum.size.max(squares.size) }
+                sum =
+                    Squares { error: larger(sum.error, squares.error), size: larger(sum.size, squares.size) }
             }
             Over::Sum => sum.add(Squares {
                 error: (time - before) * squares.error,
@@ -183,7 +185,7 @@ pub fn probe_error(folder: &Path, target: Target, probe: &ProbeError, point: &[f
         };
         let (error, size) = ((value - reference).abs(), reference.abs());
         match probe.over {
-            Over::Max => sum = Measured { error: sum.error.max(error), size: sum.size.max(size) },
+            Over::Max => sum = Measured { error: larger(sum.error, error), size: larger(sum.size, size) },
             Over::Sum => {
                 sum.error += (time - before) * error * error;
                 sum.size += (time - before) * size * size;

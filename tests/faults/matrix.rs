@@ -6,6 +6,7 @@ use clarke::{
     job::Job,
     run::{self, Clock, Start},
     session::{Mpi, Session},
+    tensor::larger,
 };
 use std::{
     path::{Path, PathBuf},
@@ -143,8 +144,8 @@ fn beside(job: &Path, folder: &str) -> PathBuf {
 fn assert_same(straight: &[(String, Vec<f64>)], found: &[(String, Vec<f64>)], share: f64, what: &str) {
     assert_eq!(straight.len(), found.len(), "{what}");
     for ((name, one), (_, other)) in straight.iter().zip(found) {
-        let scale = one.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let off = one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let scale = one.iter().fold(0.0, |most, x| larger(most, x.abs()));
+        let off = one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
         assert!(
             one.len() == other.len() && off <= share * scale,
             "{what}: {name} is {off:e} of {scale:e} off"

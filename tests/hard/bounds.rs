@@ -1,6 +1,7 @@
 //! Steps around the bound of the explicit scheme, and far beyond it under the implicit ones.
 
 use crate::{case::Case, family};
+use clarke::tensor::larger;
 
 const STEPS: f64 = 200.0;
 
@@ -69,7 +70,7 @@ fn implicit_steps_of_a_thousand_times_the_bound_stay_bounded() {
         let step = 1000.0 * certified(dimension);
         let case = of_length(shaken(dimension), step).set("time.scheme", &format!("'{scheme}'"));
         let history = case.run(1).table("history.csv");
-        let most = |column| history.numbers(column).into_iter().fold(0.0, f64::max);
+        let most = |column| history.numbers(column).into_iter().fold(0.0, larger);
         let (kinetic, elastic) = (most("kinetic_energy"), most("elastic_energy"));
         println!(
             "{scheme} in {dimension}D: kinetic at most {kinetic:.1e} J, elastic at most {elastic:.1e} J"

@@ -1,6 +1,7 @@
 //! Impacts at any speed: thrown back as the equations scale, never through the wall, without energy out of nothing.
 
 use crate::{case::Case, family, results::Results};
+use clarke::tensor::larger;
 
 /// Energy less the work of loads, of every step.
 fn energies(results: &Results) -> Vec<f64> {
@@ -12,8 +13,8 @@ fn energies(results: &Results) -> Vec<f64> {
 #[track_caller]
 fn assert_never_grows(results: &Results, what: &str) {
     let energies = energies(results);
-    let scale = energies.iter().fold(0.0, |most: f64, e| most.max(e.abs()));
-    let grown = energies.windows(2).map(|e| e[1] - e[0]).fold(0.0, f64::max);
+    let scale = energies.iter().fold(0.0, |most, e| larger(most, e.abs()));
+    let grown = energies.windows(2).map(|e| e[1] - e[0]).fold(0.0, larger);
     let imbalance = results.number("max_energy_imbalance");
     println!("{what}: energy grows by at most {:.1e} in a step, imbalance {imbalance:.1e}", grown / scale);
     assert!(grown <= 1e-12 * scale, "{what}: energy grows by {:e} of itself", grown / scale);
@@ -37,7 +38,7 @@ fn bars_are_thrown_back_alike_at_any_speed() {
         let what = format!("{:e} wave speeds", speed / 10.0);
         assert_never_grows(&results, &what);
         let front = results.table("probes.csv").only("probe", "front").numbers("displacement_x");
-        let deepest = front.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+        let deepest = front.iter().fold(f64::NEG_INFINITY, |a, b| larger(a, *b));
         assert!(deepest <= 0.1 * speed * (1.0 + 1e-12), "{what}: beyond the wall, {deepest:e}");
         let end = |results: &Results, speed: f64| {
             results.table("history.csv").last("kinetic_energy") / speed.powi(2)
@@ -86,7 +87,7 @@ fn blocks_bounce_without_energy_out_of_nothing() {
         let heights = results.table("probes.csv").only("probe", "bottom").numbers(column);
         let touching: Vec<bool> = heights.iter().map(|height| *height <= -0.05 + 1e-12).collect();
         let bounces = touching.windows(2).filter(|pair| pair[0] && !pair[1]).count();
-        let lowest = heights.iter().fold(0.0, |a: f64, b| a.min(*b));
+        let lowest = heights.iter().fold(0.0, |a, b| -larger(-a, -b));
         println!("{what}: {bounces} bounces, lowest {lowest:.17}");
         assert!(bounces >= least && lowest >= -0.05 - 1e-14, "{what}: {bounces} bounces, lowest {lowest:e}");
         assert!(results.number("max_energy_imbalance") < 1e-9, "{what}");

@@ -1,10 +1,11 @@
 //! Jumps and kinks for very many steps.
 
 use crate::{case::Case, results::Results, thorough};
+use clarke::tensor::larger;
 
 /// Largest of some numbers, without signs.
 fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().map(|x| x.abs()).fold(0.0, f64::max)
+    numbers.iter().map(|x| x.abs()).fold(0.0, larger)
 }
 
 fn assert_balanced(results: &Results) {
@@ -53,7 +54,7 @@ fn a_block_sticks_and_slips_alike_in_every_period() {
     let results = case.run(1);
     let velocity = results.table("probes.csv").numbers("velocity_y");
     let period = |n: usize| &velocity[100 * n..100 * (n + 1)];
-    let off = period(4).iter().zip(period(periods - 1)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let off = period(4).iter().zip(period(periods - 1)).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
     let sticking = period(periods - 1).iter().filter(|v| v.abs() < 1e-15).count();
     println!("{} steps: {off:.1e} m/s between periods, {sticking} of 100 steps stick", velocity.len());
     assert!((20..90).contains(&sticking), "{sticking} steps of a period stick");
@@ -97,7 +98,7 @@ fn a_plate_whose_points_cross_every_kink_together_is_one_mass() {
     let found = results.table("probes.csv").numbers("velocity_y");
     let expected = by_hand(steps);
     assert_eq!(found.len(), steps);
-    let off = found.iter().zip(&expected).map(|(a, b)| (a + b).abs()).fold(0.0, f64::max);
+    let off = found.iter().zip(&expected).map(|(a, b)| (a + b).abs()).fold(0.0, larger);
     let together =
         results.table("history.csv").numbers("active_changes").iter().filter(|n| **n == 17.0).count();
     println!("{steps} steps, {together} in which all points change their branch: {off:.1e} m/s off");

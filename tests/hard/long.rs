@@ -1,6 +1,7 @@
 //! Very many steps: no drift of the balance, no memory that grows, sums that keep their digits.
 
 use crate::{assert_close, case::Case, results::Results, thorough};
+use clarke::tensor::larger;
 
 /// A million steps, or a sample.
 fn steps() -> usize {
@@ -51,9 +52,9 @@ fn a_million_steps_of_a_small_job_drift_in_nothing_and_take_no_more_memory() {
     assert!(grown < 2e6, "memory grew by {grown:e} bytes");
     let velocity = results.table("probes.csv").numbers("velocity_y");
     let period = |n: usize| &velocity[100 * n..100 * (n + 1)];
-    let largest = velocity.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let largest = velocity.iter().fold(0.0, |a, b| larger(a, b.abs()));
     let last = steps / 100 - 1;
-    let off = period(last - 1).iter().zip(period(last)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let off = period(last - 1).iter().zip(period(last)).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
     println!("the last period differs from the one before by {off:e} m/s");
     assert!(off < 1e-9 * largest, "{off:e}");
 }

@@ -1,6 +1,7 @@
 //! The same physics in other units has the same digits.
 
 use crate::{case::Case, family, results::Results};
+use clarke::tensor::larger;
 use toml::Value;
 
 /// Numbers of one unit of stress, length and time in the units of a job.
@@ -84,8 +85,8 @@ fn job(kind: &str) -> Case {
 fn off(one: &Results, other: &Results, table: &str, column: &str, factor: f64) -> f64 {
     let (one, other) = (one.table(table).numbers(column), other.table(table).numbers(column));
     assert_eq!(one.len(), other.len());
-    let scale = one.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let off = one.iter().zip(&other).map(|(a, b)| (a - b / factor).abs()).fold(0.0, f64::max);
+    let scale = one.iter().fold(0.0, |most, x| larger(most, x.abs()));
+    let off = one.iter().zip(&other).map(|(a, b)| (a - b / factor).abs()).fold(0.0, larger);
     if off == 0.0 { 0.0 } else { off / scale }
 }
 
@@ -108,7 +109,7 @@ fn assert_same(kind: &str, units: Units) {
         ("history.csv", "external_work", energy),
     ] {
         let off = off(&a, &b, table, column, factor);
-        worst = worst.max(off);
+        worst = larger(worst, off);
         assert!(off < 1e-9, "{kind} in {units:?}: {column} is {off:e} off");
     }
     let stress = |results: &Results| results.number("max_von_mises");

@@ -1,6 +1,7 @@
 //! Effects that vanish: the answer tends to that without them, or the job is refused.
 
 use crate::{case::Case, family};
+use clarke::tensor::larger;
 
 /// Displacements of the tip.
 fn path(case: &Case) -> Vec<f64> {
@@ -16,10 +17,10 @@ fn implicit() -> Case {
 
 /// Distances to the limit over its largest displacement, of the sizes in turn; they must shrink with them.
 fn assert_approached(what: &str, limit: &[f64], sizes: &[f64], of: impl Fn(f64) -> Vec<f64>) {
-    let scale = limit.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let scale = limit.iter().fold(0.0, |most, x| larger(most, x.abs()));
     let distance = |size: f64| {
         let found = of(size);
-        found.iter().zip(limit).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
+        found.iter().zip(limit).map(|(a, b)| (a - b).abs()).fold(0.0, larger) / scale
     };
     let distances: Vec<f64> = sizes.iter().map(|size| distance(*size)).collect();
     println!("{what}: {sizes:?} are {distances:?} from the limit");

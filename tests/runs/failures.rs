@@ -40,6 +40,50 @@ fn a_load_that_fails_on_one_rank_only_ends_all_of_them() {
     assert_eq!(case.results().summary()["status"], "failed");
 }
 
+/// A free plate without stress, in flight at so many m/s, whose velocity grows by as much in the second and last step as the
+/// first argument has it.
+fn flying(growth: &str) -> Case {
+    let parts = [
+        "contact",
+        "support",
+        "traction",
+        "material.elasticity",
+        "material.viscoplasticity",
+        "output.profile",
+    ];
+    parts
+        .into_iter()
+        .fold(Case::square(4), Case::without)
+        .set("material.density", "1e4")
+        .set("initial.velocity", "[1e150, 0]")
+        .set("body_force", &format!("[{{ value = ['{growth}*(t/1e4 - 1)', '0'] }}]"))
+        .set("time.step", "1e4")
+        .set("time.end", "2e4")
+        .set("checkpoint", "{ every = 1, keep = 1 }")
+}
+
+#[test]
+fn energies_that_overflow_in_the_last_step_fail_the_run_and_leave_the_checkpoint_before_it() {
+    for ranks in [1, 2] {
+        let case = flying("1e153");
+        case.run_with(ranks, &[])
+            .expect(1)
+            .says("at t = 2.000000e4 s")
+            .says("not finite numbers")
+            .says("SI units");
+        let results = case.results();
+        assert_eq!(results.summary()["status"], "failed");
+        assert!(results.summary()["max_energy_imbalance"].is_null(), "no number is made up");
+        assert_eq!(results.checkpoints(), [1]);
+        case.run_with(ranks, &["--restart"])
+            .expect(1)
+            .says("checkpoint-1.h5 (step 1")
+            .says("not finite numbers");
+        assert_eq!(case.results().checkpoints(), [1]);
+        assert_eq!(flying("1e150").run(ranks).summary()["status"], "completed");
+    }
+}
+
 #[test]
 fn a_failed_run_can_be_repeated_from_where_it_failed() {
     let case = failing_load();

@@ -4,6 +4,7 @@ use crate::{
     case::Case,
     results::{Results, assert_same_answer},
 };
+use clarke::tensor::larger;
 
 /// Partition and rounding change the iterates, not the answer.
 const SHARE: f64 = 1e-8;
@@ -27,7 +28,7 @@ fn compare(make: impl Fn() -> Case, what: &str) {
 fn assert_same_effort(alone: &Results, results: &Results, what: &str) {
     let (one, other) = (alone.table("history.csv"), results.table("history.csv"));
     let (one, other) = (one.numbers("newton_iterations"), other.numbers("newton_iterations"));
-    let worst = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let worst = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
     assert!(worst <= 1.0, "{what}: {worst} Newton iterations more or less in a step");
     let (one, other) = (alone.number("linear_iterations"), results.number("linear_iterations"));
     assert!(other <= 1.5 * one + 16.0, "{what}: {other} linear iterations instead of {one}");

@@ -1,5 +1,6 @@
 //! What a run left, read the way a user's script would.
 
+use clarke::tensor::larger;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -103,7 +104,7 @@ impl Table {
 
 /// Largest of some numbers, without signs.
 fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
-    numbers.map(f64::abs).fold(0.0, f64::max)
+    numbers.map(f64::abs).fold(0.0, larger)
 }
 
 /// Largest difference of two lists of numbers over the largest number.
@@ -114,7 +115,7 @@ pub fn relative_difference(one: &[f64], other: &[f64]) -> f64 {
 /// Largest difference of two lists of numbers over the largest number, or over this one if it is larger.
 fn difference_over(least: f64, one: &[f64], other: &[f64]) -> f64 {
     assert_eq!(one.len(), other.len(), "lists of other lengths");
-    let scale = largest(one.iter().chain(other).copied()).max(least);
+    let scale = larger(largest(one.iter().chain(other).copied()), least);
     let difference = largest(one.iter().zip(other).map(|(a, b)| a - b));
     if difference == 0.0 { 0.0 } else { difference / scale }
 }

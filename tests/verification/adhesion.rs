@@ -11,6 +11,7 @@ use clarke::{
     },
     run::Simulation,
     session::Session,
+    tensor::larger,
 };
 
 /// Bonds of a unit of area; `length` cuts the stretch.
@@ -47,7 +48,7 @@ impl Mass {
         self.dissipated += (self.bonding.powi(2) - low * low) * potential;
         self.bonding = low;
         let pull = low * low * bond.stiffness * stretch;
-        self.peak = self.peak.max(pull);
+        self.peak = larger(self.peak, pull);
         self.speed -= step * pull / self.mass;
         self.moved += step * self.speed;
     }
@@ -128,7 +129,7 @@ fn follows<const D: usize, const S: usize>(
                 assert!(off < 1e-4, "step {}: the velocity is off by {off}", run.state.step);
             }
         }
-        let off = bonding(&run).iter().map(|b| (b - mass.bonding).abs()).fold(0.0, f64::max);
+        let off = bonding(&run).iter().map(|b| (b - mass.bonding).abs()).fold(0.0, larger);
         assert!(off < 2e-3, "step {}: the bonding is off by {off}", run.state.step);
     }
     let area = run.totals.adhesion_dissipation / mass.dissipated;

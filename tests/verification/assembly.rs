@@ -12,6 +12,7 @@ use clarke::{
     },
     petsc::Matrix,
     session::Session,
+    tensor::larger,
 };
 
 const VISCOSITY: Isotropic = Isotropic { volumetric: 2.5, shear: 7.0 };
@@ -163,7 +164,7 @@ fn entries<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh
     let (dense, reference) = (gathered(session, &body), reference(whole));
     let fixed = held_components(session, &body);
     assert_eq!(fixed.iter().any(|f| *f), !held.is_empty());
-    let largest = reference.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
+    let largest = reference.iter().flatten().fold(0.0, |m, x| larger(m, x.abs()));
     for (row, (found, expected)) in dense.chunks_exact(reference.len()).zip(&reference).enumerate() {
         for (column, (found, expected)) in found.iter().zip(expected).enumerate() {
             let decoupled = row != column && (fixed[row] || fixed[column]);

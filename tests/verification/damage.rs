@@ -3,7 +3,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
-use clarke::{mesh::GlobalMesh, run::Simulation, session::Session};
+use clarke::{mesh::GlobalMesh, run::Simulation, session::Session, tensor::larger};
 
 const MODULUS: f64 = 100.0;
 const RATIO: f64 = 0.25;
@@ -62,7 +62,7 @@ fn held<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mes
             let grown = grown.min(0.6);
             dissipated += volume * energy::<S>() * (grown - expected);
             expected = grown;
-            let off = damage(&run).iter().map(|d| (d - expected).abs()).fold(0.0, f64::max);
+            let off = damage(&run).iter().map(|d| (d - expected).abs()).fold(0.0, larger);
             assert!(off < 1e-8, "{hypothesis} {exponent}, step {}: off by {off}", run.state.step);
         }
         let exact = closed(END).min(0.6);

@@ -2,7 +2,9 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
-use clarke::{certificate::Certificates, job::Job, mesh::GlobalMesh, run::Simulation, session::Session};
+use clarke::{
+    certificate::Certificates, job::Job, mesh::GlobalMesh, run::Simulation, session::Session, tensor::larger,
+};
 use std::path::Path;
 
 const DENSITY: f64 = 10.0;
@@ -72,7 +74,7 @@ fn follows<const D: usize, const S: usize>(
         sinking = (mass * sinking / step + load - pressure) / (mass / step + DAMPING);
         taken += area * step * (DAMPING * sinking + pressure) * sinking;
         depths.push(depths[depths.len() - 1] + step * sinking);
-        largest = largest.max(pressure);
+        largest = larger(largest, pressure);
         for velocity in run.state.velocity.owned().expect("velocity").chunks_exact(D) {
             let off = (velocity[D - 1] + sinking).abs();
             assert!(off < 1e-4 * SPEED, "step {}: the velocity is off by {off}", run.state.step);

@@ -10,6 +10,7 @@ use clarke::{
     },
     run::Simulation,
     session::Session,
+    tensor::larger,
 };
 
 /// All but time, solver and contact.
@@ -102,9 +103,9 @@ fn velocities<const D: usize, const S: usize>(
 /// Largest difference over all steps and nodes, relative to the largest velocity of all.
 fn difference(session: &Session, one: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
     assert!(!one.is_empty() && one.len() == other.len());
-    let size = one.iter().flatten().fold(0.0, |m, v| f64::max(m, v.abs()));
+    let size = one.iter().flatten().fold(0.0, |m, v| larger(m, v.abs()));
     let pairs = one.iter().flatten().zip(other.iter().flatten());
-    let off = pairs.fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()));
+    let off = pairs.fold(0.0, |m, (a, b)| larger(m, (a - b).abs()));
     let [size, off] = session.largest([size, off]);
     assert!(size > 1e-3, "something moves");
     off / size
@@ -175,10 +176,10 @@ fn cross_checked<const D: usize, const S: usize>(session: &Session, mesh: &Globa
         };
         let (here, there) = (fields(&newton.0), fields(&other.0));
         for (a, b) in here.iter().zip(&there) {
-            let size = a.iter().fold(0.0, |m, v| f64::max(m, v.abs()));
-            let off = a.iter().zip(b).fold(0.0, |m, (v, w)| f64::max(m, (v - w).abs()));
+            let size = a.iter().fold(0.0, |m, v| larger(m, v.abs()));
+            let off = a.iter().zip(b).fold(0.0, |m, (v, w)| larger(m, (v - w).abs()));
             let [size, off] = session.largest([size, off]);
-            worst = worst.max(off / size.max(1e-12));
+            worst = larger(worst, off / size.max(1e-12));
         }
     }
     assert!(worst < 1e-8, "velocities or tractions are {worst:e} apart");

@@ -9,7 +9,7 @@ use clarke::{
     mesh::{Boundary, GlobalMesh},
     run::Simulation,
     session::Session,
-    tensor::Vector,
+    tensor::{Vector, larger},
 };
 use std::path::Path;
 
@@ -64,7 +64,7 @@ fn forces<const D: usize>(
     let mut unknown = velocity.clone();
     contact.unmap(&mut unknown);
     contact.map(&mut unknown);
-    let off = unknown.iter().zip(&velocity).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let off = unknown.iter().zip(&velocity).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
     assert!(off < 1e-14, "velocities come back from the unknowns, {off:e} off");
     let mut local = vec![0.0; velocity.len()];
     contact.add_forces(&velocity, &mut local);

@@ -12,7 +12,7 @@ use clarke::{
     },
     run::Simulation,
     session::Session,
-    tensor::von_mises,
+    tensor::{larger, von_mises},
 };
 use std::path::Path;
 
@@ -206,7 +206,7 @@ fn largest_error(session: &Session, overrides: &[String], reference: &[Vec<f64>]
         let mut momentum = vec![0.0; off.len()];
         run.body.add_form(Form::Mass, &off, &mut momentum);
         let square: f64 = momentum.iter().zip(&off).map(|(a, b)| a * b).sum();
-        largest = largest.max(square.sqrt());
+        largest = larger(largest, square.sqrt());
     }
     (run.state.step, run.scheme.set_ups, largest)
 }

@@ -21,7 +21,7 @@ use crate::{
     contact::FrictionLaw,
     error::{Error, Result},
     mesh::Mesh,
-    tensor::{Vector, dot, norm},
+    tensor::{Vector, dot, larger, norm},
 };
 
 /// A friction law with its points.
@@ -239,7 +239,7 @@ impl<const D: usize> Friction<D> {
 
     /// Largest fall of the graphs of all points in Pa s/m, at the pressures the bounds go by.
     pub fn steepest_fall(&self) -> f64 {
-        let most = self.points.iter().fold(0.0, |most, point| f64::max(most, point.pressure));
+        let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
         self.law.steepest_fall() * most
     }
 
@@ -272,7 +272,7 @@ impl<const D: usize> Friction<D> {
     pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         self.points.iter().fold([0.0; 2], |[v, q], point| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
-            [v.max(norm(&point.along(velocity))), q.max(norm(&point.traction)).max(bound)]
+            [larger(v, norm(&point.along(velocity))), larger(larger(q, norm(&point.traction)), bound)]
         })
     }
 

@@ -4,7 +4,7 @@ use super::{
     Contact,
     point::{Point, Unknown},
 };
-use crate::contact::NormalLaw;
+use crate::{contact::NormalLaw, tensor::larger};
 
 /// Share of the pressure that would stop a contact boundary, beside which errors of the pressure count at least.
 const STOPPING_SHARE: f64 = 0.01;
@@ -21,8 +21,8 @@ impl<const D: usize> Contact<D> {
         let nothing = matches!(&self.law, NormalLaw::Graph(graph) if graph.is_zero());
         let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
             let moved = if nothing { point.speed(velocity) } else { point.normal_component(velocity).abs() };
-            let along = moved.max(point.context_velocity());
-            [f64::max(v, along), f64::max(p, point.pressure_at(&self.law, velocity).abs())]
+            let along = larger(moved, point.context_velocity());
+            [larger(v, along), larger(p, point.pressure_at(&self.law, velocity).abs())]
         });
         let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
         [normal[0], normal[1], sliding[0], sliding[1]]

@@ -5,7 +5,7 @@ use crate::{
     contact::FrictionLaw,
     error::{Error, Result},
     mesh::Mesh,
-    tensor::Vector,
+    tensor::{Vector, larger},
 };
 
 impl<const D: usize> Contact<D> {
@@ -74,7 +74,7 @@ impl<const D: usize> Contact<D> {
 
     /// The largest contact pressure in Pa at points here, at least 0, in the step just solved.
     pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
-        self.points.iter().fold(0.0, |most, point| f64::max(most, point.pressure_at(&self.law, velocity)))
+        self.points.iter().fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, velocity)))
     }
 
     /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     material::{DruckerPrager, Elasticity, Hypothesis, Maxwell, Metric, Perzyna},
-    tensor::{dot, von_mises},
+    tensor::{dot, larger, von_mises},
 };
 use proptest::prelude::*;
 
@@ -52,7 +52,7 @@ fn rates<const S: usize>(law: &Viscoplasticity, s: &Mandel<S>, accumulated: f64)
 }
 
 fn largest<const S: usize>(s: &Mandel<S>) -> f64 {
-    s.iter().fold(0.0, |m, x| m.max(x.abs()))
+    s.iter().fold(0.0, |m, x| larger(m, x.abs()))
 }
 
 fn difference<const S: usize>(a: &Mandel<S>, b: &Mandel<S>) -> f64 {
