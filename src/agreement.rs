@@ -3,38 +3,99 @@
 use crate::error::{Error, Exit, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
+use std::cell::Cell;
 
-/// Turns the results of the ranks into one outcome: a value everywhere, or an error everywhere. The lowest rank that
-/// failed by itself keeps its error, the others get its words. Collective.
-pub fn agree<T>(communicator: &impl Communicator, result: Result<T>) -> Result<T> {
+/// A failure that all ranks share: the same kind, rank and words on each of them, so that what a run does next may depend on it.
+///
+/// Only [`agree`] makes one. What failed on one rank alone is an [`Error`], which can't be asked what it is.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{words}")]
+pub struct Agreed {
+    rank: usize,
+    exit: Exit,
+    words: String,
+}
+
+impl Agreed {
+    /// The exit code that all ranks end with.
+    pub fn exit(&self) -> Exit {
+        self.exit
+    }
+
+    /// The lowest rank that failed; it tells the user.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// Whether the run failed at what it was doing, so that another way may succeed; not so where the job is refused or a library has
+    /// a fault.
+    pub fn is_failure(&self) -> bool {
+        self.exit == Exit::Failed
+    }
+}
+
+impl From<Agreed> for Error {
+    fn from(Agreed { rank, exit, words }: Agreed) -> Self {
+        Self::of_all(rank, exit, words)
+    }
+}
+
+/// Turns the results of the ranks into one outcome: a value everywhere, or the same failure everywhere, that of the lowest rank
+/// that failed. Collective.
+pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result<T, E>) -> Result<T, Agreed> {
     let (size, rank) = (communicator.size(), communicator.rank());
-    let own = match &result {
-        Ok(_) => 2 * size,
-        Err(Error::Elsewhere { .. }) => size + rank,
-        Err(_) => rank,
+    // A value, which may be a file that all ranks close together, lives until they have agreed.
+    let (value, error) = match result {
+        Ok(value) => (Some(value), pass().err()),
+        Err(error) => (None, Some(error.into())),
     };
-    let mut lowest = 2 * size;
+    let own = if error.is_none() { size } else { rank };
+    let mut lowest = size;
     communicator.all_reduce_into(&own, &mut lowest, SystemOperation::min());
-    if lowest == 2 * size {
-        return result;
+    if lowest == size
+        && let Some(value) = value
+    {
+        return Ok(value);
     }
-    let (mut exit, mut text) = match &result {
-        Err(error) if own == lowest => (error.exit() as u8, error.to_string().into_bytes()),
-        _ => (0, Vec::new()),
-    };
-    let speaker = lowest % size;
-    let culprit = communicator.process_at_rank(speaker);
-    let mut length = text.len() as u64;
-    culprit.broadcast_into(&mut exit);
-    culprit.broadcast_into(&mut length);
-    text.resize(length as usize, 0);
+    let mut failure = Agreed { rank: 0, exit: Exit::Internal, words: String::new() };
+    if let Some(error) = error.filter(|_| rank == lowest) {
+        let (known, exit, words) = error.into_parts();
+        let is_told = known.is_some() || rank == 0;
+        let words = if is_told { words } else { format!("rank {rank}: {words}") };
+        failure = Agreed { rank: known.unwrap_or(rank as usize), exit, words };
+    }
+    let mut numbers = [failure.rank as u64, u64::from(failure.exit as u8), failure.words.len() as u64];
+    let mut text = failure.words.into_bytes();
+    let culprit = communicator.process_at_rank(lowest);
+    culprit.broadcast_into(&mut numbers[..]);
+    text.resize(numbers[2] as usize, 0);
     culprit.broadcast_into(&mut text[..]);
-    match result {
-        Err(error) if own == lowest => Err(error),
-        _ => Err(Error::Elsewhere {
-            rank: speaker as usize,
-            exit: Exit::from_code(i32::from(exit)),
-            message: String::from_utf8_lossy(&text).into_owned(),
-        }),
+    Err(Agreed {
+        rank: numbers[0] as usize,
+        exit: Exit::from_code(numbers[1] as i32),
+        words: String::from_utf8_lossy(&text).into_owned(),
+    })
+}
+
+thread_local! {
+    /// Agreements and file operations so far, and the one that is to fail.
+    static PASSED: Cell<u64> = const { Cell::new(0) };
+    static FAILS: Cell<u64> = const { Cell::new(u64::MAX) };
+}
+
+/// Counts an agreement or a file operation of this process; fails where a test wants it to.
+pub(crate) fn pass() -> Result<()> {
+    let number = PASSED.replace(PASSED.get() + 1);
+    if number == FAILS.get() {
+        return Err(Error::Failed(format!("operation {number} failed for a test")));
     }
+    Ok(())
+}
+
+/// For tests: counts agreements and file operations of this thread from zero, and lets the one of this number fail. Gives how many
+/// there were.
+#[doc(hidden)]
+pub fn fail_at(number: Option<u64>) -> u64 {
+    FAILS.set(number.unwrap_or(u64::MAX));
+    PASSED.replace(0)
 }

@@ -7,6 +7,7 @@ pub use implicit::Cells;
 pub use traffic::PassBytes;
 
 use crate::{
+    agreement::Agreed,
     effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
     error::Result,
     lanes::Pack,
@@ -39,7 +40,7 @@ pub struct Body<const D: usize, const S: usize> {
 
 impl<const D: usize, const S: usize> Body<D, S> {
     /// The constant matrix of a step of this length. Collective.
-    pub fn matrix(&self, session: &Session, step_length: f64) -> Result<BlockRows> {
+    pub fn matrix(&self, session: &Session, step_length: f64) -> Result<BlockRows, Agreed> {
         let effects: Vec<_> = self.effects.iter().filter(|e| e.phases().matrix).collect();
         let mut runs = self.geometry.runs.iter().copied().peekable();
         assemble(session, &self.mesh, &self.geometry, &self.fixed, |cell, geometry, matrix| {

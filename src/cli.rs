@@ -1,6 +1,7 @@
 //! Arguments to exit codes.
 
 use crate::{
+    agreement::Agreed,
     error::{Error, Exit, Result},
     job::{self, Job, Loaded},
     output::{inspect::inspect, parallel_file::given_up},
@@ -144,7 +145,7 @@ pub fn main() -> ExitCode {
         Ok(exit) => ExitCode::from(exit as u8),
         Err(error) => {
             speak_alone(|| print_error(&error));
-            ExitCode::from(error.exit() as u8)
+            ExitCode::from(Exit::from(error) as u8)
         }
     }
 }
@@ -234,7 +235,15 @@ fn speak_alone(words: impl FnOnce()) {
     }
 }
 
-fn print_error(error: &Error) {
+/// Lets the rank that an error comes from tell it; all end with its exit code.
+fn told(session: &Session, error: &Agreed) -> Exit {
+    if session.rank() == error.rank() {
+        print_error(error);
+    }
+    error.exit()
+}
+
+fn print_error(error: &impl std::error::Error) {
     let words = error.to_string();
     let prefix = if words.starts_with("error") { "" } else { "error: " };
     let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
@@ -269,12 +278,7 @@ fn report_on(folder: &Path) -> Result<Exit> {
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let outcome = session.agree(if session.is_first() { make() } else { Ok(Exit::Done) });
-    Ok(outcome.unwrap_or_else(|error| {
-        if !matches!(error, Error::Elsewhere { .. }) {
-            print_error(&error);
-        }
-        error.exit()
-    }))
+    Ok(outcome.unwrap_or_else(|error| told(&session, &error)))
 }
 
 /// Splits a mesh, on one process.
@@ -310,7 +314,7 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         return Err(Error::Refused(words));
     }
     on_all_ranks(&arguments.job, &arguments.overrides, |session, loaded, clock| {
-        run::run(session, loaded, &from, clock)
+        Ok(run::run(session, loaded, &from, clock)?)
     })
 }
 
@@ -348,18 +352,13 @@ fn run_study(path: &Path, overrides: &[String], ablate: bool, part: Option<study
     })
 }
 
-/// Starts MPI and PETSc and works; the rank with the fault of its own speaks.
+/// Starts MPI and PETSc and works; the rank with the fault speaks.
 fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit> {
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
-    let exit = work(&session, clock).unwrap_or_else(|error| {
-        if !matches!(error, Error::Elsewhere { .. }) {
-            print_error(&error);
-        }
-        error.exit()
-    });
+    let exit = session.agree(work(&session, clock)).unwrap_or_else(|error| told(&session, &error));
     if exit != Exit::Done && given_up() {
         session.world().barrier();
         std::process::exit(i32::from(exit as u8));

@@ -29,42 +29,50 @@ impl Exit {
     }
 }
 
-/// An error with the words the user reads; the kind decides the exit code.
+/// An error with the words the user reads; its kind decides the exit code.
+///
+/// It may be known on one rank alone. Nothing may depend on it but the end of what the rank is doing, so it does not show its kind:
+/// what ranks do next is chosen by an `Agreed` failure, which is the same on all of them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// The job, mesh or command line can't be run: what, where and what to do.
-    #[error("{0}")]
-    Refused(String),
-    /// The run can't go on: what happened, when, and what to try.
-    #[error("{0}")]
-    Failed(String),
-    /// A library or the machine failed in a way the user did not cause.
-    #[error("{0}")]
-    Internal(String),
-    /// Another rank failed; it carries that rank's own words.
-    #[error("rank {rank}: {message}")]
-    Elsewhere {
-        /// The lowest rank that failed.
-        rank: usize,
-        /// The exit code of that rank's error.
-        exit: Exit,
-        /// That rank's message.
-        message: String,
-    },
+#[error("{words}")]
+pub struct Error {
+    exit: Exit,
+    words: String,
+    /// Whose words they are, once all ranks know of it.
+    rank: Option<usize>,
 }
 
 /// Result with the crate's error.
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// The kinds, made as the variants of an enum would be; unlike these, they can't be told apart again.
+#[allow(non_snake_case)]
+impl Error {
+    /// The job, mesh or command line can't be run: what, where and what to do.
+    pub fn Refused(words: String) -> Self {
+        Self { exit: Exit::Refused, words, rank: None }
+    }
+
+    /// The run can't go on: what happened, when, and what to try.
+    pub fn Failed(words: String) -> Self {
+        Self { exit: Exit::Failed, words, rank: None }
+    }
+
+    /// A library or the machine failed in a way the user did not cause.
+    pub fn Internal(words: String) -> Self {
+        Self { exit: Exit::Internal, words, rank: None }
+    }
+}
 
 impl Error {
-    /// The exit code this error ends the process with.
-    pub fn exit(&self) -> Exit {
-        match self {
-            Self::Refused(_) => Exit::Refused,
-            Self::Failed(_) => Exit::Failed,
-            Self::Internal(_) => Exit::Internal,
-            Self::Elsewhere { exit, .. } => *exit,
-        }
+    /// One that all ranks share.
+    pub(crate) fn of_all(rank: usize, exit: Exit, words: String) -> Self {
+        Self { exit, words, rank: Some(rank) }
+    }
+
+    /// Rank, if all know of it, exit code and words.
+    pub(crate) fn into_parts(self) -> (Option<usize>, Exit, String) {
+        (self.rank, self.exit, self.words)
     }
 
     /// A file operation that failed while the job was being read.
@@ -75,5 +83,12 @@ impl Error {
     /// A file operation that failed while results were being written.
     pub fn unwritable(path: &std::path::Path, error: impl std::fmt::Display) -> Self {
         Self::Failed(format!("cannot write {}: {error}", path.display()))
+    }
+}
+
+/// The exit code that an error ends the process with.
+impl From<Error> for Exit {
+    fn from(error: Error) -> Self {
+        error.exit
     }
 }

@@ -1,7 +1,7 @@
 //! Messages between ranks whose sizes only the sender knows.
 
 use crate::{
-    agreement::agree,
+    agreement::{Agreed, agree},
     error::{Error, Result},
 };
 use mpi::{
@@ -19,7 +19,7 @@ pub fn exchange<T: Equivalence + Copy + Default>(
     communicator: &SimpleCommunicator,
     numbers: &[T],
     counts: &[usize],
-) -> Result<(Vec<T>, Vec<usize>)> {
+) -> Result<(Vec<T>, Vec<usize>), Agreed> {
     let mut received_counts = vec![0_u64; counts.len()];
     let sent_counts: Vec<u64> = counts.iter().map(|count| *count as u64).collect();
     communicator.all_to_all_into(&sent_counts[..], &mut received_counts[..]);
@@ -39,7 +39,7 @@ pub fn exchange<T: Equivalence + Copy + Default>(
 pub fn exchange_lists<T: Equivalence + Copy + Default>(
     communicator: &SimpleCommunicator,
     lists: &[Vec<T>],
-) -> Result<Vec<T>> {
+) -> Result<Vec<T>, Agreed> {
     let counts: Vec<usize> = lists.iter().map(Vec::len).collect();
     Ok(exchange(communicator, &lists.concat(), &counts)?.0)
 }
@@ -48,7 +48,7 @@ pub fn exchange_lists<T: Equivalence + Copy + Default>(
 pub fn gather<T: Equivalence + Copy + Default>(
     communicator: &SimpleCommunicator,
     numbers: &[T],
-) -> Result<Vec<T>> {
+) -> Result<Vec<T>, Agreed> {
     let gathering = Gathering::new(communicator, numbers.len())?;
     let mut all = vec![T::default(); gathering.total()];
     gathering.gather(communicator, numbers, &mut all);
@@ -64,11 +64,11 @@ pub struct Gathering {
 
 impl Gathering {
     /// For so many numbers from this rank. Collective, with the same outcome on all ranks.
-    pub fn new(communicator: &SimpleCommunicator, count: usize) -> Result<Self> {
+    pub fn new(communicator: &SimpleCommunicator, count: usize) -> Result<Self, Agreed> {
         let mut counts = vec![0_u64; communicator.size() as usize];
         communicator.all_gather_into(&(count as u64), &mut counts[..]);
         let counts: Vec<usize> = counts.into_iter().map(|count| count as usize).collect();
-        let (counts, starts) = mpi_counts(&counts)?;
+        let (counts, starts) = agree(communicator, mpi_counts(&counts))?;
         Ok(Self { counts, starts })
     }
 

@@ -1,7 +1,7 @@
 //! One process of a parallel run: MPI, PETSc, collective failure, and requests to stop.
 
 use crate::{
-    agreement::agree,
+    agreement::{Agreed, agree},
     error::{Error, Exit, Result},
     petsc::Petsc,
 };
@@ -79,9 +79,9 @@ impl Session<'_> {
         &self.petsc
     }
 
-    /// Makes a failure on any rank a failure on all: the lowest rank that failed keeps its error, the others get its
-    /// words. Collective; stands at the end of every phase in which ranks can fail, alone or alike.
-    pub fn agree<T>(&self, result: Result<T>) -> Result<T> {
+    /// Makes a failure on any rank the same failure on all. Collective; stands at the end of every phase in which ranks can fail,
+    /// alone or alike, and before everything that depends on whether they did.
+    pub fn agree<T, E: Into<Error>>(&self, result: Result<T, E>) -> Result<T, Agreed> {
         agree(&self.world, result)
     }
 

@@ -1,6 +1,11 @@
 //! Good jobs and meshes with random changes, through everything up to the first step, in this process.
 
-use clarke::{error::Error, job::Job, run, session::Mpi};
+use clarke::{
+    error::{Error, Exit},
+    job::Job,
+    run,
+    session::Mpi,
+};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::{cell::Cell, path::Path};
@@ -123,11 +128,12 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
         write(&changed(SQUARE, &of_mesh));
         match check(&changed(JOB, &of_job)) {
             Ok(()) => ready.set(ready.get() + 1),
-            Err(Error::Refused(words)) => {
+            Err(error) => {
+                let words = error.to_string();
+                prop_assert_eq!(Exit::from(error), Exit::Refused);
                 refused.set(refused.get() + 1);
                 prop_assert!(names_its_place(&words, folder.path()), "{}", words);
             }
-            Err(other) => prop_assert!(false, "{:?}", other),
         }
         Ok(())
     });

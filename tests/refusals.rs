@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clarke::error::Error;
+use clarke::error::Exit;
 use clarke::job::Job;
 
 fn refusals() -> Vec<PathBuf> {
@@ -25,7 +25,7 @@ fn differences(text: &str) -> Result<(), String> {
     let overrides: Vec<String> = header(text, "# set:").into_iter().map(str::to_owned).collect();
     let report = match Job::from_text(text, "job.toml", Path::new("."), &overrides) {
         Ok(_) => return Err("it is accepted".into()),
-        Err(Error::Refused(report)) => report,
+        Err(error) if Exit::from(error.clone()) == Exit::Refused => error.to_string(),
         Err(other) => return Err(format!("it is not refused but {other:?}")),
     };
     let mut faults: Vec<&str> = report.split("error: ").skip(1).collect();

@@ -1,7 +1,7 @@
 //! Any bytes as a job file: refused in words, or a job whose effective form loads as the same job.
 #![no_main]
 
-use clarke::{error::Error, job::Job};
+use clarke::{error::Exit, job::Job};
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 
@@ -18,7 +18,9 @@ fuzz_target!(|bytes: &[u8]| {
                 }
             }
         }
-        Err(Error::Refused(words)) => assert!(words.contains("job.toml"), "{words}"),
-        Err(other) => panic!("{other:?}"),
+        Err(error) => {
+            assert!(error.to_string().contains("job.toml"), "{error}");
+            assert_eq!(Exit::from(error), Exit::Refused);
+        }
     }
 });

@@ -2,7 +2,7 @@
 #![no_main]
 
 use clarke::{
-    error::Error,
+    error::Exit,
     mesh::{
         GlobalMesh,
         gmsh::{AnyMesh, parse},
@@ -13,8 +13,10 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| match parse(bytes) {
     Ok(AnyMesh::Two(mesh)) => check(&mesh),
     Ok(AnyMesh::Three(mesh)) => check(&mesh),
-    Err(Error::Refused(words)) => assert!(!words.is_empty()),
-    Err(other) => panic!("{other:?}"),
+    Err(error) => {
+        assert!(!error.to_string().is_empty());
+        assert_eq!(Exit::from(error), Exit::Refused);
+    }
 });
 
 fn check<const D: usize>(mesh: &GlobalMesh<D>) {

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::mesh::shape::facet_of;
 use crate::{
+    agreement::Agreed,
     error::Result,
     exchange::{exchange, gather},
     session::Session,
@@ -16,7 +17,7 @@ impl<const D: usize> Mesh<D> {
     ///
     /// Ranks find what holds together among their own cells and meet over facets at the owner of each facet's first node. What
     /// all ranks then know is one number for each such piece of a body.
-    pub fn bodies(&self, session: &Session) -> Result<Bodies> {
+    pub fn bodies(&self, session: &Session) -> Result<Bodies, Agreed> {
         let topology = session.agree(self.topology())?;
         let Bodies { count, mut of_cell } = topology.bodies();
         let first = session.share_start(count) as u32;
@@ -44,7 +45,7 @@ impl<const D: usize> Mesh<D> {
 }
 
 /// Pieces of bodies that share a facet, two and two: of those whose facets' first nodes this rank owns.
-fn meet<const D: usize>(session: &Session, records: &[Vec<u32>]) -> Result<Vec<u32>> {
+fn meet<const D: usize>(session: &Session, records: &[Vec<u32>]) -> Result<Vec<u32>, Agreed> {
     let counts: Vec<usize> = records.iter().map(Vec::len).collect();
     let (came, _) = exchange(session.world(), &records.concat(), &counts)?;
     let mut facets: Vec<&[u32]> = came.chunks_exact(D + 1).collect();

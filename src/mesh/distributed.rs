@@ -7,6 +7,7 @@ use super::{
     surface::Topology,
 };
 use crate::{
+    agreement::Agreed,
     error::{Error, Result},
     exchange::{exchange, gather},
     session::Session,
@@ -126,7 +127,7 @@ pub struct Names {
 impl<const D: usize> Mesh<D> {
     /// Puts the ranks' pieces together, whose nodes are owned by ranks: numbers the nodes, asks owners for the numbers of
     /// ghosts, and counts what the ranks have together. Collective, with the same outcome on all ranks.
-    pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self> {
+    pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self, Agreed> {
         let (rank, ranks, world) = (session.rank(), session.ranks(), session.world());
         let digest = session.total(piece.digest(rank, &names) as usize) as u64;
         let (owned, mut ghosts): (Vec<usize>, Vec<usize>) =
@@ -222,7 +223,7 @@ fn countable(nodes: usize, cells: usize) -> Result<()> {
 pub fn distribute<const D: usize>(
     session: &Session,
     whole: Option<(GlobalMesh<D>, Partition)>,
-) -> Result<Mesh<D>> {
+) -> Result<Mesh<D>, Agreed> {
     let world = session.world();
     let mut names = String::new();
     let piece = match whole {
@@ -240,7 +241,7 @@ pub fn distribute<const D: usize>(
     let mut bytes = names.into_bytes();
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
-    let names = decode(&String::from_utf8_lossy(&bytes))?;
+    let names = session.agree(decode(&String::from_utf8_lossy(&bytes)))?;
     Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names)? })
 }
 

@@ -3,6 +3,7 @@
 use super::Mesh;
 use super::skeleton::skeleton;
 use super::tags::place;
+use crate::agreement::Agreed;
 use crate::error::Result;
 use crate::session::Session;
 use crate::tensor::{Vector, add_scaled, dot, norm};
@@ -22,7 +23,7 @@ pub fn free_motions<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     held: &[[bool; D]],
-) -> Result<Vec<String>> {
+) -> Result<Vec<String>, Agreed> {
     Ok(skeleton(session, mesh, held)?.free_motions())
 }
 

@@ -7,6 +7,7 @@ use super::{
     surface::Bodies,
 };
 use crate::{
+    agreement::Agreed,
     error::Result,
     exchange::{exchange_lists, gather},
     session::Session,
@@ -19,7 +20,7 @@ pub(super) fn skeleton<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     held: &[[bool; D]],
-) -> Result<Skeleton<D>> {
+) -> Result<Skeleton<D>, Agreed> {
     let bodies = mesh.bodies(session)?;
     let nodes = nodes_of(mesh, &bodies);
     let mut skeleton = Skeleton { bodies: frames(session, mesh, &bodies, &nodes)?, ..Skeleton::default() };
@@ -74,7 +75,7 @@ fn frames<const D: usize>(
     mesh: &Mesh<D>,
     bodies: &Bodies,
     nodes: &[Vec<u32>],
-) -> Result<Vec<Body<D>>> {
+) -> Result<Vec<Body<D>>, Agreed> {
     let mut sums = vec![0.0; bodies.count * (D + 1)];
     for (cell, &body) in bodies.of_cell.iter().enumerate() {
         let of_cell = mesh.cell(cell);
@@ -105,7 +106,7 @@ fn joints<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     nodes: &[Vec<u32>],
-) -> Result<Vec<(u32, usize, Vector<D>)>> {
+) -> Result<Vec<(u32, usize, Vector<D>)>, Agreed> {
     let mut to_owners: Vec<Vec<u32>> = vec![Vec::new(); session.ranks()];
     for (body, nodes) in nodes.iter().enumerate() {
         for &node in nodes {

@@ -5,6 +5,7 @@ use super::{
     history::Totals,
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     effect::History,
     error::{Error, Exit, Result},
@@ -108,7 +109,7 @@ pub fn save<const D: usize, const S: usize>(
         };
         tables.extend(histories.iter().map(table));
     }
-    checkpoint_file::write(path, session.world(), &header, &sets, &tables)
+    Ok(checkpoint_file::write(path, session.world(), &header, &sets, &tables)?)
 }
 
 /// Puts a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
@@ -121,7 +122,7 @@ pub fn restore<const D: usize, const S: usize>(
     state: &mut State,
 ) -> Result<Header> {
     let checkpoint = Checkpoint::open(path, session.world()).map_err(damaged)?;
-    let header = check(path, checkpoint.header(), identity, body)?;
+    let header = session.agree(check(path, checkpoint.header(), identity, body))?;
     let nodes = owned_node_ids(body);
     let names = ["displacement", "velocity", "previous_velocity"].map(|name| (name, D));
     let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &names, &nodes)?;
@@ -160,8 +161,8 @@ pub fn restore<const D: usize, const S: usize>(
 }
 
 /// A file that can't be opened leaves the way to an older one open.
-fn damaged(error: Error) -> Error {
-    if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error }
+fn damaged(error: Agreed) -> Error {
+    if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error.into() }
 }
 
 fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {

@@ -14,7 +14,7 @@ use super::hyperslab::{Element, Rows};
 use super::parallel_file::ParallelFile;
 use super::redistribution::{Redistribution, are_whole, first_of_part};
 use super::seal;
-use crate::agreement::agree;
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
@@ -54,7 +54,7 @@ pub fn write(
     header: &[u8],
     sets: &[RowSet],
     tables: &[Table],
-) -> Result<()> {
+) -> Result<(), Agreed> {
     agree(communicator, check(path, sets, tables))?;
     let part = part_name(path);
     let written = write_part(&part, communicator, header, sets, tables);
@@ -79,7 +79,7 @@ fn write_part(
     header: &[u8],
     sets: &[RowSet],
     tables: &[Table],
-) -> Result<()> {
+) -> Result<(), Agreed> {
     let file = ParallelFile::create_behind(part, seal::SEAL_BYTES, communicator)?;
     let written = write_content(&file, communicator, header, sets, tables);
     let closed = file.close();
@@ -120,7 +120,7 @@ fn write_content(
     header: &[u8],
     sets: &[RowSet],
     tables: &[Table],
-) -> Result<()> {
+) -> Result<(), Agreed> {
     let rows = file.create_rows::<u8>("header", header.len() as u64, 1)?;
     rows.write(0, if communicator.rank() == 0 { header } else { &[] })?;
     file.set_number("header", "checksum", xxh3_64(header))?;
@@ -157,7 +157,7 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Checks that the file is whole, opens it and reads the header. Collective, with the same outcome on all ranks.
-    pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+    pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         seal::verify(path, seal::CHECKPOINT, communicator)?;
         let communicator = communicator.duplicate();
         let file = ParallelFile::open_readonly(path, &communicator)?;
@@ -176,7 +176,7 @@ impl Checkpoint {
     }
 
     /// The names of the tables of a set; none where there is no such set.
-    pub fn tables(&self, set: &str) -> Result<Vec<String>> {
+    pub fn tables(&self, set: &str) -> Result<Vec<String>, Agreed> {
         let group = format!("tables/{set}");
         if self.file.contains(&group) { self.file.names(&group) } else { Ok(Vec::new()) }
     }
@@ -190,7 +190,7 @@ impl Checkpoint {
         total: u64,
         tables: &[(&str, usize)],
         wanted: &[u64],
-    ) -> Result<Vec<Vec<f64>>> {
+    ) -> Result<Vec<Vec<f64>>, Agreed> {
         let (rank, size) = (self.communicator.rank() as usize, self.communicator.size() as usize);
         let first = first_of_part(total, rank, size);
         let rows = (first_of_part(total, rank + 1, size) - first) as usize;
@@ -202,13 +202,13 @@ impl Checkpoint {
             let expected: u64 = self.file.number(&path, "checksum")?;
             let found = table_checksum(&self.communicator, name, *width, &ids, &values);
             if found != expected {
-                return Err(damaged(&self.file, &path));
+                return agree(&self.communicator, Err(damaged(&self.file, &path)));
             }
             plan.apply(*width, &values)
         };
         tables.iter().map(read_table).collect()
     }
-    fn open_table<T: Element>(&self, name: &str, total: u64, width: usize) -> Result<Rows<'_, T>> {
+    fn open_table<T: Element>(&self, name: &str, total: u64, width: usize) -> Result<Rows<'_, T>, Agreed> {
         let refused = |what: String| {
             Error::Refused(format!(
                 "{}: {what}. The checkpoint belongs to another mesh or another set of effects: restart with the job that wrote it",
@@ -216,14 +216,13 @@ impl Checkpoint {
             ))
         };
         if !self.file.contains(name) {
-            return Err(refused(format!("dataset {name} is missing")));
+            return agree(&self.communicator, Err(refused(format!("dataset {name} is missing"))));
         }
         let rows = self.file.rows::<T>(name)?;
         if (rows.count(), rows.width()) != (total, width) {
             let (found, columns) = (rows.count(), rows.width());
-            return Err(refused(format!(
-                "dataset {name} is {found} x {columns}, the job needs {total} x {width}"
-            )));
+            let words = format!("dataset {name} is {found} x {columns}, the job needs {total} x {width}");
+            return agree(&self.communicator, Err(refused(words)));
         }
         Ok(rows)
     }

@@ -1,5 +1,6 @@
 //! The checkpoints of a run: `checkpoint-<step>.h5` in its output folder.
 
+use crate::agreement::pass;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -11,6 +12,7 @@ pub fn checkpoint_path(folder: &Path, step: u64) -> PathBuf {
 /// Steps and files of all checkpoints of a folder, the newest first; none where there is no such folder. Files under other
 /// names, half-written ones among them, do not count.
 pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
+    pass()?;
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -31,6 +33,7 @@ pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
 pub fn prune(folder: &Path, keep: usize) -> Result<()> {
     let old = list(folder)?.into_iter().skip(keep).map(|(_, path)| path);
     for path in old.chain(half_written(folder)?) {
+        pass()?;
         std::fs::remove_file(&path).map_err(|error| Error::unwritable(&path, error))?;
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! Tables that grow by rows and survive a restart; only rank 0 writes them.
 
+use crate::agreement::pass;
 use crate::error::{Error, Result};
 use std::{
     fmt::{self, Display, Formatter},
@@ -23,6 +24,7 @@ pub struct CsvFile {
 impl CsvFile {
     /// Starts an empty table.
     pub fn create(path: &Path, header: &str) -> Result<Self> {
+        pass()?;
         let mut file = File::create(path).map_err(|e| Error::unwritable(path, e))?;
         writeln!(file, "{header}").map_err(|e| Error::unwritable(path, e))?;
         Ok(Self { path: path.to_owned(), writer: BufWriter::new(file), flushed: Instant::now() })
@@ -31,6 +33,7 @@ impl CsvFile {
     /// Goes on with a table, keeping the rows whose first column is at most `last`; starts one where there is none or
     /// it has another header.
     pub fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
+        pass()?;
         let Ok(old) = File::open(path) else { return Self::create(path, header) };
         let mut lines = BufReader::new(old).lines();
         if !matches!(lines.next(), Some(Ok(first)) if first == header) {
@@ -55,12 +58,18 @@ impl CsvFile {
 
     /// Appends a row, its columns joined by commas.
     pub fn row(&mut self, row: fmt::Arguments<'_>) -> Result<()> {
+        pass()?;
         writeln!(self.writer, "{row}").map_err(|e| Error::unwritable(&self.path, e))?;
-        if self.flushed.elapsed() > FLUSH_EVERY { self.flush() } else { Ok(()) }
+        if self.flushed.elapsed() > FLUSH_EVERY { self.write_out() } else { Ok(()) }
     }
 
     /// Brings all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
+        pass()?;
+        self.write_out()
+    }
+
+    fn write_out(&mut self) -> Result<()> {
         self.flushed = Instant::now();
         self.writer.flush().map_err(|e| Error::unwritable(&self.path, e))
     }

@@ -6,6 +6,7 @@ use super::{
     log::Log,
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     effect::History,
     error::{Error, Result},
@@ -112,11 +113,11 @@ impl<const D: usize> FieldOutput<D> {
             let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });
         }
-        self.0.write_step(state.time, &fields)
+        Ok(self.0.write_step(state.time, &fields)?)
     }
 
     /// Closes the files. Collective.
-    pub fn close(self) -> Result<()> {
+    pub fn close(self) -> Result<(), Agreed> {
         self.0.close()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::parallel_file::ParallelFile;
 use super::redistribution::{Redistribution, first_of_part};
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives};
@@ -32,17 +33,18 @@ impl Slab {
         communicator: &impl Communicator,
         stored: &str,
         owned: &[u64],
-    ) -> Result<Self> {
+    ) -> Result<Self, Agreed> {
         let mut slab = Self::new(file, communicator, owned.len());
         let rows = file.rows::<i64>(stored)?;
         if rows.count() != slab.total {
-            return Err(Error::Refused(format!(
+            let fault = Error::Refused(format!(
                 "{}: {stored} has {} rows, the job's mesh {}: it belongs to another mesh. Restart with the job that wrote it \
                  or move the file away",
                 file.path().display(),
                 rows.count(),
                 slab.total
-            )));
+            ));
+            return agree(communicator, Err(fault));
         }
         let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
         slab.first = first_of_part(slab.total, rank, size);

@@ -25,7 +25,7 @@ use super::field_slab::Slab;
 use super::hyperslab::Element;
 use super::parallel_file::ParallelFile;
 use super::xdmf;
-use crate::agreement::agree;
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use crate::tensor::Vector;
 use mpi::topology::SimpleCommunicator;
@@ -73,7 +73,7 @@ impl<const D: usize> FieldFile<D> {
         communicator: &impl Communicator,
         mesh: FieldMesh<D>,
         compression: u8,
-    ) -> Result<Self> {
+    ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let sound =
             mesh.points.len() == mesh.point_ids.len() && mesh.cells.len() == (D + 1) * mesh.cell_ids.len();
@@ -100,7 +100,7 @@ impl<const D: usize> FieldFile<D> {
         mesh: FieldMesh<D>,
         time: f64,
         compression: u8,
-    ) -> Result<Self> {
+    ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let file = ParallelFile::open_append(&folder.join("fields.vtkhdf"), &communicator)?;
         let points = Slab::resume(&file, &communicator, "VTKHDF/PointData/node", mesh.point_ids)?;
@@ -130,7 +130,7 @@ impl<const D: usize> FieldFile<D> {
     }
 
     /// Appends a step at `time` (s), later than those before. All steps have the same fields.
-    pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<()> {
+    pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<(), Agreed> {
         agree(&self.communicator, self.check(time, fields))?;
         let step = self.times.len();
         if self.kinds.is_empty() {
@@ -161,7 +161,7 @@ impl<const D: usize> FieldFile<D> {
     }
 
     /// Closes the files.
-    pub fn close(self) -> Result<()> {
+    pub fn close(self) -> Result<(), Agreed> {
         self.file.close()
     }
 
@@ -207,7 +207,7 @@ impl<const D: usize> FieldFile<D> {
         Ok(())
     }
 
-    fn add_fields(&mut self, fields: &[Field]) -> Result<()> {
+    fn add_fields(&mut self, fields: &[Field]) -> Result<(), Agreed> {
         self.file.create_group("VTKHDF/Steps")?;
         self.file.create_group("VTKHDF/Steps/PointDataOffsets")?;
         self.file.create_group("VTKHDF/Steps/CellDataOffsets")?;
@@ -242,7 +242,7 @@ impl<const D: usize> FieldFile<D> {
         Ok(())
     }
 
-    fn append<T: Element>(&self, name: &str, step: usize, value: T) -> Result<()> {
+    fn append<T: Element>(&self, name: &str, step: usize, value: T) -> Result<(), Agreed> {
         let series = self.file.rows::<T>(name)?;
         series.resize(step as u64 + 1)?;
         let own = [value];
@@ -250,7 +250,7 @@ impl<const D: usize> FieldFile<D> {
     }
 
     /// Writes the file anew, or adds the last step to it if it has `grown` by that.
-    fn write_xdmf(&self, grown: bool) -> Result<()> {
+    fn write_xdmf(&self, grown: bool) -> Result<(), Agreed> {
         let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
         let written = match self.times.split_last() {
             _ if self.communicator.rank() != 0 => Ok(()),
@@ -269,7 +269,7 @@ fn write_mesh<const D: usize>(
     mesh: &FieldMesh<D>,
     [points, cells]: [&Slab; 2],
     level: u8,
-) -> Result<()> {
+) -> Result<(), Agreed> {
     for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
         file.create_group(group)?;
     }
@@ -309,7 +309,7 @@ fn write_mesh<const D: usize>(
     ranks.write(cells.first, &vec![communicator.rank(); cells.owned])
 }
 
-fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>> {
+fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>, Agreed> {
     let mut kinds = Vec::new();
     for name in file.names("Fields")? {
         let folder = format!("Fields/{name}");
@@ -328,7 +328,7 @@ fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>> {
 }
 
 /// Removes all steps from `steps` on.
-fn cut(file: &ParallelFile, kinds: &[FieldKind], steps: usize) -> Result<()> {
+fn cut(file: &ParallelFile, kinds: &[FieldKind], steps: usize) -> Result<(), Agreed> {
     file.set_number("VTKHDF/Steps", "NSteps", steps as i64)?;
     for kind in kinds {
         let folder = format!("Fields/{}", kind.name);

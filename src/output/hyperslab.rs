@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::parallel_file::ParallelFile;
+use crate::agreement::Agreed;
 use crate::error::Result;
 use hdf5::{Dataset, Datatype};
 use hdf5_sys::h5::{herr_t, hsize_t};
@@ -50,7 +51,7 @@ impl<'file, T: Element> Rows<'file, T> {
     }
 
     /// Grows or cuts a series to this many rows.
-    pub fn resize(&self, rows: u64) -> Result<()> {
+    pub fn resize(&self, rows: u64) -> Result<(), Agreed> {
         let rows = rows as usize;
         let done = if self.dataset.ndim() == 1 {
             self.dataset.resize(rows)
@@ -61,7 +62,7 @@ impl<'file, T: Element> Rows<'file, T> {
     }
 
     /// Writes this rank's rows from row `first` on; `values` holds whole rows, one after the other.
-    pub fn write(&self, first: u64, values: &[T]) -> Result<()> {
+    pub fn write(&self, first: u64, values: &[T]) -> Result<(), Agreed> {
         let rows = values.len() / self.width.max(1);
         let words = format!("write dataset {}", self.dataset.name());
         self.file.agreed(&words, self.fits(first, rows, values.len()))?;
@@ -77,7 +78,7 @@ impl<'file, T: Element> Rows<'file, T> {
     }
 
     /// Reads `rows` whole rows from row `first` on.
-    pub fn read(&self, first: u64, rows: usize) -> Result<Vec<T>> {
+    pub fn read(&self, first: u64, rows: usize) -> Result<Vec<T>, Agreed> {
         self.agreed("read", self.fits(first, rows, rows * self.width))?;
         let mut values = vec![T::default(); rows * self.width];
         self.transfer("read", rows, |offset, count, list| {
@@ -108,7 +109,7 @@ impl<'file, T: Element> Rows<'file, T> {
         doing: &str,
         rows: usize,
         mut move_piece: impl FnMut(usize, usize, hid_t) -> hdf5::Result<()>,
-    ) -> Result<()> {
+    ) -> Result<(), Agreed> {
         let row_bytes = (self.width * size_of::<T>()).max(1);
         let piece_rows = (self.file.transfer_bytes / row_bytes).max(1);
         let (own, mut pieces) = (rows.div_ceil(piece_rows) as u64, 0_u64);
@@ -151,7 +152,7 @@ impl<'file, T: Element> Rows<'file, T> {
         }
     }
 
-    fn agreed<R>(&self, doing: &str, result: hdf5::Result<R>) -> Result<R> {
+    fn agreed<R>(&self, doing: &str, result: hdf5::Result<R>) -> Result<R, Agreed> {
         let words = format!("{doing} dataset {}", self.dataset.name());
         if doing == "read" { self.file.agreed(&words, result) } else { self.file.written(&words, result) }
     }

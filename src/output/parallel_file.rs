@@ -15,7 +15,7 @@
 use super::hyperslab::{Element, Rows};
 use super::room;
 use super::stacked_view;
-use crate::agreement::agree;
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::types::{FixedAscii, TypeDescriptor};
@@ -56,13 +56,17 @@ pub struct ParallelFile {
 
 impl ParallelFile {
     /// Creates the file, replacing one of the same name.
-    pub fn create(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+    pub fn create(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         Self::create_behind(path, 0, communicator)
     }
 
     /// Creates the file with `reserved` bytes before the HDF5 content, for the owner of the format
     /// (HDF5's user block: 0 or a power of two from 512 on).
-    pub fn create_behind(path: &Path, reserved: u64, communicator: &impl Communicator) -> Result<Self> {
+    pub fn create_behind(
+        path: &Path,
+        reserved: u64,
+        communicator: &impl Communicator,
+    ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let lacks = room::lacks(path, room::TABLES, communicator.rank() == 0);
         agree(
@@ -78,7 +82,7 @@ impl ParallelFile {
     }
 
     /// Opens an existing file for reading.
-    pub fn open_readonly(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+    pub fn open_readonly(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let opened =
             hdf5::FileBuilder::new().with_fapl(|access| access.mpio(communicator.as_raw(), None)).open(path);
@@ -87,7 +91,7 @@ impl ParallelFile {
     }
 
     /// Opens an existing file for reading and writing.
-    pub fn open_append(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+    pub fn open_append(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let opened = hdf5::FileBuilder::new()
             .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
@@ -117,20 +121,20 @@ impl ParallelFile {
     }
 
     /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
-    pub(super) fn need_room(&self, bytes: u64) -> Result<()> {
+    pub(super) fn need_room(&self, bytes: u64) -> Result<(), Agreed> {
         let more = bytes.saturating_add(room::TABLES);
         let lacks = room::lacks(&self.path, more, self.communicator.rank() == 0);
         self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
     }
 
     /// Hands everything written so far to the operating system.
-    pub fn flush(&self) -> Result<()> {
+    pub fn flush(&self) -> Result<(), Agreed> {
         self.need_room(0)?;
         self.written("flush", self.file.flush())
     }
 
     /// Flushes and closes the file on all ranks; one that could not be written is given up.
-    pub fn close(self) -> Result<()> {
+    pub fn close(self) -> Result<(), Agreed> {
         if self.is_broken() {
             return Ok(());
         }
@@ -147,7 +151,7 @@ impl ParallelFile {
     }
 
     /// Makes a group; groups above it that are missing are made too.
-    pub fn create_group(&self, name: &str) -> Result<()> {
+    pub fn create_group(&self, name: &str) -> Result<(), Agreed> {
         self.written(&format!("make group {name}"), self.file.create_group(name).map(drop))
     }
 
@@ -161,7 +165,7 @@ impl ParallelFile {
     }
 
     /// The names in a group, in alphabetical order.
-    pub fn names(&self, group: &str) -> Result<Vec<String>> {
+    pub fn names(&self, group: &str) -> Result<Vec<String>, Agreed> {
         let found = self.file.group(group).and_then(|group| group.member_names());
         let mut names = self.agreed(&format!("list group {group}"), found)?;
         names.sort_unstable();
@@ -169,7 +173,7 @@ impl ParallelFile {
     }
 
     /// Removes a dataset or group from the file; its space is not given back.
-    pub fn remove(&self, name: &str) -> Result<()> {
+    pub fn remove(&self, name: &str) -> Result<(), Agreed> {
         self.written(&format!("remove {name}"), self.file.unlink(name))
     }
 
@@ -179,7 +183,12 @@ impl ParallelFile {
     }
 
     /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
-    pub fn create_rows<T: Element>(&self, name: &str, rows: u64, width: usize) -> Result<Rows<'_, T>> {
+    pub fn create_rows<T: Element>(
+        &self,
+        name: &str,
+        rows: u64,
+        width: usize,
+    ) -> Result<Rows<'_, T>, Agreed> {
         self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
         let rows = rows as usize;
         let empty = self.new_dataset::<T>().no_chunk();
@@ -197,7 +206,7 @@ impl ParallelFile {
         rows: u64,
         width: usize,
         level: u8,
-    ) -> Result<Rows<'_, T>> {
+    ) -> Result<Rows<'_, T>, Agreed> {
         if level == 0 {
             return self.create_rows(name, rows, width);
         }
@@ -221,7 +230,7 @@ impl ParallelFile {
         name: &str,
         width: usize,
         chunk_rows: usize,
-    ) -> Result<Rows<'_, T>> {
+    ) -> Result<Rows<'_, T>, Agreed> {
         self.need_room((chunk_rows * width * size_of::<T>()) as u64)?;
         let empty = self.new_dataset::<T>();
         let growing = Extent { dim: 0, max: None };
@@ -242,7 +251,7 @@ impl ParallelFile {
         name: &str,
         source: &str,
         shape: (usize, usize),
-    ) -> Result<()> {
+    ) -> Result<(), Agreed> {
         let whole = Selection::All;
         let made = self
             .file
@@ -262,13 +271,13 @@ impl ParallelFile {
         folder: &str,
         rows: usize,
         columns: &[usize],
-    ) -> Result<()> {
+    ) -> Result<(), Agreed> {
         let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
         self.written(&format!("make view {name}"), made)
     }
 
     /// Opens a dataset of one or two dimensions.
-    pub fn rows<T: Element>(&self, name: &str) -> Result<Rows<'_, T>> {
+    pub fn rows<T: Element>(&self, name: &str) -> Result<Rows<'_, T>, Agreed> {
         let opened = self.file.dataset(name).and_then(|dataset| {
             let stored = dataset.dtype()?.to_descriptor()?;
             if stored != T::type_descriptor() {
@@ -285,7 +294,7 @@ impl ParallelFile {
     }
 
     /// Sets an attribute of a group or dataset to one number.
-    pub fn set_number<T: Element>(&self, object: &str, name: &str, value: T) -> Result<()> {
+    pub fn set_number<T: Element>(&self, object: &str, name: &str, value: T) -> Result<(), Agreed> {
         let done = self.object(object).and_then(|object| match object.attr(name) {
             Ok(attribute) => attribute.write_scalar(&value),
             Err(_) => object.new_attr::<T>().create(name)?.write_scalar(&value),
@@ -294,7 +303,7 @@ impl ParallelFile {
     }
 
     /// Adds an attribute that is a list of numbers.
-    pub fn set_numbers<T: Element>(&self, object: &str, name: &str, values: &[T]) -> Result<()> {
+    pub fn set_numbers<T: Element>(&self, object: &str, name: &str, values: &[T]) -> Result<(), Agreed> {
         let done = self
             .object(object)
             .and_then(|object| object.new_attr::<T>().shape(values.len()).create(name)?.write_raw(values));
@@ -302,7 +311,7 @@ impl ParallelFile {
     }
 
     /// Adds an attribute that is a fixed-length ASCII text of at most 256 bytes.
-    pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<()> {
+    pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<(), Agreed> {
         let done = self.object(object).and_then(|object| {
             let value = FixedAscii::<LONGEST_TEXT>::from_ascii(text).map_err(|error| error.to_string())?;
             let kind = TypeDescriptor::FixedAscii(text.len().max(1));
@@ -312,13 +321,13 @@ impl ParallelFile {
     }
 
     /// An attribute that is one number.
-    pub fn number<T: Element>(&self, object: &str, name: &str) -> Result<T> {
+    pub fn number<T: Element>(&self, object: &str, name: &str) -> Result<T, Agreed> {
         let found = self.object(object).and_then(|object| object.attr(name)?.read_scalar());
         self.agreed(&format!("read attribute {name} of {object}"), found)
     }
 
     /// An attribute that is a fixed-length text.
-    pub fn text(&self, object: &str, name: &str) -> Result<String> {
+    pub fn text(&self, object: &str, name: &str) -> Result<String, Agreed> {
         let found = self
             .object(object)
             .and_then(|object| object.attr(name)?.read_scalar::<FixedAscii<LONGEST_TEXT>>());
@@ -333,23 +342,18 @@ impl ParallelFile {
     }
 
     /// As `agreed`, of something that writes: after a failure the file is given up.
-    pub(super) fn written<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T> {
-        let outcome = self.agreed(doing, result);
-        outcome.map_err(|error| {
-            if !self.broken.replace(true) {
-                // One more reference, never given back, keeps HDF5 from closing the file.
-                std::mem::forget(self.file.clone());
-                GIVEN_UP.store(true, Ordering::Relaxed);
-            }
-            match error {
-                Error::Failed(words) => Error::Failed(format!("{words}. {ROOM}")),
-                other => other,
-            }
-        })
+    pub(super) fn written<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
+        let outcome = self.agreed(doing, result.map_err(|error| format!("{error}. {ROOM}").into()));
+        if outcome.is_err() && !self.broken.replace(true) {
+            // One more reference, never given back, keeps HDF5 from closing the file.
+            std::mem::forget(self.file.clone());
+            GIVEN_UP.store(true, Ordering::Relaxed);
+        }
+        outcome
     }
 
     /// The same outcome on all ranks, with words about what was being done.
-    pub(super) fn agreed<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T> {
+    pub(super) fn agreed<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
         let explain = |error| Error::Failed(format!("{}: cannot {doing}: {error}", self.path.display()));
         agree(&self.communicator, result.map_err(explain))
     }

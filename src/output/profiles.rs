@@ -2,6 +2,7 @@
 
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
+    agreement::Agreed,
     body::Body,
     contact::NodeContext,
     error::Result,
@@ -82,16 +83,20 @@ impl<const D: usize> Profiles<D> {
         body: &Body<D, S>,
         state: &State,
         stress: &[Mandel<S>],
-    ) -> Result<()> {
+    ) -> Result<(), Agreed> {
         let width = if self.with_friction { 2 * D + 3 } else { D + 3 };
         for profile in &self.profiles {
-            let rows = gather(session, &profile.rows(body, state, stress, self.with_friction)?);
-            let Some(file) = &mut self.file else { continue };
-            let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
-            rows.sort_by(|a, b| compare(a, b));
-            for row in rows {
-                file.row(format_args!("{},{},{}", Number(state.time), profile.name, Numbers(row)))?;
-            }
+            let rows = session.agree(profile.rows(body, state, stress, self.with_friction))?;
+            let rows = gather(session, &rows);
+            let written = self.file.as_mut().map_or(Ok(()), |file| {
+                let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
+                rows.sort_by(|a, b| compare(a, b));
+                let mut row = |row: &[f64]| {
+                    file.row(format_args!("{},{},{}", Number(state.time), profile.name, Numbers(row)))
+                };
+                rows.into_iter().try_for_each(&mut row)
+            });
+            session.agree(written)?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 //!
 //! A directory of all ids is spread over the ranks in equal blocks, so that no rank ever knows more than its share.
 
-use crate::agreement::agree;
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use crate::exchange::{exchange, offsets};
 use mpi::collective::SystemOperation;
@@ -23,7 +23,12 @@ impl Redistribution {
     ///
     /// Over all ranks each id must be held exactly once; it may be wanted any number of times. Collective, with the
     /// same outcome on all ranks.
-    pub fn new(communicator: &impl Communicator, total: u64, held: &[u64], wanted: &[u64]) -> Result<Self> {
+    pub fn new(
+        communicator: &impl Communicator,
+        total: u64,
+        held: &[u64],
+        wanted: &[u64],
+    ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
         let within = |ids: &[u64]| match ids.iter().find(|id| **id >= total) {
             Some(id) => Err(Error::Refused(format!("id {id} found, but there are only {total} rows"))),
@@ -43,7 +48,7 @@ impl Redistribution {
 
     /// The wanted rows, in the order they were asked for, of a table with `width` numbers a row of which this rank
     /// holds `values`. Collective, with the same outcome on all ranks.
-    pub fn apply(&self, width: usize, values: &[f64]) -> Result<Vec<f64>> {
+    pub fn apply(&self, width: usize, values: &[f64]) -> Result<Vec<f64>, Agreed> {
         let mut packed = Vec::with_capacity(self.send_rows.len() * width);
         for row in &self.send_rows {
             packed.extend_from_slice(&values[row * width..(row + 1) * width]);
@@ -91,7 +96,7 @@ struct Directory {
 }
 
 impl Directory {
-    fn new(communicator: &SimpleCommunicator, total: u64, held: &[u64]) -> Result<Self> {
+    fn new(communicator: &SimpleCommunicator, total: u64, held: &[u64]) -> Result<Self, Agreed> {
         const NOBODY: [u64; 2] = [u64::MAX; 2];
         let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
         let grouped = Grouped::new(size, held.iter().map(|id| part_of(total, *id, size)));
@@ -118,7 +123,7 @@ impl Directory {
     }
 
     /// Rank and row that hold each of these ids.
-    fn look_up(&self, communicator: &SimpleCommunicator, ids: &[u64]) -> Result<Vec<[u64; 2]>> {
+    fn look_up(&self, communicator: &SimpleCommunicator, ids: &[u64]) -> Result<Vec<[u64; 2]>, Agreed> {
         let size = communicator.size() as usize;
         let grouped = Grouped::new(size, ids.iter().map(|id| part_of(self.total, *id, size)));
         let questions: Vec<u64> = grouped.order.iter().map(|position| ids[*position]).collect();

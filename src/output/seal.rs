@@ -16,7 +16,7 @@
 //! the blocks.
 
 use super::redistribution::first_of_part;
-use crate::agreement::agree;
+use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives};
@@ -54,7 +54,7 @@ const BLOCK_BYTES: u64 = 1 << 20;
 
 /// Seals a closed file whose first [`SEAL_BYTES`] are free, and makes sure that it is on the disk. Collective, with
 /// the same outcome on all ranks.
-pub fn seal(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<()> {
+pub fn seal(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<(), Agreed> {
     let length = std::fs::metadata(path).map(|status| status.len());
     let length = agree(communicator, length.map_err(|error| Error::unwritable(path, error)))?;
     let digest = shared_digest(path, length, communicator)?;
@@ -63,9 +63,10 @@ pub fn seal(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result
 }
 
 /// Checks the seal and every byte behind it. Collective, with the same outcome on all ranks.
-pub fn verify(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<()> {
+pub fn verify(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<(), Agreed> {
     let (length, expected) = agree(communicator, read_seal(path, kind))?;
-    compare(path, kind, shared_digest(path, length, communicator)?, expected)
+    let found = shared_digest(path, length, communicator)?;
+    agree(communicator, compare(path, kind, found, expected))
 }
 
 /// Checks the seal and every byte behind it, in this process alone.
@@ -157,7 +158,7 @@ fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     Ok((length, number(32)))
 }
 
-fn shared_digest(path: &Path, length: u64, communicator: &impl Communicator) -> Result<u64> {
+fn shared_digest(path: &Path, length: u64, communicator: &impl Communicator) -> Result<u64, Agreed> {
     let (part, parts) = (communicator.rank() as usize, communicator.size() as usize);
     let own = digest_part(path, length, part, parts).map_err(|error| Error::unreadable(path, error));
     let own = agree(communicator, own)?;

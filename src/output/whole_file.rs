@@ -1,10 +1,12 @@
 //! Small files that are there whole or not at all.
 
+use crate::agreement::pass;
 use crate::error::{Error, Result};
 use std::path::Path;
 
 /// Writes the text to a file; one of this name stays as it is until the new one is whole. On one rank.
 pub fn write_whole(path: &Path, text: &str) -> Result<()> {
+    pass()?;
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));

@@ -2,7 +2,7 @@
 
 use super::{Header, MESH, TABLES};
 use crate::{
-    agreement::agree,
+    agreement::{Agreed, agree},
     error::{Error, Result},
     mesh::{GlobalMesh, Mesh, piece::Piece},
     output::{hyperslab::Element, parallel_file::ParallelFile, redistribution::first_of_part, seal},
@@ -23,7 +23,7 @@ pub struct PartitionedFile {
 
 impl PartitionedFile {
     /// Checks that the file is whole, opens it and reads what all ranks need. Collective, with the same outcome on all ranks.
-    pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self> {
+    pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error));
         if !agree(communicator, facts)?.is_file() {
             return agree(communicator, Err(Error::unreadable(path, "it is not a file")));
@@ -43,7 +43,7 @@ impl PartitionedFile {
     }
 
     /// This rank's part: the parts of the file are shared out in runs. Collective, with the same outcome on all ranks.
-    pub fn mesh<const D: usize>(&self, session: &Session) -> Result<Mesh<D>> {
+    pub fn mesh<const D: usize>(&self, session: &Session) -> Result<Mesh<D>, Agreed> {
         let (parts, rank, ranks) = (self.header.parts, session.rank(), session.ranks());
         if parts < ranks {
             return session.agree(Err(Error::Refused(format!(
@@ -75,7 +75,7 @@ impl PartitionedFile {
     }
 
     /// Consecutive parts as one; owners are parts. Collective, with the same outcome on all ranks.
-    fn piece<const D: usize>(&self, parts: Range<usize>) -> Result<Piece<D>> {
+    fn piece<const D: usize>(&self, parts: Range<usize>) -> Result<Piece<D>, Agreed> {
         let ids = self.table::<u32>("nodes/id", 1, &parts)?;
         let owners = self.table::<u32>("nodes/owner", 1, &parts)?;
         let places = self.table::<f64>("nodes/place", D, &parts)?;
@@ -119,7 +119,7 @@ impl PartitionedFile {
     }
 
     /// The rows of consecutive parts in a table.
-    fn table<T: Element>(&self, name: &str, width: usize, parts: &Range<usize>) -> Result<Vec<T>> {
+    fn table<T: Element>(&self, name: &str, width: usize, parts: &Range<usize>) -> Result<Vec<T>, Agreed> {
         let group = name.split('/').next().unwrap_or(name);
         let at = TABLES.iter().position(|table| *table == group).unwrap_or(0);
         let rows = |parts: &[[u64; 4]]| parts.iter().try_fold(0_u64, |sum, count| sum.checked_add(count[at]));
@@ -135,7 +135,7 @@ impl PartitionedFile {
 }
 
 /// A table that every rank reads whole.
-fn all_rows<T: Element>(file: &ParallelFile, name: &str) -> Result<Vec<T>> {
+fn all_rows<T: Element>(file: &ParallelFile, name: &str) -> Result<Vec<T>, Agreed> {
     let rows = file.rows::<T>(name)?;
     rows.read(0, rows.count() as usize)
 }

@@ -2,6 +2,7 @@
 
 use super::{Header, MESH, TABLES};
 use crate::{
+    agreement::Agreed,
     error::{Error, Result},
     mesh::{
         GlobalMesh,
@@ -62,7 +63,7 @@ fn write_sealed<const D: usize>(
     let file = ParallelFile::create_behind(path, seal::SEAL_BYTES, alone)?;
     let written = write_tables(&file, &header, &pieces);
     let closed = file.close();
-    written.and(closed)?;
+    written.and(closed.map_err(Error::from))?;
     seal::seal(path, MESH, alone)?;
     Ok(header)
 }
@@ -85,7 +86,7 @@ fn write_tables<const D: usize>(file: &ParallelFile, header: &Header, pieces: &[
     table(file, "facets/id", 1, pieces, |piece| piece.facet_ids.as_slice().into())?;
     table(file, "facets/cell", 1, pieces, |piece| piece.facet_cells.as_slice().into())?;
     table(file, "facets/nodes", D, pieces, |piece| piece.facets.as_flattened().into())?;
-    table(file, "named", 2, pieces, |piece| piece.named.as_flattened().into())
+    Ok(table(file, "named", 2, pieces, |piece| piece.named.as_flattened().into())?)
 }
 
 /// A table with rows of all pieces, one after the other.
@@ -95,7 +96,7 @@ fn table<'a, T: Element, const D: usize>(
     width: usize,
     pieces: &'a [Piece<D>],
     rows: impl Fn(&'a Piece<D>) -> std::borrow::Cow<'a, [T]>,
-) -> Result<()> {
+) -> Result<(), Agreed> {
     let all: Vec<T> = pieces.iter().flat_map(|piece| rows(piece).into_owned()).collect();
     file.create_rows::<T>(name, (all.len() / width) as u64, width)?.write(0, &all)
 }

@@ -16,8 +16,11 @@ pub struct BlockRows {
 }
 
 impl BlockRows {
-    /// Fails unless these are rows of a matrix of so many block columns.
-    pub(super) fn check(&self, block: usize, block_columns: usize) -> Result<()> {
+    /// Fails unless these are rows of a matrix of so many block columns that PETSc can count. Ranks have to agree on the outcome
+    /// before they make a matrix.
+    pub fn check(&self, block: usize, block_columns: usize) -> Result<()> {
+        index(block_columns * block, "unknowns")?;
+        index(self.columns.len() * block * block, "matrix entries of a rank")?;
         let starts = self.offsets.first() == Some(&0) && self.offsets.is_sorted();
         let sizes = self.offsets.last() == Some(&self.columns.len())
             && self.values.len() == self.columns.len() * block * block;

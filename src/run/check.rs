@@ -9,6 +9,7 @@ use super::{
     time_loop::steps_between,
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     certificate::Certificates,
     error::{Error, Result},
@@ -70,11 +71,11 @@ pub(super) fn check<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
     mesh: Mesh<D>,
-) -> Result<Report> {
+) -> Result<Report, Agreed> {
     let quality = mesh.quality_summary(session);
-    let ready = setup::<D, S>(session, loaded, mesh)?;
+    let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
-    report(session, loaded, &ready, quality)
+    session.agree(report(session, loaded, &ready, quality))
 }
 
 /// Evaluates the loads at the first and the last step: what is not finite there would end the run.

@@ -1,6 +1,7 @@
 //! A mesh held against its job, by all ranks together.
 
 use crate::{
+    agreement::Agreed,
     error::Result,
     job::{self, Job, Loaded, Material, MeshNames},
     mesh::{Mesh, rigid::free_motions},
@@ -8,7 +9,11 @@ use crate::{
 };
 
 /// Refuses a mesh without what the job speaks of, and one on which it makes no sense; warns of bad cells. Collective.
-pub(super) fn hold<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &mut Loaded) -> Result<()> {
+pub(super) fn hold<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    loaded: &mut Loaded,
+) -> Result<(), Agreed> {
     let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
     let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
     let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions };
@@ -26,7 +31,7 @@ pub(super) fn hold<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &m
     Ok(())
 }
 
-fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
+fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loaded) -> Result<(), Agreed> {
     let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
     let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
     let claims = mesh.claimed_twice(&supports, &contacts);
@@ -43,7 +48,7 @@ pub(super) fn refuse_free_bodies<const D: usize>(
     mesh: &Mesh<D>,
     fixed: &[bool],
     loaded: &Loaded,
-) -> Result<()> {
+) -> Result<(), Agreed> {
     let has_mass: Vec<bool> =
         mesh.regions.iter().map(|region| material_of(&loaded.job, region).density.is_some()).collect();
     if has_mass.iter().all(|&has| has) {

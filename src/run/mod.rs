@@ -26,6 +26,7 @@ pub use simulation::Simulation;
 pub use summary::Summary;
 
 use crate::{
+    agreement::Agreed,
     error::{Exit, Result},
     job::{self, Loaded},
     session::Session,
@@ -84,11 +85,11 @@ macro_rules! on_the_mesh {
 }
 
 /// Runs a job to its end or to a request to stop. Collective.
-pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit> {
+pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit, Agreed> {
     on_the_mesh!(session, loaded, time_loop::run, start, clock)
 }
 
 /// Everything but the run: sets a job up as a run does and tells what it would be; writes no file. Collective.
-pub fn check(session: &Session, loaded: Loaded) -> Result<Report> {
+pub fn check(session: &Session, loaded: Loaded) -> Result<Report, Agreed> {
     on_the_mesh!(session, loaded, check::check)
 }

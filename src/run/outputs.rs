@@ -1,6 +1,7 @@
 //! All files of a run, opened for a start or to go on.
 
 use crate::{
+    agreement::Agreed,
     body::Body,
     error::Result,
     job::{Every, Job},
@@ -150,7 +151,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let indicated = self.indicated(session, body, &stress)?;
         self.fields.write(body, state, &stress, indicated.as_ref().map(|indicated| &indicated.cells[..]))?;
         if !self.profiles.is_empty() {
-            session.agree(self.profiles.write(session, body, state, &stress))?;
+            self.profiles.write(session, body, state, &stress)?;
         }
         Ok(())
     }
@@ -200,7 +201,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Closes the field files. Collective.
-    pub fn close(self) -> Result<()> {
+    pub fn close(self) -> Result<(), Agreed> {
         self.fields.close()
     }
 }

@@ -2,17 +2,19 @@
 
 use super::Start;
 use crate::{
+    agreement::Agreed,
     body::Body,
     error::{Error, Exit, Result},
     output::{
         checkpoint::{self, Identity},
-        checkpoint_folder::list,
+        checkpoint_folder::{checkpoint_path, list},
         history::Totals,
     },
     session::Session,
     state::State,
 };
-use std::path::Path;
+use mpi::traits::{Communicator, Root};
+use std::path::{Path, PathBuf};
 
 /// Where a restarted run comes from.
 pub(super) struct Restored {
@@ -30,15 +32,15 @@ pub(super) fn restore<const D: usize, const S: usize>(
     identity: &Identity,
     body: &mut Body<D, S>,
     state: &mut State,
-) -> Result<Option<Restored>> {
+) -> Result<Option<Restored>, Agreed> {
     let candidates = match start {
         Start::Anew | Start::Over => return Ok(None),
         Start::From(path) => vec![path.clone()],
-        Start::Newest => session.agree(list(folder))?.into_iter().map(|(_, path)| path).collect(),
+        Start::Newest => newest(session, folder)?,
     };
     let mut faults = Vec::new();
     for path in &candidates {
-        match checkpoint::restore(session, path, identity, body, state) {
+        match session.agree(checkpoint::restore(session, path, identity, body, state)) {
             Ok(header) => {
                 let file = path.display().to_string();
                 let mut words: Vec<String> = faults.iter().map(|fault| format!("warning: {fault}")).collect();
@@ -49,9 +51,21 @@ pub(super) fn restore<const D: usize, const S: usize>(
             Err(error) => faults.push(error.to_string()),
         }
     }
-    Err(Error::Refused(if faults.is_empty() {
+    session.agree(Err(Error::Refused(if faults.is_empty() {
         format!("{}: no checkpoint to go on from; run without --restart", folder.display())
     } else {
         format!("no good checkpoint to go on from; run without --restart\n{}", faults.join("\n"))
-    }))
+    })))
+}
+
+/// The checkpoints of a folder as rank 0 finds them, the newest first: what a rank sees of a shared folder may be old. Collective.
+fn newest(session: &Session, folder: &Path) -> Result<Vec<PathBuf>, Agreed> {
+    let found = if session.is_first() { list(folder) } else { Ok(Vec::new()) };
+    let found = session.agree(found)?;
+    let mut count = found.len() as u64;
+    session.world().process_at_rank(0).broadcast_into(&mut count);
+    let mut steps: Vec<u64> = found.into_iter().map(|(step, _)| step).collect();
+    steps.resize(count as usize, 0);
+    session.world().process_at_rank(0).broadcast_into(&mut steps[..]);
+    Ok(steps.into_iter().map(|step| checkpoint_path(folder, step)).collect())
 }

@@ -2,7 +2,8 @@
 
 use super::hold::hold;
 use crate::{
-    error::Result,
+    agreement::Agreed,
+    error::{Error, Result},
     job::{self, Loaded, Partition},
     mesh::{
         GlobalMesh, Mesh, distribute,
@@ -30,7 +31,7 @@ pub enum Scene {
 
 impl Scene {
     /// The mesh of a job, held against it; the job's warnings grow by those of the mesh. Collective.
-    pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self> {
+    pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self, Agreed> {
         let scene = match &loaded.job.mesh {
             job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
             job::Mesh::Box(of) => generated(session, cuboid(of), of.partition).map(Self::Three)?,
@@ -45,10 +46,13 @@ impl Scene {
 }
 
 /// Splits a mesh that is whole on rank 0 (`None` elsewhere) and hands the parts out. Collective.
-pub(super) fn split<const D: usize>(session: &Session, whole: Option<GlobalMesh<D>>) -> Result<Mesh<D>> {
+pub(super) fn split<const D: usize>(
+    session: &Session,
+    whole: Option<GlobalMesh<D>>,
+) -> Result<Mesh<D>, Agreed> {
     let split = |mesh: GlobalMesh<D>| {
         let parts = divide(&mesh, session.ranks(), Method::KWay)?;
-        Ok((mesh, parts))
+        Ok::<_, Error>((mesh, parts))
     };
     distribute(session, session.agree(whole.map(split).transpose())?)
 }
@@ -57,7 +61,7 @@ fn generated<const D: usize, G: Grid<D>>(
     session: &Session,
     grid: Result<G>,
     partition: Partition,
-) -> Result<Mesh<D>> {
+) -> Result<Mesh<D>, Agreed> {
     let grid = session.agree(grid)?;
     let large = grid.counts()[1].is_none_or(|cells| cells > MOST_CELLS_ON_ONE_RANK);
     if partition == Partition::Grid || (partition == Partition::Auto && large) {
@@ -68,7 +72,7 @@ fn generated<const D: usize, G: Grid<D>>(
     split(session, session.agree(whole)?)
 }
 
-fn from_file(session: &Session, path: &Path) -> Result<Scene> {
+fn from_file(session: &Session, path: &Path) -> Result<Scene, Agreed> {
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
     session.world().process_at_rank(0).broadcast_into(&mut in_parts);
     if in_parts {

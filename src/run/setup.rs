@@ -4,7 +4,7 @@ use super::{build, hold::refuse_free_bodies};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},
-    error::{Error, Result},
+    error::{Exit, Result},
     job::{Accept, Job, Loaded},
     mesh::Mesh,
     output::probes::Probes,
@@ -39,25 +39,24 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body.mesh, &body.fixed, loaded)?;
     let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
-    let scheme = scheme.map_err(|error| match error {
-        Error::Internal(words) if !job.solver.petsc.is_empty() => loaded.fault(
+    let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
+        Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",
-            words,
+            error.to_string(),
             "PETSc can't use these options: correct them or leave them out",
         ),
-        other => other,
-    });
-    let mut scheme = session.agree(scheme)?;
+        _ => error.into(),
+    })?;
     let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
-    let prepared = scheme.prepare_length(session, &mut body, longest).map_err(|error| match error {
-        Error::Internal(words) => loaded.fault(
+    let prepared = scheme.prepare_length(session, &mut body, longest);
+    session.agree(prepared).map_err(|error| match error.exit() {
+        Exit::Internal => loaded.fault(
             "material",
-            format!("the equations of a step can't be solved: {words}"),
+            format!("the equations of a step can't be solved: {error}"),
             "see whether density and viscosity, in SI units, are of sensible size for this mesh and step",
         ),
-        other => other,
-    });
-    session.agree(prepared)?;
+        _ => error.into(),
+    })?;
     let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme, longest))?;
     let unique_step = if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?

@@ -13,6 +13,7 @@ use super::{
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     certificate::Certificates,
     error::{Error, Exit, Result},
@@ -47,30 +48,29 @@ pub(super) fn run<const D: usize, const S: usize>(
     mesh: Mesh<D>,
     start: &Start,
     clock: Clock,
-) -> Result<Exit> {
+) -> Result<Exit, Agreed> {
     let job = &loaded.job;
     session.agree(if session.is_first() { refuse_foreign(job, start) } else { Ok(()) })?;
-    let mut ready = setup::<D, S>(session, loaded, mesh)?;
+    let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let folder = job.output_folder();
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     session.agree(claim_folder(folder, &mut log))?;
-    let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state);
-    let restored = session.agree(restored)?;
+    let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state)?;
     session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {
         restored.words.iter().for_each(|words| log.line(words));
     }
-    super::header::lines(session, loaded, &ready)?.iter().for_each(|line| log.line(line));
+    session.agree(super::header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = match &restored {
         Some(restored) => restored.totals,
-        None => totals_at_start(session, &body, &state)?,
+        None => session.agree(totals_at_start(session, &body, &state))?,
     };
     let wanted = Wanted { identity, probes, goes_on };
-    let mut outputs = Outputs::open(session, job, wanted, &body, &state, &mut log)?;
-    outputs.at_start(session, &body, &state)?;
+    let mut outputs = session.agree(Outputs::open(session, job, wanted, &body, &state, &mut log))?;
+    session.agree(outputs.at_start(session, &body, &state))?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
     let mut adaptive = build::adaptive(job);
@@ -140,7 +140,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let outcome = self.take_step(length, end).map_err(|error| self.explain(error))?;
+            let outcome = self.take_step(length, end).or_else(|error| self.explain(error))?;
             self.totals.add(&outcome);
             watch_slip(self.session, &self.body, &self.state, &mut self.totals)?;
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
@@ -164,11 +164,11 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 
     /// Takes a step of the job's length, or of an adapted one that lands on the next output time. Collective.
-    fn take_step(&mut self, length: f64, end: f64) -> Result<StepOutcome> {
+    fn take_step(&mut self, length: f64, end: f64) -> Result<StepOutcome, Agreed> {
         let (body, state) = (&mut self.body, &mut self.state);
         let Some(adaptive) = &mut self.adaptive else {
             let step = next_step(state, length, end);
-            return self.scheme.advance(self.session, body, state, step);
+            return self.session.agree(self.scheme.advance(self.session, body, state, step));
         };
         let target = match self.job.output.fields {
             Some(Every::Interval(interval)) => {
@@ -182,13 +182,13 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 
     /// Adds what the certificates say to the words of a step that failed.
-    fn explain(&self, error: Error) -> Error {
-        match (error, self.certificates.theta_step) {
-            (Error::Failed(words), Some(theta)) if theta >= 1.0 => Error::Failed(format!(
-                "{words}; theta of a step = {theta:.3e} is not below 1, which the job accepts: a step may have several \
+    fn explain<T>(&self, error: Agreed) -> Result<T> {
+        match self.certificates.theta_step {
+            Some(theta) if theta >= 1.0 && error.is_failure() => Err(Error::Failed(format!(
+                "{error}; theta of a step = {theta:.3e} is not below 1, which the job accepts: a step may have several \
                  solutions, and none that goes on from the step before"
-            )),
-            (error, _) => error,
+            ))),
+            _ => Err(error.into()),
         }
     }
 
@@ -271,7 +271,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     }
 
     /// Writes the last files and the summary; gives the exit code or the first error. Collective.
-    fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit> {
+    fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit, Agreed> {
         self.log.end_progress();
         let mut result = match self.session.agree(ended) {
             Ok(Ended::Completed) => Ok(Exit::Done),
@@ -287,10 +287,12 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             );
         } else if result != Ok(Exit::Done) || self.job.checkpoint.is_some() {
             let saved = self.save();
+            let saved = self.session.agree(saved);
             self.keep_first(&mut result, saved);
         }
         if result != Ok(Exit::Stopped) {
             let written = self.outputs.at_end(self.session, &self.body, &self.state);
+            let written = self.session.agree(written);
             self.keep_first(&mut result, written);
         }
         let (status, error) = match &result {
@@ -298,20 +300,22 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             Ok(_) => ("stopped", None),
             Err(error) => ("failed", Some(error.to_string())),
         };
-        let summary = self.summary(status, error, restarted_from)?;
-        let mut written = Ok(());
-        if self.session.is_first() {
-            super::header::closing(&mut self.log, &summary, self.job.output_folder());
-            written = summary.write(self.job.output_folder());
-        }
-        let written = self.session.agree(written);
+        let summary = self.summary(status, error, restarted_from);
+        let written = self.session.agree(summary).and_then(|summary| {
+            let mut written = Ok(());
+            if self.session.is_first() {
+                super::header::closing(&mut self.log, &summary, self.job.output_folder());
+                written = summary.write(self.job.output_folder());
+            }
+            self.session.agree(written)
+        });
         self.keep_first(&mut result, written);
-        let closed = self.outputs.close();
+        let closed = self.session.agree(self.outputs.close());
         result.and_then(|exit| closed.map(|()| exit))
     }
 
     /// A later error is logged, not lost, and does not hide the first.
-    fn keep_first<T>(&mut self, result: &mut Result<Exit>, later: Result<T>) {
+    fn keep_first<T>(&mut self, result: &mut Result<Exit, Agreed>, later: Result<T, Agreed>) {
         let Err(error) = later else { return };
         match result {
             Ok(_) => *result = Err(error),

@@ -1,7 +1,10 @@
 //! Assembly of the constant matrix from cell matrices into the rows each rank owns.
 
 use super::{Geometry, Simplex};
-use crate::{error::Result, exchange::exchange_lists, mesh::Mesh, petsc::BlockRows, session::Session};
+use crate::{
+    agreement::Agreed, error::Result, exchange::exchange_lists, mesh::Mesh, petsc::BlockRows,
+    session::Session,
+};
 
 /// Blocks `[a][b][i][j]` coupling component `i` of local node `a` with component `j` of local node `b`.
 pub struct CellMatrix<const D: usize> {
@@ -55,7 +58,7 @@ pub fn assemble<const D: usize>(
     geometry: &Geometry<D>,
     fixed: &[bool],
     mut fill: impl FnMut(usize, &Simplex<D>, &mut CellMatrix<D>),
-) -> Result<BlockRows> {
+) -> Result<BlockRows, Agreed> {
     let mut rows = LocalRows::pattern(mesh);
     for (number, cell) in geometry.iter().enumerate() {
         let mut matrix = CellMatrix { blocks: [[[[0.0; D]; D]; 4]; 4] };
@@ -128,7 +131,7 @@ impl LocalRows {
     }
 
     /// Sends the rows of ghost nodes to their owners and merges what comes back into global rows.
-    fn merge<const D: usize>(self, session: &Session, mesh: &Mesh<D>) -> Result<BlockRows> {
+    fn merge<const D: usize>(self, session: &Session, mesh: &Mesh<D>) -> Result<BlockRows, Agreed> {
         let size = D * D;
         let mut pairs = vec![Vec::new(); session.ranks()];
         let mut blocks = vec![Vec::new(); session.ranks()];

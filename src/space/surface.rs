@@ -1,6 +1,7 @@
 //! Points of a boundary at which nodal quadrature evaluates a law.
 
 use crate::{
+    agreement::Agreed,
     error::Result,
     exchange::exchange_lists,
     mesh::{Mesh, shape::facet_normal},
@@ -30,7 +31,7 @@ pub fn surface_points<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     facets: &[u32],
-) -> Result<Vec<SurfacePoint<D>>> {
+) -> Result<Vec<SurfacePoint<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let nodes = mesh.facets[facet as usize];

@@ -11,13 +11,7 @@ use super::{
     StepOutcome, Stepper,
     step_length::{SNAP, next_step},
 };
-use crate::{
-    body::Body,
-    effect::Step,
-    error::{Error, Result},
-    session::Session,
-    state::State,
-};
+use crate::{agreement::Agreed, body::Body, effect::Step, error::Result, session::Session, state::State};
 use serde::{Deserialize, Serialize};
 
 /// Steps of one length between two growths of it.
@@ -101,28 +95,28 @@ impl Adaptive {
         body: &mut Body<D, S>,
         state: &mut State,
         target: f64,
-    ) -> Result<StepOutcome> {
+    ) -> Result<StepOutcome, Agreed> {
         if state.step == 0 {
             self.look_ahead(session, stepper, body, state, target)?;
         }
         loop {
             let step = next_step(state, self.next_length(state, target), target);
-            match stepper.attempt(session, body, state, step) {
+            match session.agree(stepper.attempt(session, body, state, step)) {
                 Ok(mut outcome) => {
-                    let [error, size] = stepper.error(session, body, state, step)?;
+                    let [error, size] = session.agree(stepper.error(session, body, state, step))?;
                     let error = self.relative(error, size);
                     if error > self.settings.tolerance && self.level_of(step) > self.lowest {
                         self.reject(step, self.fitting(step, error));
                         continue;
                     }
-                    stepper.accept(session, body, state, step, &mut outcome)?;
+                    session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
                     let stress = (2.0 * outcome.energy.elastic).max(0.0).sqrt();
                     self.pace.velocity = self.pace.velocity.max(size.velocity);
                     self.pace.stress = self.pace.stress.max(stress);
                     self.grow(step, error);
                     return Ok(outcome);
                 }
-                Err(Error::Failed(_)) if self.level_of(step) > self.lowest => {
+                Err(error) if error.is_failure() && self.level_of(step) > self.lowest => {
                     self.reject(step, self.level_of(step) - 1);
                 }
                 Err(error) => return Err(error),
@@ -139,15 +133,15 @@ impl Adaptive {
         body: &mut Body<D, S>,
         state: &State,
         target: f64,
-    ) -> Result<()> {
+    ) -> Result<(), Agreed> {
         let step = next_step(state, self.longest(), target);
-        match stepper.attempt(session, body, state, step) {
+        match session.agree(stepper.attempt(session, body, state, step)) {
             Ok(_) => {
-                let [_, size] = stepper.error(session, body, state, step)?;
+                let [_, size] = session.agree(stepper.error(session, body, state, step))?;
                 (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
                 Ok(())
             }
-            Err(Error::Failed(_)) => Ok(()),
+            Err(error) if error.is_failure() => Ok(()),
             Err(error) => Err(error),
         }
     }

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     body::Body,
     effect::Contact,
-    error::{Error, Result},
+    error::Result,
     petsc::{DistributedVector, NonlinearOutcome},
     session::Session,
 };
@@ -176,19 +176,15 @@ impl Newton {
         *effort = equations.effort;
         let iterations = effort.sets.len();
         let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
-        let fatal = matches!(&solved, Err(error) if !matches!(error, Error::Failed(_)));
         // All ranks go the same way, whichever of them failed.
-        let [missed, fatal] = session.largest([missed, fatal].map(|flag| f64::from(u8::from(flag))));
+        let [missed] = session.largest([f64::from(u8::from(missed))]);
         if missed == 0.0 {
             return Ok(Ok(iterations));
         }
         match session.agree(solved) {
             Ok(outcome) => Ok(Err((iterations, words(&outcome, effort)))),
-            Err(error) if fatal > 0.0 => Err(error),
-            Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) => {
-                Ok(Err((iterations, words)))
-            }
-            Err(other) => Err(other),
+            Err(error) if error.is_failure() => Ok(Err((iterations, error.to_string()))),
+            Err(error) => Err(error.into()),
         }
     }
 }

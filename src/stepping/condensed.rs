@@ -12,6 +12,7 @@ use super::{
     refined::Refinement,
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     effect::{Contact, ContactNode, contact_nodes},
     error::{Error, Result},
@@ -183,8 +184,7 @@ impl Condensed {
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
         self.factored = None;
-        let factored = Cholesky::new(D, &rows, &self.unknowns, self.order.as_deref(), self.precision);
-        let Some(cholesky) = session.agree(factored)? else { return Ok(false) };
+        let Some(cholesky) = self.factor(session, D, &rows)? else { return Ok(false) };
         self.order.get_or_insert_with(|| cholesky.order().to_vec());
         self.precision = cholesky.precision();
         drop(rows);
@@ -205,6 +205,23 @@ impl Condensed {
         chosen?;
         self.factored = Some(Factored { cholesky, condensed, scales: self.newton.scales.clone() });
         Ok(true)
+    }
+
+    /// Factors a matrix in one precision on all ranks: processors that differ may find another one enough. `None` on all where the
+    /// unknowns of contact can't be last on one. Collective.
+    fn factor(&self, session: &Session, block: usize, rows: &BlockRows) -> Result<Option<Cholesky>, Agreed> {
+        let factor = |precision| Cholesky::new(block, rows, &self.unknowns, self.order.as_deref(), precision);
+        let found = session.agree(factor(self.precision))?;
+        let is = |precision| found.as_ref().is_some_and(|cholesky| cholesky.precision() == precision);
+        let here = [found.is_none(), is(Precision::Single), is(Precision::Double)];
+        let [none, single, double] = session.largest(here.map(|flag| f64::from(u8::from(flag))));
+        if none > 0.0 {
+            return Ok(None);
+        }
+        if single * double == 0.0 {
+            return Ok(found);
+        }
+        session.agree(if here[1] { factor(Precision::Double) } else { Ok(found) })
     }
 
     /// The precision of the factor in use.

@@ -2,12 +2,7 @@
 
 use super::step_solver::{Known, StepSolver};
 use crate::{
-    body::Body,
-    effect::Step,
-    error::{Error, Result},
-    petsc::DistributedVector,
-    session::Session,
-    state::State,
+    body::Body, effect::Step, error::Result, petsc::DistributedVector, session::Session, state::State,
 };
 
 /// Velocities differ when they do by more than this share of the larger one.
@@ -43,14 +38,14 @@ pub(super) fn other_solutions<const D: usize, const S: usize>(
             let fixed = nodal.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed);
             fixed.for_each(|(value, _)| *value = 0.0);
         }
-        match solver.solve(session, body, state, step, known, &mut velocity) {
+        match session.agree(solver.solve(session, body, state, step, known, &mut velocity)) {
             Ok(_) if is_new(&found, &velocity)? => {
                 let mut kept = velocity.like()?;
                 kept.copy_from(&velocity)?;
                 found.push(kept);
             }
-            Ok(_) | Err(Error::Failed(_)) => {}
-            Err(other) => return Err(other),
+            Err(error) if !error.is_failure() => return Err(error.into()),
+            _ => {}
         }
     }
     Ok(found)

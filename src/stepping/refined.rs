@@ -11,12 +11,7 @@ use super::{
     equations::StepMatrix,
     newton::{From, Task, recall},
 };
-use crate::{
-    body::Body,
-    error::{Error, Result},
-    petsc::DistributedVector,
-    session::Session,
-};
+use crate::{body::Body, error::Result, petsc::DistributedVector, session::Session};
 
 /// Corrections after which single precision has failed.
 const CORRECTIONS: usize = 12;
@@ -67,16 +62,16 @@ impl Condensed {
         };
         refinement.first.copy_from(trial)?;
         let refined = self.refine_with(session, body, from, task, trial, &mut refinement);
-        let refined = match refined {
-            Err(Error::Failed(_)) => Ok(None),
-            other => other,
+        let refined = match session.agree(refined) {
+            Err(error) if error.is_failure() => None,
+            other => other?,
         };
-        if matches!(refined, Ok(None)) {
+        if refined.is_none() {
             trial.copy_from(&refinement.first)?;
             recall(body, from)?;
         }
         self.refinement = Some(refinement);
-        refined
+        Ok(refined)
     }
 
     fn refine_with<const D: usize, const S: usize>(

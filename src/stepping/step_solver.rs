@@ -9,10 +9,11 @@ use super::{
     rungs::{self, Krylov, Rung, Rungs},
 };
 use crate::{
+    agreement::Agreed,
     body::Body,
     effect::Step,
     error::{Error, Result},
-    petsc::{DistributedVector, Ksp, Matrix, Precision},
+    petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
     session::Session,
     state::State,
 };
@@ -127,7 +128,7 @@ impl StepSolver {
             made = self.change_rung(session, body, rung, like)?;
         }
         if lengths.matrix != rung {
-            let rows = session.agree(body.matrix(session, lengths.matrix))?;
+            let rows = matrix_rows(session, body, lengths.matrix)?;
             self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
         self.matrix_norm = self.matrix()?.norm()?;
@@ -176,7 +177,7 @@ impl StepSolver {
             self.rung = Some((length, matrix));
             return Ok(false);
         }
-        let rows = session.agree(body.matrix(session, length))?;
+        let rows = matrix_rows(session, body, length)?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
         if let Solver::Condensed(condensed) = &mut self.solver {
             if condensed.prepare(session, body, rows)? {
@@ -290,7 +291,10 @@ impl StepSolver {
         let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
         let solved = self.solve_to(session, body, state, (step, start), (forces, tolerance), trial);
-        let Err(Error::Failed(_)) = &solved else { return solved };
+        let solved = session.agree(solved);
+        if !solved.as_ref().is_err_and(Agreed::is_failure) {
+            return Ok(solved?);
+        }
         // The start may be much less than the solution, above all at rest.
         let mut answer = forces.like()?;
         self.precondition(forces, &mut answer)?;
@@ -301,7 +305,7 @@ impl StepSolver {
             }
             return self.solve_to(session, body, state, (step, start), (forces, floor), trial);
         }
-        solved
+        Ok(solved?)
     }
 
     /// Solves a step to this residual norm in N. Collective.
@@ -335,11 +339,22 @@ impl StepSolver {
                     return Ok(outcome);
                 }
                 condensed.precision = Precision::Double;
-                let rows = session.agree(body.matrix(session, *length))?;
+                let rows = body.matrix(session, *length)?;
                 condensed.prepare(session, body, rows)?;
                 let solved = condensed.solve(session, body, from, task, trial)?;
                 solved.ok_or_else(|| Error::Internal("a factor in double precision was not enough".into()))
             }
         }
     }
+}
+
+/// The rows of the matrix here, which PETSc can count. Collective.
+fn matrix_rows<const D: usize, const S: usize>(
+    session: &Session,
+    body: &mut Body<D, S>,
+    length: f64,
+) -> Result<BlockRows, Agreed> {
+    let rows = body.matrix(session, length)?;
+    session.agree(rows.check(D, body.mesh.total_nodes))?;
+    Ok(rows)
 }

@@ -207,15 +207,15 @@ impl Stepper {
         let known = known(session, &self.method, &self.right_hand_side);
         let solved = self.solver.solve(session, body, state, step, known, &mut self.trial);
         let Some(others) = others else { return solved };
-        match solved {
+        match session.agree(solved) {
             Ok(outcome) => {
                 let solutions = others.len() + usize::from(is_new(others, &self.trial)?);
                 Ok(StepOutcome { solutions, ..outcome })
             }
-            Err(Error::Failed(words)) => {
-                Err(Error::Failed(format!("{words}; solutions found from other starts: {}", others.len())))
+            Err(error) if error.is_failure() => {
+                Err(Error::Failed(format!("{error}; solutions found from other starts: {}", others.len())))
             }
-            Err(other) => Err(other),
+            Err(other) => Err(other.into()),
         }
     }
 

@@ -5,6 +5,7 @@ use super::{
     record::{Record, digest},
 };
 use crate::{
+    agreement::Agreed,
     error::{Exit, Result},
     petsc::clear_option,
     run::{self, Clock, Start},
@@ -39,8 +40,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
     }
     let mut record = Record::new(digest);
     for _ in 0..repetitions {
-        let ended = run_once(session, planned);
-        let finished = match ended {
+        let finished = match run_once(session, planned) {
             Ok(Exit::Stopped) => return Ok(Outcome::Stopped),
             Ok(_) => {
                 let mine = if session.is_first() { record.add_summary(folder) } else { Ok(()) };
@@ -68,7 +68,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
 }
 
 /// One run; the PETSc options it asks for are taken back, so that the next one starts like it. Collective.
-fn run_once(session: &Session, planned: &Planned) -> Result<Exit> {
+fn run_once(session: &Session, planned: &Planned) -> Result<Exit, Agreed> {
     let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
     let ended = run::run(session, planned.loaded.clone(), &Start::Over, clock);
     for name in planned.loaded.job.solver.petsc.keys() {

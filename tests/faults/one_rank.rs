@@ -3,28 +3,16 @@
 
 use crate::mpirun;
 use clarke::{
+    agreement::Agreed,
     effect::{Effect, Energy, Phases, Step},
-    error::{Error, Exit},
+    error::Exit,
     job::Job,
     mesh::generate::{Diagonal, rectangle},
     run::Simulation,
     session::{Mpi, Session},
     space::{Batch, CellMatrix, Needs, Simplex},
 };
-use std::{
-    path::Path,
-    sync::Once,
-    time::{SystemTime, UNIX_EPOCH},
-};
-
-/// Milliseconds from the fault to the end of all ranks.
-const SOON: u128 = 1000;
-/// The same behind a panic, until `mpirun` has ended, which gives the ranks it aborts a second or two.
-const AFTER_ABORT: u128 = 5000;
-
-fn now() -> u128 {
-    SystemTime::now().duration_since(UNIX_EPOCH).expect("a time").as_millis()
-}
+use std::path::Path;
 
 /// What goes wrong on the last rank, at the third step or at the last, shorter one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,12 +27,6 @@ struct Faulty {
     fault: Fault,
     here: bool,
     calls: usize,
-}
-
-/// Notes when the fault was.
-fn note_fault() {
-    static NOTED: Once = Once::new();
-    NOTED.call_once(|| println!("\nfault at {} ms", now()));
 }
 
 impl Effect<2, 3> for Faulty {
@@ -62,7 +44,6 @@ impl Effect<2, 3> for Faulty {
 
     fn add_matrix(&self, _: usize, _: &Simplex<2>, _: f64, matrix: &mut CellMatrix<2>) {
         if self.here && self.fault == Fault::Assembly {
-            note_fault();
             matrix.blocks[0][0][0][0] = f64::NAN;
         }
     }
@@ -70,9 +51,6 @@ impl Effect<2, 3> for Faulty {
     fn add_explicit(&mut self, step: Step, batch: &mut Batch<2, 3>, _: &mut Energy) {
         self.calls += 1;
         let now = self.here && step.time > 0.11;
-        if now {
-            note_fault();
-        }
         assert!(!now || self.fault != Fault::Panic, "this law panicked at t = {} s", step.time);
         if now && self.fault == Fault::Law {
             batch.stress.0.as_flattened_mut().fill(f64::NAN);
@@ -111,8 +89,8 @@ pub fn fail(name: &str) -> Exit {
             other => break other.map(drop),
         }
     };
-    let words = ended.as_ref().err().map(Error::to_string).unwrap_or_default();
-    println!("\nrank {} after {steps} steps: {words}\nended at {} ms", session.rank(), now());
+    let words = ended.as_ref().err().map(Agreed::to_string).unwrap_or_default();
+    println!("\nrank {} after {steps} steps: {words}", session.rank());
     ended.map_or_else(|error| error.exit(), |()| Exit::Done)
 }
 
@@ -123,17 +101,7 @@ fn expect(fault: &str, code: i32, words: &str, steps: usize) {
         let output = mpirun::start(ranks, &format!("one_rank {fault}"), folder.path());
         let said =
             format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-        let over = now();
         assert_eq!(output.status.code(), Some(code), "{fault} on {ranks} ranks\n{said}");
-        let at = |word: &str| -> Vec<u128> {
-            let lines = said.lines().filter_map(|line| line.strip_prefix(word)?.strip_suffix(" ms"));
-            lines.map(|number| number.parse().expect("milliseconds")).collect()
-        };
-        let (faults, ends) = (at("fault at "), at("ended at "));
-        let (last, limit) = ends.into_iter().max().map_or((over, AFTER_ABORT), |last| (last, SOON));
-        let took = last - faults[0];
-        println!("{fault} on {ranks} ranks: {took} ms from the fault to the end");
-        assert!(took < limit, "{fault} on {ranks} ranks: {took} ms");
         assert!(said.contains(words), "{said}");
         let told: Vec<&str> =
             said.lines().filter(|line| line.contains(&format!("after {steps} steps:"))).collect();

@@ -1,15 +1,16 @@
 //! Studies that are refused before anything runs.
 
 use crate::scene::{SOLUTION, SQUARE, Scene};
-use clarke::study::Plan;
+use clarke::{error::Exit, study::Plan};
 
 /// What a study says that is refused.
 fn refused(study: &str) -> String {
     let scene = Scene::new(SQUARE, study);
     let error = Plan::load(&scene.path("study.toml"), &[], false).expect_err("refused");
-    assert_eq!(error.exit() as u8, 2);
     assert!(!scene.path("out").exists());
-    error.to_string()
+    let words = error.to_string();
+    assert_eq!(Exit::from(error), Exit::Refused);
+    words
 }
 
 #[test]
