@@ -2,6 +2,7 @@
 //!
 //! `make test` tries a sample of each, `make hard` many more (`CLARKE_HARD=1`); docs/stability.md has the counts.
 
+mod agreements;
 #[path = "../runs/case.rs"]
 #[allow(dead_code)]
 mod case;
@@ -35,6 +36,10 @@ fn scenario() {
     if name.starts_with("restart_") {
         let folder = std::env::var(mpirun::FOLDER).expect("a folder");
         return matrix::scenario(&name, folder.as_ref());
+    }
+    if let Some(words) = name.strip_prefix(agreements::SCENARIO) {
+        let folder = std::env::var(mpirun::FOLDER).expect("a folder");
+        return agreements::scenario(words, folder.as_ref());
     }
     let exit = one_rank::fail(name.trim_start_matches("one_rank "));
     std::process::exit(i32::from(exit as u8));
