@@ -105,6 +105,9 @@ pub fn refuse_misfits(world: &impl Communicator, folder: &Path) {
     let error = checkpoint_file::write(&other, world, b"{}", &twice, &[]).expect_err("refused").to_string();
     assert!(error.contains("row 1 is there twice") || error.contains("row 0 is missing"), "{error}");
     assert!(!other.exists());
+    let sum = [RowSet { name: "nodes", total: 4, ids: if last { &[1, 1, 1, 3] } else { &[] } }];
+    let error = checkpoint_file::write(&other, world, b"{}", &sum, &[]).expect_err("refused").to_string();
+    assert!(error.contains("row 1 is there twice") || error.contains("is missing"), "same sum: {error}");
 
     let foreign = folder.join("foreign.h5");
     if world.rank() == 0 {

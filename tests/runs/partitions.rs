@@ -79,6 +79,37 @@ fn checkpoints_go_from_a_mesh_to_its_parts_and_back() {
 }
 
 #[test]
+fn a_mesh_whose_node_moved_is_refused_at_a_restart() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mesh = folder.path().join("square.msh");
+    let text = std::fs::read_to_string(meshes().join("clamped_square.msh")).expect("mesh");
+    std::fs::write(&mesh, &text).expect("written");
+    let case = Case::of("clamped_square")
+        .set("mesh.file", &format!("'{}'", mesh.display()))
+        .set("time.step", "0.0625")
+        .set("time.end", "0.25")
+        .set("checkpoint.every", "2");
+    case.run_with(2, &["--set", "time.end=0.125"]).expect(0);
+    // The last node of the file lies inside, and goes on a little.
+    let (before, last) = text
+        .split_once("$EndNodes")
+        .map(|(nodes, _)| nodes.trim_end())
+        .and_then(|nodes| nodes.rsplit_once('\n'))
+        .expect("nodes");
+    let numbers: Vec<f64> = last.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+    let moved = format!("{before}\n{} {} 0\n$EndNodes", numbers[0] + 1e-6, numbers[1]);
+    let rest = text.split_once("$EndNodes").expect("nodes").1;
+    std::fs::write(&mesh, format!("{moved}{rest}")).expect("written");
+    for ranks in [1, 2] {
+        case.run_with(ranks, &["--restart"])
+            .expect(2)
+            .says("the mesh has changed since the checkpoint was written");
+    }
+    std::fs::write(&mesh, &text).expect("written");
+    case.run_with(2, &["--restart"]).expect(0).says("(step 2,");
+}
+
+#[test]
 fn generated_parts_run_as_the_mesh_that_metis_splits() {
     let square = |way: &str| {
         Case::square(12)
