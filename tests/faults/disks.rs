@@ -34,6 +34,7 @@ fn assert_says_why(outcome: &Outcome, what: &str) {
     assert_eq!(outcome.code, 1, "{what}\n{}\n{said}", outcome.stdout);
     assert!(said.contains("cannot write"), "{what}\n{said}");
     assert!(said.contains("Is the disk full") || said.contains("File too large"), "{what}\n{said}");
+    assert_eq!(said.lines().filter(|line| line.starts_with("error: ")).count(), 1, "one rank tells\n{said}");
     let signs = ["Segmentation", "panicked", "MPI_ABORT"];
     assert!(!signs.iter().any(|sign| said.contains(sign)), "{what}\n{said}");
 }
@@ -115,9 +116,13 @@ fn a_folder_that_may_only_be_read_is_named() {
 
 #[test]
 fn a_device_that_is_always_full_ends_the_run_in_words() {
-    let case = saving();
-    std::fs::create_dir_all(case.folder().join("out")).expect("folder");
-    std::os::unix::fs::symlink("/dev/full", case.folder().join("out/probes.csv")).expect("link");
-    let outcome = case.run_with(RANKS, &[]).expect(1);
-    outcome.says("out/probes.csv").says("No space left on device");
+    // Of several profiles: rank 0 fails in the rows of the first one, where the others go on to the next.
+    let profiles = "[{on = 'bottom'}, {on = 'top'}, {on = 'right'}]";
+    for name in ["probes.csv", "profiles.csv"] {
+        let case = saving().set("mesh.rectangle.cells", "[200, 4]").set("output.profile", profiles);
+        std::fs::create_dir_all(case.folder().join("out")).expect("folder");
+        std::os::unix::fs::symlink("/dev/full", case.folder().join("out").join(name)).expect("link");
+        let outcome = case.run_with(RANKS, &[]).expect(1);
+        outcome.says(&format!("out/{name}")).says("No space left on device");
+    }
 }

@@ -178,8 +178,13 @@ fn compare(combination: Combination, job: &Path) {
 #[test]
 fn restarts_from_any_ranks_to_any_ranks_lose_nothing_of_any_effect_under_any_scheme() {
     let all = combinations();
-    let mut random = Random(11);
-    let sample = (0..3).map(|_| all[random.below(all.len() as u64) as usize]).collect();
+    let mut random = Random(23);
+    let sample = (0..SCHEMES.len()).map(|scheme| {
+        let of_scheme: Vec<Combination> = all.iter().copied().filter(|c| c.1 == scheme).collect();
+        of_scheme[random.below(of_scheme.len() as u64) as usize]
+    });
+    let sample: Vec<Combination> = sample.collect();
+    assert!(sample.iter().any(|c| c.2) && sample.iter().any(|c| !c.2), "steps of both kinds: {sample:?}");
     let tried = if trials(0, 1) == 1 { all } else { sample };
     let mut restarts = 0;
     for batch in tried.chunks(BATCH) {
