@@ -263,6 +263,18 @@ mod tests {
     }
 
     #[test]
+    fn branches_are_measured_from_the_nearer_of_corner_and_rest() {
+        // Near rest, far from the corner: through it, 1e-3 would be the difference of numbers of 2e8.
+        let far = Graph::new(vec![[1e8, 1e8]], 1.0, 1.0).unwrap();
+        let near_rest = far.resolve(1e-3, 1.0);
+        assert!((near_rest.velocity - 5e-4).abs() < 1e-18 && (near_rest.pressure - 5e-4).abs() < 1e-18);
+        // Near the corner of a steep branch: from rest, 1e-3 would be the difference of numbers of 1e8.
+        let steep = Graph::new(vec![[1.0, 0.0]], 0.0, 1e8).unwrap();
+        let near_corner = steep.resolve(1.0 + 0.0009765625, 1.0);
+        assert!((near_corner.pressure - 0.0009765625 / (1.0 + 1e-8)).abs() < 1e-17, "{near_corner:?}");
+    }
+
+    #[test]
     fn velocities_out_of_order_are_refused() {
         assert!(Graph::new(vec![[1.0, 0.0], [0.0, 0.0]], 0.0, 0.0).is_err());
         assert!(Graph::new(vec![], 0.0, 0.0).is_err());
