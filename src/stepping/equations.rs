@@ -369,6 +369,10 @@ impl<const D: usize> ProjectedOperator for Inside<'_, D> {
         self.contacts.iter().for_each(|contact| contact.hold(&mut x));
         Ok(())
     }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.matrix.precondition(r, z)
+    }
 }
 
 #[cfg(test)]

@@ -82,6 +82,29 @@ fn where_single_precision_is_not_enough_double_takes_its_place() {
 }
 
 #[test]
+fn a_wheel_on_a_curved_obstacle_is_solved_in_one_step_whatever_solves_with_its_matrix() {
+    let mesh = format!("'{}/meshes/wheel_segment.msh'", env!("CARGO_MANIFEST_DIR"));
+    let make = || {
+        Case::of("wheel_segment")
+            .set("mesh.file", &mesh)
+            .set("material", "{ elasticity = { youngs_modulus = 5e6, poisson_ratio = 0.4 } }")
+            .set(
+                "contact",
+                "[{ on = ['foundation'], normal = { unilateral = { gap = '0.3*(x^2) - 0.005*t' } } }]",
+            )
+            .set("time", "{ scheme = 'implicit_euler', end = 1.0, step = 1.0 }")
+            .without("traction")
+    };
+    let double = run(make(), "double", 1);
+    for precision in ["single", "auto"] {
+        let single = in_precision(make(), precision).run_and_keep(1);
+        assert_same(&double, &single, precision);
+    }
+    let multigrid = make().set("solver.preconditioner", "'gamg'").run_and_keep(2);
+    assert_same(&double, &multigrid, "gamg");
+}
+
+#[test]
 fn corrections_keep_velocity_and_pressure_on_the_graph_at_loose_tolerances() {
     let case = Case::cube(6).set("time.step", "0.0625").set("time.end", "1").set("solver.tolerance", "3e-8");
     assert!(run(case, "single", 1).results().number("max_inclusion_residual") < 1e-7);
