@@ -22,7 +22,9 @@ mod viscoplastic_history;
 mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
-pub use contact::{COUNTS, Contact, ContactNode, PointCount, Quadrature, choose_unknowns, contact_nodes};
+pub use contact::{
+    COUNTS, Contact, ContactNode, PointCount, Quadrature, ReferenceValues, choose_unknowns, contact_nodes,
+};
 pub use contact_memory::ContactMemory;
 pub use damage::Damage;
 pub use elastic_stress::{ElasticLaw, ElasticStress};

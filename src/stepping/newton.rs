@@ -111,27 +111,10 @@ impl Newton {
         like: &DistributedVector,
         matrix: &dyn StepMatrix,
     ) -> Result<()> {
-        let (mut motion, mut answer) = (like.like()?, like.like()?);
-        let mut stiffness = |motion: &DistributedVector, square: f64| -> Result<f64> {
-            matrix.multiply(motion, &mut answer)?;
-            let [square] = session.sum([square]);
-            Ok(positive_or_one(motion.dot(&answer)? / square))
-        };
         self.scales.clear();
+        let mut room = [like.like()?, like.like()?];
         for contact in contacts {
-            motion.fill(0.0)?;
-            contact.add_normals(&mut motion.owned_mut()?);
-            let square = contact.normal_square(&motion.owned()?);
-            let normal = stiffness(&motion, square)?.max(2.0 * contact.law.monotonicity_constant());
-            let tangential = if contact.friction().is_some() {
-                motion.fill(0.0)?;
-                contact.add_unit_sliding(&mut motion.owned_mut()?);
-                let square = contact.tangential_square(&motion.owned()?);
-                stiffness(&motion, square)?
-            } else {
-                normal
-            };
-            self.scales.push([normal, tangential]);
+            self.scales.push(resistance(session, contact, matrix, &mut room)?);
         }
         Ok(())
     }
@@ -267,6 +250,50 @@ impl Newton {
         }
         Ok(session.largest([largest])[0])
     }
+}
+
+/// What resists a motion of a contact's boundary alone, along the normal and in sliding, in Pa s/m; along the normal no less than
+/// twice the law's steepest fall. Collective.
+fn resistance<const D: usize>(
+    session: &Session,
+    contact: &Contact<D>,
+    matrix: &dyn StepMatrix,
+    [motion, answer]: &mut [DistributedVector; 2],
+) -> Result<[f64; 2]> {
+    let mut against = |motion: &DistributedVector, square: f64| -> Result<f64> {
+        matrix.multiply(motion, answer)?;
+        let [square] = session.sum([square]);
+        Ok(positive_or_one(motion.dot(answer)? / square))
+    };
+    motion.fill(0.0)?;
+    contact.add_normals(&mut motion.owned_mut()?);
+    let square = contact.normal_square(&motion.owned()?);
+    let normal = against(motion, square)?.max(2.0 * contact.law.monotonicity_constant());
+    if contact.friction().is_none() {
+        return Ok([normal; 2]);
+    }
+    motion.fill(0.0)?;
+    contact.add_unit_sliding(&mut motion.owned_mut()?);
+    let square = contact.tangential_square(&motion.owned()?);
+    Ok([normal, against(motion, square)?])
+}
+
+/// Lets the contacts of a body be judged by the matrix of the whole body, however steps are solved. Collective.
+pub(super) fn judge_by<const D: usize>(
+    session: &Session,
+    contacts: &mut [Contact<D>],
+    like: &DistributedVector,
+    matrix: &dyn StepMatrix,
+) -> Result<()> {
+    if contacts.is_empty() {
+        return Ok(());
+    }
+    let mut room = [like.like()?, like.like()?];
+    for contact in contacts {
+        contact.reference.resistance = resistance(session, contact, matrix, &mut room)?;
+        [contact.reference.area] = session.sum([contact.area()]);
+    }
+    Ok(())
 }
 
 /// Takes the pressures of all contacts back to those of the converged state.

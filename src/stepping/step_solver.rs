@@ -5,7 +5,7 @@ use super::{
     condensed::Condensed,
     flow::FlowStart,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
-    newton::{From, Newton, REMEDY, Task, failed},
+    newton::{From, Newton, REMEDY, Task, failed, judge_by},
     rungs::{self, Krylov, Rung, Rungs},
 };
 use crate::{
@@ -132,6 +132,7 @@ impl StepSolver {
             self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
         self.matrix_norm = self.matrix()?.norm()?;
+        judge_by(session, &mut body.contacts, like, self.matrix()?)?;
         if let (Solver::Linear(ksp), Some((_, rung))) = (&mut self.solver, &self.rung) {
             ksp.set_matrices(self.between.as_ref().map_or(rung, |(_, matrix)| matrix), rung)?;
         }
@@ -287,6 +288,9 @@ impl StepSolver {
                 "check loads and initial values; use smaller steps",
             ));
         }
+        // As many newtons as if all unknowns bore alike.
+        let total = norm * ((body.mesh.total_nodes * D) as f64).sqrt();
+        body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
         // No residual below the rounding of `K v` is asked for, however small the forces that are left.
         let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);

@@ -12,6 +12,7 @@ mod creep;
 mod damage;
 mod effects;
 mod energy;
+mod inclusion;
 mod indefinite;
 mod indicator;
 mod jacobian;
@@ -65,6 +66,7 @@ fn scenario() {
         "memory" => memory::all(&session),
         "adhesion" => adhesion::all(&session),
         "one_cell" => one_cell::all(&session),
+        "judged" => inclusion::judged(&session),
         "indefinite" => indefinite::solve(&session),
         "moving_obstacles" => obstacles::moving(&session),
         "impacts" => obstacles::impacts(&session),

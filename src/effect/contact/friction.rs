@@ -14,6 +14,7 @@
 //! equation is taken from the tangential ones ([`Friction::reduce`]).
 
 use super::{
+    inclusion::ReferenceValues,
     point::{Point, Unknown},
     tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
 };
@@ -283,9 +284,9 @@ impl<const D: usize> Friction<D> {
         points: &[Point<D>],
         velocity: &[f64],
         residual: &[f64],
-        range: [f64; 2],
+        (range, reference): ([f64; 2], ReferenceValues),
     ) -> f64 {
-        let range = [range[0].max(range[1] / self.scale), range[1].max(self.scale * range[0])];
+        let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
         let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let distance = |point: &TangentialPoint<D>| {
             let (sliding, open) = (point.along(velocity), point.along(residual));

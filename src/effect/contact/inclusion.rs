@@ -6,8 +6,33 @@ use super::{
 };
 use crate::{contact::NormalLaw, tensor::larger};
 
-/// Share of the pressure that would stop a contact boundary, beside which errors of the pressure count at least.
-const STOPPING_SHARE: f64 = 0.01;
+/// Share of the mean pressure of all forces of a step, beside which errors of the pressure count at least.
+const FORCE_SHARE: f64 = 0.01;
+
+/// What the velocities and tractions of a contact are held against where its laws have no range of their own. It follows from the
+/// step's matrix and forces alone, not from the way in which the step is solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReferenceValues {
+    /// What resists a motion of the boundary alone, along the normal and in sliding, in Pa s/m.
+    pub resistance: [f64; 2],
+    /// The boundary in m^(D-1), over all ranks.
+    pub area: f64,
+    /// The forces of the step, in N.
+    pub forces: f64,
+}
+
+impl Default for ReferenceValues {
+    fn default() -> Self {
+        Self { resistance: [1.0; 2], area: 1.0, forces: 0.0 }
+    }
+}
+
+impl ReferenceValues {
+    /// The mean traction of all forces, in Pa.
+    pub fn traction(self) -> f64 {
+        if self.area > 0.0 { self.forces / self.area } else { 0.0 }
+    }
+}
 
 /// The largest distance; a distance that is no number is beyond all others.
 pub(super) fn worst(distances: impl Iterator<Item = f64>) -> f64 {
@@ -32,13 +57,15 @@ impl<const D: usize> Contact<D> {
     /// left of the equations of motion at the owned nodes, in N; `range` scales where the law has no range of its own or a smaller one.
     pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
         let sliding = [range[2], range[3]];
-        // The velocity that the pressures would change, and the pressure that would change the velocities, count where there
-        // is no other; of the latter a share where the law has a range of its own.
+        // The velocity that the pressures would change, and the pressure of the forces, count where there is no other; of the
+        // latter a share where the law has a range of its own.
         let share = match &self.law {
-            NormalLaw::Graph(graph) if !graph.is_zero() => STOPPING_SHARE,
+            NormalLaw::Graph(graph) if !graph.is_zero() => FORCE_SHARE,
             _ => 1.0,
         };
-        let range = [range[0].max(range[1] / self.scale), range[1].max(share * self.scale * range[0])];
+        let reference = self.reference;
+        let range =
+            [range[0].max(range[1] / reference.resistance[0]), range[1].max(share * reference.traction())];
         let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
         let distance = |p: &Point<D>| {
@@ -46,8 +73,7 @@ impl<const D: usize> Contact<D> {
             self.law.distance(p.normal_component(velocity), pressure, p.context, range)
         };
         let normal = worst(free.map(distance));
-        let friction = self.friction.as_ref();
-        friction
-            .map_or(normal, |f| normal.max(f.inclusion_residual(&self.points, velocity, residual, sliding)))
+        let Some(friction) = &self.friction else { return normal };
+        normal.max(friction.inclusion_residual(&self.points, velocity, residual, (sliding, reference)))
     }
 }

@@ -42,6 +42,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
+pub use inclusion::ReferenceValues;
 pub use unknowns::choose_unknowns;
 
 /// Where on a facet the law holds.
@@ -62,6 +63,8 @@ pub struct Contact<const D: usize> {
     gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
+    /// The sizes that velocities and tractions are judged by where the laws have no range of their own.
+    pub reference: ReferenceValues,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
     friction: Option<Friction<D>>,
@@ -97,7 +100,8 @@ impl<const D: usize> Contact<D> {
         }
         let scale = 2.0 * law.monotonicity_constant() + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
-        Ok(Self { law, gap, scale, facets: facets.to_vec(), points, friction: None, needs_ghosts })
+        let reference = ReferenceValues::default();
+        Ok(Self { law, gap, scale, reference, facets: facets.to_vec(), points, friction: None, needs_ghosts })
     }
 
     /// Whether velocities of ghost nodes are read and forces on them written.
@@ -113,6 +117,11 @@ impl<const D: usize> Contact<D> {
     /// Facets of this rank, local numbers.
     pub fn facets(&self) -> &[u32] {
         &self.facets
+    }
+
+    /// Its size on this rank, in m^(D-1).
+    pub fn area(&self) -> f64 {
+        self.points.iter().map(|point| point.weight).sum()
     }
 
     /// Adds the normals at the points to nodal values.
