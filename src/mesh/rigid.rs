@@ -14,25 +14,27 @@ pub(super) type Motion = [f64; 6];
 /// A unit row that adds less than this to the span of the others adds nothing.
 const INDEPENDENT: f64 = 1e-9;
 
-/// The rigid motions each body can still do when `held` components of its nodes are held, in words: one text for
-/// each body that can move, none when every body is held. Collective, with the same words on all ranks.
+/// The rigid motions each body can still do when `held` components of its nodes are held, and nodes along the directions
+/// `along`, in words: one text for each body that can move, none when every body is held. Collective, with the same words on all
+/// ranks.
 ///
-/// A node component held at `x` is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
+/// A node held at `x` along a direction is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
 /// A body that touches a held body in single nodes is held there.
 pub fn free_motions<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     held: &[[bool; D]],
+    along: &[(usize, Vector<D>)],
 ) -> Result<Vec<String>, Agreed> {
-    Ok(skeleton(session, mesh, held)?.free_motions())
+    Ok(skeleton(session, mesh, held, along)?.free_motions())
 }
 
-/// What the bodies of a mesh are held by: points, some of them shared by bodies.
+/// What the bodies of a mesh are held by, and the points that bodies share.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Skeleton<const D: usize> {
     /// Coordinates in m.
     pub points: Vec<Vector<D>>,
-    /// Components held there.
+    /// Components held there, by a body that can't move.
     pub held: Vec<[bool; D]>,
     /// The bodies, by number.
     pub bodies: Vec<Body<D>>,
@@ -41,7 +43,9 @@ pub(super) struct Skeleton<const D: usize> {
 /// A body as far as its rigid motions go.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Body<const D: usize> {
-    /// The points at which it is held, or touches another body.
+    /// What holds it, as rows on its motions.
+    pub rows: Vec<Motion>,
+    /// The points at which it touches another body.
     pub points: Vec<usize>,
     /// Its middle, in m.
     pub centre: Vector<D>,
@@ -79,10 +83,11 @@ impl<const D: usize> Body<D> {
     /// An orthonormal basis of the free motions.
     fn free(&self, points: &[Vector<D>], held: &[[bool; D]]) -> Vec<Motion> {
         let rows = || {
-            self.points.iter().flat_map(|&point| {
+            let joints = self.points.iter().flat_map(|&point| {
                 let components = (0..D).filter(move |&component| held[point][component]);
                 components.map(move |component| self.row(component, &points[point]))
-            })
+            });
+            self.rows.iter().copied().chain(joints)
         };
         let mut constrained = absent::<D>();
         extend(&mut constrained, rows);
@@ -103,6 +108,12 @@ impl<const D: usize> Body<D> {
         row[3 + next] = at[after];
         row[3 + after] = -at[next];
         row
+    }
+
+    /// The displacement along a direction of a unit motion at a point.
+    pub fn row_along(&self, direction: &Vector<D>, point: &Vector<D>) -> Motion {
+        let rows = direction.iter().enumerate();
+        rows.fold([0.0; 6], |sum, (i, share)| add_scaled(&sum, *share, &self.row(i, point)))
     }
 
     fn in_words(&self, free: &[Motion]) -> Vec<String> {
@@ -228,7 +239,7 @@ mod tests {
             let centre = points.iter().fold([0.0; D], |sum, &p| add_scaled(&sum, share, &mesh.nodes[p]));
             let distance = |&p: &usize| norm(&add_scaled(&mesh.nodes[p], -1.0, &centre));
             let radius = points.iter().map(distance).fold(0.0, f64::max);
-            Body { points, centre, radius }
+            Body { rows: Vec::new(), points, centre, radius }
         };
         let skeleton = Skeleton {
             points: mesh.nodes.clone(),

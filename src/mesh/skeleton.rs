@@ -2,7 +2,7 @@
 
 use super::{
     Mesh,
-    rigid::{Body, Skeleton, absent, extend},
+    rigid::{Body, Motion, Skeleton, absent, extend},
     shape::{centroid, signed_measure},
     surface::Bodies,
 };
@@ -13,33 +13,39 @@ use crate::{
     session::Session,
     tensor::{Vector, add_scaled, norm},
 };
+use std::collections::BTreeMap;
 
-/// The bodies; for each the points that span all that its held nodes hold, at most six of every rank, and those in
+/// The bodies; for each the rows that span all that its held nodes hold, at most six of every rank, and the points in
 /// which it touches others. Collective, the same on all ranks.
 pub(super) fn skeleton<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     held: &[[bool; D]],
+    along: &[(usize, Vector<D>)],
 ) -> Result<Skeleton<D>, Agreed> {
+    let mut directions: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+    along.iter().for_each(|(node, direction)| directions.entry(*node as u32).or_default().push(*direction));
     let bodies = mesh.bodies(session)?;
     let nodes = nodes_of(mesh, &bodies);
     let mut skeleton = Skeleton { bodies: frames(session, mesh, &bodies, &nodes)?, ..Skeleton::default() };
     let mut records: Vec<f64> = Vec::new();
     for (number, (body, nodes)) in skeleton.bodies.iter().zip(&nodes).enumerate() {
-        let flags = |&node: &u32| (0..D).filter(move |&c| held[node as usize][c]).map(move |c| (node, c));
-        let all: Vec<(u32, usize)> = nodes.iter().flat_map(flags).collect();
-        let rows = || all.iter().map(|&(node, component)| body.row(component, &mesh.nodes[node as usize]));
-        for taken in extend(&mut absent::<D>(), rows) {
-            let (node, component) = all[taken];
-            records.extend([number as f64, component as f64]);
-            records.extend(mesh.nodes[node as usize]);
+        let rows_of = |&node: &u32| {
+            let place = &mesh.nodes[node as usize];
+            let components = (0..D).filter(move |&c| held[node as usize][c]);
+            let components = components.map(move |component| body.row(component, place));
+            let directions = directions.get(&node).into_iter().flatten();
+            components.chain(directions.map(move |direction| body.row_along(direction, place)))
+        };
+        let all: Vec<Motion> = nodes.iter().flat_map(rows_of).collect();
+        for taken in extend(&mut absent::<D>(), || all.iter().copied()) {
+            records.push(number as f64);
+            records.extend(all[taken]);
         }
     }
-    for record in gather(session.world(), &records)?.chunks_exact(D + 2) {
-        let component = record[1] as usize;
-        skeleton.bodies[record[0] as usize].points.push(skeleton.points.len());
-        skeleton.points.push(std::array::from_fn(|i| record[2 + i]));
-        skeleton.held.push(std::array::from_fn(|i| i == component));
+    for record in gather(session.world(), &records)?.chunks_exact(7) {
+        let row = std::array::from_fn(|i| record[1 + i]);
+        skeleton.bodies[record[0] as usize].rows.push(row);
     }
     if bodies.count > 1 {
         let joints = joints(session, mesh, &nodes)?;
@@ -97,7 +103,7 @@ fn frames<const D: usize>(
     for ranks in gather(session.world(), &own)?.chunks_exact(bodies.count.max(1)) {
         radii.iter_mut().zip(ranks).for_each(|(radius, reach)| *radius = reach.max(*radius));
     }
-    let body = |(centre, radius)| Body { points: Vec::new(), centre, radius };
+    let body = |(centre, radius)| Body { rows: Vec::new(), points: Vec::new(), centre, radius };
     Ok(centres.into_iter().zip(radii).map(body).collect())
 }
 

@@ -7,6 +7,10 @@ use super::{
 use crate::error::Result;
 use std::{marker::PhantomData, ptr};
 
+/// Growth of the residual that counts as divergence: that of CG may grow by the root of the matrix' condition number before it falls,
+/// and bodies that contact alone holds have large ones.
+const DIVERGENCE: f64 = 1e12;
+
 /// A Krylov solver with its preconditioner.
 ///
 /// The preconditioner is set up at the first solve (or [`Ksp::set_up`]) and kept for as long as the matrix stands.
@@ -131,9 +135,7 @@ impl Ksp {
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         let iterations = index(iterations, "linear iterations")?;
         // SAFETY: live object.
-        check(unsafe {
-            sys::KSPSetTolerances(self.raw, relative, absolute, f64::from(sys::PETSC_DEFAULT), iterations)
-        })
+        check(unsafe { sys::KSPSetTolerances(self.raw, relative, absolute, DIVERGENCE, iterations) })
     }
 
     /// Starts from the values already in the solution; what counts as divergence is then measured against the residual there.

@@ -2,6 +2,8 @@
 
 use crate::{
     agreement::Agreed,
+    body::Body,
+    effect::Contact,
     error::Result,
     job::{self, Job, Loaded, Material, MeshNames},
     mesh::{Mesh, rigid::free_motions},
@@ -42,26 +44,27 @@ fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loa
     session.agree(if claims.count == 0 { Ok(()) } else { Err(fault()) })
 }
 
-/// Refuses a quasistatic body that can move without resistance, given the held components of its nodes. Collective.
-pub(super) fn refuse_free_bodies<const D: usize>(
+/// Refuses a quasistatic body with a rigid motion that neither supports nor contact can hold. Collective.
+pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
     session: &Session,
-    mesh: &Mesh<D>,
-    fixed: &[bool],
+    body: &Body<D, S>,
     loaded: &Loaded,
 ) -> Result<(), Agreed> {
+    let mesh = &body.mesh;
     let has_mass: Vec<bool> =
         mesh.regions.iter().map(|region| material_of(&loaded.job, region).density.is_some()).collect();
     if has_mass.iter().all(|&has| has) {
         return Ok(());
     }
-    let mut held: Vec<[bool; D]> = fixed.as_chunks().0.to_vec();
+    let mut held: Vec<[bool; D]> = body.fixed.as_chunks().0.to_vec();
     // What has mass moves by its inertia: no motion of it is free.
     for (cell, &region) in mesh.cell_regions.iter().enumerate() {
         if has_mass[usize::from(region)] {
             mesh.cell(cell).iter().for_each(|&node| held[node as usize] = [true; D]);
         }
     }
-    let free = free_motions(session, mesh, &held)?;
+    let touched: Vec<_> = body.contacts.iter().flat_map(Contact::holding_directions).collect();
+    let free = free_motions(session, mesh, &held, &touched)?;
     if free.is_empty() {
         return Ok(());
     }
@@ -72,7 +75,7 @@ pub(super) fn refuse_free_bodies<const D: usize>(
             "without density the problem is quasistatic, and these motions are free: {}",
             free.join("; ")
         ),
-        "add supports that hold them, or give a density",
+        "add supports, or contact that can hold them, or give a density",
     )))
 }
 

@@ -37,7 +37,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     }
     let probes = session.agree(probes(session, &mesh, job))?;
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
-    refuse_free_bodies(session, &body.mesh, &body.fixed, loaded)?;
+    refuse_free_bodies(session, &body, loaded)?;
     let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(

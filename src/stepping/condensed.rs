@@ -17,7 +17,7 @@ use crate::{
     effect::{Contact, ContactNode, contact_nodes},
     error::{Error, Result},
     exchange::{Gathering, gather},
-    petsc::{BlockRows, Cholesky, DistributedVector, Precision, ProjectedKsp},
+    petsc::{BlockRows, Cholesky, DistributedVector, Matrix, Precision, ProjectedKsp},
     session::Session,
 };
 use mpi::topology::SimpleCommunicator;
@@ -174,12 +174,17 @@ impl Condensed {
         session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
     }
 
-    /// Factors the matrix that has these rows on this rank, in the order of the one in use; says whether it could. Collective.
+    /// Factors the matrix that has these rows on this rank, in the order of the one in use; says whether it could. Springs along
+    /// the motions of this rank that the rows have too much of are taken off products with the condensed matrix; where there are any, this
+    /// resists rigid motions too little to choose the parameters of graphs by, and the matrix of the whole body does it, whose
+    /// vectors are laid out like the last argument. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         rows: BlockRows,
+        springs: Option<&[f64]>,
+        (matrix, like): (&Matrix, &DistributedVector),
     ) -> Result<bool> {
         let mut rows = whole(session, rows, D)?;
         self.frames.turn_matrix(&mut rows);
@@ -196,13 +201,18 @@ impl Condensed {
             nodes: self.groups.clone(),
             own: self.own.clone(),
             motions: self.motions.clone(),
+            springs: springs.unwrap_or_default().to_vec(),
             subspace: Subspace::whole(&self.trial)?,
             room: Room::new(&self.motions, self.unknowns.len())?,
         };
-        number_nodes(&mut body.contacts, &self.nodes);
-        let chosen = self.newton.choose_scales(session, &body.contacts, &self.trial, &condensed);
-        number_back(&mut body.contacts, &self.nodes);
-        chosen?;
+        if springs.is_none() {
+            number_nodes(&mut body.contacts, &self.nodes);
+            let chosen = self.newton.choose_scales(session, &body.contacts, &self.trial, &condensed);
+            number_back(&mut body.contacts, &self.nodes);
+            chosen?;
+        } else {
+            self.newton.choose_scales(session, &body.contacts, like, matrix)?;
+        }
         self.factored = Some(Factored { cholesky, condensed, scales: self.newton.scales.clone() });
         Ok(true)
     }

@@ -21,7 +21,7 @@ pub(super) struct Motion {
     pub direction: Vec<f64>,
 }
 
-/// The Schur complement `S = L L^T` of all other motions, whole on each rank.
+/// The Schur complement `S = L L^T - B` of all other motions, whole on each rank, with the springs `B` that were factored with it.
 ///
 /// Vectors hold all components of the contact nodes of a rank; motions that no law sees have no stiffness here.
 pub(super) struct CondensedMatrix {
@@ -34,6 +34,8 @@ pub(super) struct CondensedMatrix {
     /// Which motions are those of this rank.
     pub own: Range<usize>,
     pub motions: Vec<Motion>,
+    /// Stiffness along each motion of this rank that the factor has and the matrix has not, in N s/m; none, or one a motion.
+    pub springs: Vec<f64>,
     pub subspace: RefCell<Subspace>,
     pub room: RefCell<Room>,
 }
@@ -260,6 +262,9 @@ impl StepMatrix for CondensedMatrix {
         let [amounts, product] = &mut room.placed;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
+        for ((spring, amount), number) in self.springs.iter().zip(&room.own).zip(self.own.clone()) {
+            amounts[self.places[number]] -= spring * amount;
+        }
         self.write(amounts, y)
     }
 

@@ -21,6 +21,7 @@ mod outcome;
 mod refined;
 mod rungs;
 mod scheme;
+mod springs;
 mod step_clock;
 mod step_length;
 mod step_solver;

@@ -7,6 +7,7 @@ use super::{
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
     newton::{From, Newton, REMEDY, Task, failed, judge_by},
     rungs::{self, Krylov, Rung, Rungs},
+    springs::Springs,
 };
 use crate::{
     agreement::Agreed,
@@ -57,6 +58,8 @@ pub(super) struct StepSolver {
     solver: Solver,
     /// What else is kept.
     rungs: Option<Rungs>,
+    /// What keeps factors of bodies that contact alone holds from being singular.
+    springs: Springs,
 }
 
 impl StepSolver {
@@ -84,6 +87,7 @@ impl StepSolver {
             matrix_norm: 0.0,
             solver,
             rungs: None,
+            springs: Springs::default(),
         })
     }
 
@@ -178,10 +182,11 @@ impl StepSolver {
             self.rung = Some((length, matrix));
             return Ok(false);
         }
-        let rows = matrix_rows(session, body, length)?;
+        let mut rows = matrix_rows(session, body, length)?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        let springs = self.springs.add(session, body, &mut rows)?;
         if let Solver::Condensed(condensed) = &mut self.solver {
-            if condensed.prepare(session, body, rows)? {
+            if condensed.prepare(session, body, rows, springs.as_deref(), (&matrix, like))? {
                 if condensed.precision_in_use()? == Precision::Single {
                     matrix.multiply_often()?;
                 }
@@ -189,12 +194,17 @@ impl StepSolver {
                 return Ok(true);
             }
             self.solver = choice::whole_newton(session, body, like, self.settings, chosen)?;
-        } else {
-            drop(rows);
+            (rows, _) = self.springs.rows(session, body, length)?;
         }
+        // What the preconditioner is made of, if it is not the matrix itself.
+        let mut sprung = None;
+        if springs.is_some() {
+            sprung = Some(session.agree(Matrix::symmetric(D, &rows))?);
+        }
+        drop(rows);
         if chosen == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
-            matrix.attach_rigid_motions(D, coordinates)?;
+            sprung.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
         }
         if chosen != Preconditioner::Cholesky {
             matrix.multiply_often()?;
@@ -205,7 +215,8 @@ impl StepSolver {
                 session.agree(ksp.set_up())?;
             }
             Solver::Newton(newton) => {
-                session.agree(newton.linear_solver.set_constant(&matrix))?;
+                let constant = sprung.as_ref().unwrap_or(&matrix);
+                session.agree(newton.linear_solver.set_constant(constant))?;
                 newton.choose_scales(session, &body.contacts, like, &matrix)?;
             }
             Solver::Condensed(_) => {}
@@ -307,9 +318,10 @@ impl StepSolver {
             if !self.is_nonlinear() {
                 trial.copy_from(&answer)?;
             }
-            return self.solve_to(session, body, state, (step, start), (forces, floor), trial);
+            let solved = self.solve_to(session, body, state, (step, start), (forces, floor), trial);
+            return session.agree(solved).map_err(|failure| self.springs.explain(failure));
         }
-        Ok(solved?)
+        solved.map_err(|failure| self.springs.explain(failure))
     }
 
     /// Solves a step to this residual norm in N. Collective.
@@ -343,8 +355,8 @@ impl StepSolver {
                     return Ok(outcome);
                 }
                 condensed.precision = Precision::Double;
-                let rows = body.matrix(session, *length)?;
-                condensed.prepare(session, body, rows)?;
+                let (rows, springs) = self.springs.rows(session, body, *length)?;
+                condensed.prepare(session, body, rows, springs.as_deref(), (matrix, forces))?;
                 let solved = condensed.solve(session, body, from, task, trial)?;
                 solved.ok_or_else(|| Error::Internal("a factor in double precision was not enough".into()))
             }

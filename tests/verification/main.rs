@@ -12,6 +12,7 @@ mod creep;
 mod damage;
 mod effects;
 mod energy;
+mod held_by_contact;
 mod inclusion;
 mod indefinite;
 mod indicator;
@@ -66,6 +67,8 @@ fn scenario() {
         "memory" => memory::all(&session),
         "adhesion" => adhesion::all(&session),
         "one_cell" => one_cell::all(&session),
+        "held_by_contact" => held_by_contact::blocks(&session),
+        "nearly_free" => held_by_contact::nearly_free(&session),
         "judged" => inclusion::judged(&session),
         "indefinite" => indefinite::solve(&session),
         "moving_obstacles" => obstacles::moving(&session),

@@ -1,7 +1,11 @@
 //! The motions of nodes that contact laws see.
 
-use super::{Contact, point::Unknown, tangential_point::span_without};
-use crate::tensor::Vector;
+use super::{
+    Contact,
+    point::{Point, Unknown},
+    tangential_point::span_without,
+};
+use crate::{contact::NormalLaw, tensor::Vector};
 use std::collections::BTreeMap;
 
 /// A node of contact boundaries with the directions in which their laws act.
@@ -52,6 +56,25 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) ->
 }
 
 impl<const D: usize> Contact<D> {
+    /// Nodes of this rank with directions along which the contact can hold a body at rest: the normal, unless the law never
+    /// presses or falls, and the tangents of friction.
+    pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
+        let presses = match &self.law {
+            NormalLaw::Graph(graph) => !graph.is_zero() && graph.monotonicity_constant() == 0.0,
+            NormalLaw::Compliance(_) | NormalLaw::Unilateral(_) => true,
+        };
+        let normal = |point: &Point<D>| {
+            let normal = point.normal;
+            point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()
+        };
+        let points = self.points.iter().filter(|_| presses).flat_map(normal);
+        let rubs = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
+        let tangents = rubs
+            .flat_map(|friction| &friction.points)
+            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node, *tangent)));
+        points.chain(tangents).collect()
+    }
+
     /// Gives the nodes of all points other numbers: those of arrays that hold the nodes of contacts alone, and back.
     pub fn number_nodes(&mut self, number: impl Fn(usize) -> usize) {
         self.points.iter_mut().for_each(|point| point.set_node(number(point.node())));

@@ -129,16 +129,21 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Takes the derivative of the law at these unknowns, after `points` took their pressures.
-    pub fn linearise(&mut self, values: &[f64]) {
-        let (law, scale) = (self.law, self.scale);
+    ///
+    /// A point without pressure whose normal graph is vertical is about to be pressed: it sticks, which is one of the derivatives at
+    /// rest.
+    pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
+        let (law, scale, follows) = (self.law, self.scale, self.follows);
         for point in &mut self.points {
             let unknown = point.along(values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
-            point.tangent = if found.derivative == 0.0 {
+            let at_rest = length == 0.0 || found.speed == 0.0;
+            let touches = follows && points[point.at].theta == 0.0;
+            point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
                 Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
-            } else if length == 0.0 || found.speed == 0.0 {
-                // Without a bound, at rest.
+            } else if at_rest {
+                // Without a bound.
                 Tangent::free()
             } else {
                 Tangent {

@@ -215,7 +215,7 @@ impl<const D: usize> Contact<D> {
             point.slope = if derivative > 0.0 { 1.0 / derivative - scale } else { 0.0 };
         }
         if let Some(friction) = &mut self.friction {
-            friction.linearise(values);
+            friction.linearise(&self.points, values);
         }
     }
 

@@ -1,0 +1,149 @@
+//! Blocks that contact and friction alone hold: quasistatic ones, under loads whose stress is uniform, and one whose inertia counts for
+//! next to nothing.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, simulation};
+use clarke::{
+    error::Error,
+    job::Job,
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, box_mesh, rectangle},
+    },
+    run::Simulation,
+    session::Session,
+};
+use std::path::Path;
+
+const MODULUS: f64 = 1.3e11;
+const POISSON: f64 = 0.3;
+const FRICTION: f64 = 0.5;
+const PRESSURE: f64 = 1e8;
+
+/// A block on a plane under `PRESSURE` from above, kept from growing sideways, and sheared.
+fn job<const D: usize>(pressure: f64, shear: f64, solver: &str) -> String {
+    let side = POISSON / (1.0 - POISSON) * pressure;
+    let vector = |along: f64, up: f64| {
+        if D == 2 { format!("[{along:e}, {up:e}]") } else { format!("[{along:e}, 0, {up:e}]") }
+    };
+    let mut job = format!(
+        "{}[material]\nelasticity = {{ youngs_modulus = {MODULUS:e}, poisson_ratio = {POISSON} }}\n{}\
+         [time]\nscheme = \"implicit_euler\"\nend = 2\nstep = 1\n[solver]\n{solver}\n\
+         [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\nfriction.coulomb = {{ coefficient = {FRICTION} }}\n",
+        any_mesh::<D>(),
+        if D == 2 { "hypothesis = \"plane_strain\"\n" } else { "" },
+    );
+    let mut load =
+        |on: &str, value: String| job += &format!("[[traction]]\non = [\"{on}\"]\nvalue = {value}\n");
+    load("top", vector(shear, -pressure));
+    load("left", vector(side, -shear));
+    load("right", vector(-side, shear));
+    if D == 3 {
+        load("front", format!("[0, {side:e}, 0]"));
+        load("back", format!("[0, {:e}, 0]", -side));
+    }
+    job
+}
+
+fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
+    let solvers = [
+        "preconditioner = \"cholesky\"\nfactor_precision = \"double\"",
+        "preconditioner = \"cholesky\"\nfactor_precision = \"single\"",
+        "preconditioner = \"gamg\"",
+    ];
+    for solver in solvers {
+        let shares: &[f64] = if solver == solvers[0] { &[0.0, 0.5, 0.99] } else { &[0.99] };
+        for &share in shares {
+            let shear = share * FRICTION * PRESSURE;
+            let mut run = simulation::<D, S>(session, &job::<D>(PRESSURE, shear, solver), mesh);
+            let slope = 2.0 * (1.0 + POISSON) / MODULUS * shear;
+            let squeeze = (1.0 + POISSON) * (1.0 - 2.0 * POISSON) / (MODULUS * (1.0 - POISSON)) * PRESSURE;
+            while let Some(outcome) =
+                run.advance(session).unwrap_or_else(|e| panic!("{solver}, {share}: {e}"))
+            {
+                let step = run.state.step;
+                let found = run.state.displacement.owned().expect("values");
+                for (node, found) in found.chunks_exact(D).enumerate() {
+                    let height = run.body.mesh.nodes[node][D - 1];
+                    for (i, value) in found.iter().enumerate() {
+                        let known = match i {
+                            0 => slope * height,
+                            i if i == D - 1 => -squeeze * height,
+                            _ => 0.0,
+                        };
+                        let off = (value - known).abs();
+                        assert!(
+                            off <= 1e-7 * squeeze * 0.1,
+                            "{solver}, {share}, step {step}: off by {off:e}"
+                        );
+                    }
+                }
+                assert!(outcome.inclusion_residual <= 1e-7, "{solver}, {share}: {outcome:?}");
+                let points = outcome.points;
+                assert!(points.sticking > 0 && points.slipping == 0, "{solver}, {share}: {points:?}");
+            }
+            assert_eq!(run.state.step, 2);
+        }
+    }
+    // More than friction bears, and a pull that lifts it off.
+    for (pressure, shear) in [(PRESSURE, 1.01 * FRICTION * PRESSURE), (-PRESSURE, 0.0)] {
+        let mut run = simulation::<D, S>(session, &job::<D>(pressure, shear, solvers[0]), mesh);
+        let found = run.advance(session);
+        let Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) = found else {
+            panic!("{pressure}, {shear}: {found:?}");
+        };
+        assert!(words.contains("contact and friction alone hold these motions"), "{words}");
+        assert!(words.contains("translation along x"), "{words}");
+    }
+    // Without friction nothing holds it along the plane.
+    let text = job::<D>(PRESSURE, 0.0, solvers[0]).replace("friction.coulomb = { coefficient = 0.5 }\n", "");
+    let mut loaded = Job::from_text(&text, "job.toml", Path::new("."), &[]).expect("a job");
+    let refused = Simulation::<D, S>::new(session, &mut loaded, session.is_first().then(|| mesh.clone()));
+    let words = refused.err().expect("refused").to_string();
+    assert!(words.contains("these motions are free") && words.contains("translation along x"), "{words}");
+    let height = if D == 2 { "translation along y" } else { "translation along z" };
+    assert!(!words.contains(height), "{words}");
+}
+
+pub fn blocks(session: &Session) {
+    // So high that some ranks have no node on the plane.
+    let plate = rectangle([0.1, 0.3], [3, 9], Diagonal::Right, [1.0; 2]).expect("mesh");
+    block::<2, 4>(session, &plate);
+    block::<3, 6>(session, &box_mesh([0.1, 0.1, 0.3], [2, 2, 5], [1.0; 3]).expect("mesh"));
+}
+
+/// A block whose inertia counts for next to nothing is pushed along its plane.
+pub fn nearly_free(session: &Session) {
+    let mesh = rectangle([0.04, 0.04], [32, 32], Diagonal::Right, [1.0; 2]).expect("mesh");
+    for density in [7800.0, 1e-3] {
+        let sizes = ["cholesky", "gamg"].map(|preconditioner| {
+            let text = format!(
+                "{}[material]\nhypothesis = \"plane_strain\"\ndensity = {density:e}\n\
+                 elasticity = {{ youngs_modulus = 1.3e11, poisson_ratio = 0.2 }}\n\
+                 [[traction]]\non = [\"left\"]\nvalue = [\"1e7*t\", 0]\n[[traction]]\non = [\"top\"]\nvalue = [0, \"-5e7*t\"]\n\
+                 [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\nfriction.coulomb = {{ coefficient = 1 }}\n\
+                 [time]\nscheme = \"implicit_euler\"\nend = 0.6\nstep = 0.2\n[solver]\npreconditioner = \"{preconditioner}\"\n",
+                any_mesh::<2>()
+            );
+            let mut run = simulation::<2, 4>(session, &text, &mesh);
+            while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{density}, {preconditioner}: {e}")) {
+                assert!(outcome.newton_iterations <= 20, "{density}, {preconditioner}: {outcome:?}");
+                assert!(outcome.inclusion_residual <= 1e-9, "{density}, {preconditioner}: {outcome:?}");
+            }
+            assert_eq!(run.state.step, 3);
+            run.state.displacement.norm().expect("a norm")
+        });
+        let off = (sizes[0] - sizes[1]).abs();
+        assert!(sizes[0] > 1e-9 && off <= 1e-8 * sizes[0], "{density}: {sizes:?}");
+    }
+}
+
+#[test]
+fn contact_and_friction_alone_hold_a_quasistatic_block_up_to_coulombs_limit() {
+    run_on(&[1, 2, 3], "held_by_contact");
+}
+
+#[test]
+fn friction_holds_a_block_whose_inertia_counts_for_next_to_nothing() {
+    run_on(&[1, 2], "nearly_free");
+}
