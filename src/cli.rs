@@ -122,7 +122,7 @@ struct RunArguments {
     /// Go on from the newest good checkpoint of the output folder, or from this file.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
-    /// Start even where the output folder holds the results of another job, and overwrite them.
+    /// Start even where the output folder holds the results of another job or a run to go on with, and overwrite them.
     #[arg(long, conflicts_with = "restart")]
     force: bool,
 }

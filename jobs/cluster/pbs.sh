@@ -9,7 +9,7 @@
 #   SOLVER     the binary (default: solver)
 #   LAUNCHER   what starts the ranks (default: mpirun; where Open MPI was built without PBS support,
 #              "mpirun --hostfile $PBS_NODEFILE", already expanded)
-#   OUTPUT     the job's output folder (default: what the job file's [output] table says)
+#   OUTPUT     the job's output folder (default: what `solver check` says, which sets the problem up once more)
 #   RESTART    yes: go on from a checkpoint (set by the resubmission)
 #   SCRIPT     this file, for the resubmission (default: jobs/cluster/pbs.sh)
 #   MARGIN     seconds before the limit at which the ranks are asked to stop (default: 120)
@@ -31,10 +31,9 @@ solver=${SOLVER:-solver}
 read -ra launcher <<<"${LAUNCHER:-mpirun}"
 
 if [[ -z ${OUTPUT:-} ]]; then
-    folder=$(sed -n '/^\[output\]/,/^\[/s/^ *folder *= *"\([^"]*\)".*/\1/p' "$job")
-    folder=${folder:-out/$(basename "$job" .toml)}
-    [[ $folder == /* ]] || folder=$(dirname "$job")/$folder
-    OUTPUT=$folder
+    checked=$("${launcher[@]}" "$solver" check "$job" --json) || exit
+    OUTPUT=$(sed -n 's/^  "output_folder": "\(.*\)",*$/\1/p' <<<"$checked" | sed 's/\\\(["\\]\)/\1/g')
+    : "${OUTPUT:?solver check does not show the output folder}"
 fi
 # The checkpoints in the output folder; with arguments, those that `find` selects by them.
 checkpoints() { find "$OUTPUT" -maxdepth 1 -name 'checkpoint-*.h5' "$@" 2>/dev/null; }

@@ -3,6 +3,7 @@
 use super::{
     Inventory, build,
     estimate::Estimate,
+    folder::refuse_unwritable,
     header,
     setup::{Setup, setup},
     summary::PartitionQuality,
@@ -73,6 +74,8 @@ pub(super) fn check<const D: usize, const S: usize>(
     mesh: Mesh<D>,
 ) -> Result<Report, Agreed> {
     let quality = mesh.quality_summary(session);
+    let folder = loaded.job.output_folder();
+    session.agree(if session.is_first() { refuse_unwritable(folder) } else { Ok(()) })?;
     let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
     session.agree(report(session, loaded, &ready, quality))

@@ -1,12 +1,13 @@
 //! The output folder: whose results it holds, and how a run takes it over.
 
-use super::Start;
+use super::{Start, summary::SUMMARY};
 use crate::{
     error::{Error, Result},
     job::{Job, differing_keys},
     output::{checkpoint_folder::list, log::Log},
 };
-use std::path::Path;
+use rustix::fs::{Access, access};
+use std::{io::ErrorKind, path::Path};
 
 /// The file that every run writes, and locks while it does.
 const LOG: &str = "run.log";
@@ -14,9 +15,55 @@ const LOG: &str = "run.log";
 /// Keys of another job that a refusal names; the rest is only counted.
 const SHOWN: usize = 8;
 
-/// Refuses a folder that holds the results of another job, or a job file that no run wrote. On one rank, before
-/// anything is written.
-pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
+/// Takes the folder for this run alone if it is there, and refuses one in which the run must not begin. On one rank, before
+/// anything of it is read; touches nothing.
+pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()> {
+    let folder = job.output_folder();
+    refuse_unwritable(folder)?;
+    log.claim(&folder.join(LOG), false)?;
+    refuse_foreign(job, start)?;
+    if *start == Start::Anew { refuse_unfinished(folder) } else { Ok(()) }
+}
+
+/// Refuses a folder that can't be written or made. On one rank; touches nothing.
+pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
+    let there = folder.ancestors().find(|path| path.symlink_metadata().is_ok()).unwrap_or(folder);
+    let refuse = |why: String| {
+        let remedy = "choose another [output] folder";
+        Err(Error::Refused(format!("cannot write {}: {why}; {remedy}", folder.display())))
+    };
+    if !there.is_dir() {
+        return refuse(format!("{} is no folder", there.display()));
+    }
+    match access(there, Access::WRITE_OK | Access::EXEC_OK) {
+        Ok(()) => Ok(()),
+        Err(error) => refuse(format!("{}: {error}", there.display())),
+    }
+}
+
+/// Refuses a folder with a checkpoint that a new start would remove although its run has not come to its end.
+fn refuse_unfinished(folder: &Path) -> Result<()> {
+    let saved = list(folder)?;
+    let Some((newest, file)) = saved.first() else { return Ok(()) };
+    let text = std::fs::read_to_string(folder.join(SUMMARY)).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let is_of_this_run = summary["steps"].as_u64().is_some_and(|steps| steps >= *newest);
+    let what = match summary["status"].as_str().filter(|_| is_of_this_run) {
+        Some("completed") => return Ok(()),
+        Some("stopped") => "was stopped",
+        Some("failed") => "failed",
+        _ => "did not come to its end",
+    };
+    Err(Error::Refused(format!(
+        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); go on from there with --restart, or start anew \
+         and lose it with --force",
+        folder.display(),
+        file.display()
+    )))
+}
+
+/// Refuses a folder that holds the results of another job, or a job file that no run wrote.
+fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let folder = job.output_folder();
     let file = folder.join("job.toml");
     // The newest checkpoint of the folder itself is held against the job when it is read.
@@ -59,18 +106,18 @@ pub(super) fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     ))
 }
 
-/// Takes a folder that is there for this run alone. On one rank, before anything of it is read.
-pub(super) fn claim_folder(folder: &Path, log: &mut Log) -> Result<()> {
-    log.claim(&folder.join(LOG), false)
-}
-
-/// Makes the output folder, takes it for this run alone and opens the log; a new start removes the checkpoints of an
-/// earlier run. On one rank.
+/// Makes the output folder, takes it for this run alone, opens the log and removes the summary of an earlier run, which is
+/// not that of this one if it is killed; a new start removes the checkpoints, too. On one rank.
 pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);
     log.claim(&file, true)?;
     log.open(&file, goes_on)?;
+    let summary = folder.join(SUMMARY);
+    match std::fs::remove_file(&summary) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::unwritable(&summary, error)),
+        _ => {}
+    }
     if !goes_on {
         for (_, path) in list(folder)? {
             std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
@@ -78,4 +125,59 @@ pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Res
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::write;
+
+    fn folder(summary: Option<&str>, checkpoints: &[u64]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("folder");
+        for step in checkpoints {
+            write(folder.path().join(format!("checkpoint-{step}.h5")), "").expect("written");
+        }
+        if let Some(text) = summary {
+            write(folder.path().join(SUMMARY), text).expect("written");
+        }
+        folder
+    }
+
+    #[test]
+    fn a_checkpoint_is_lost_by_a_new_start_only_where_its_run_came_to_its_end() {
+        let refused = |summary: Option<&str>, checkpoints: &[u64]| {
+            let folder = folder(summary, checkpoints);
+            refuse_unfinished(folder.path()).err().map(|error| error.to_string())
+        };
+        let completed = r#"{"status": "completed", "steps": 8}"#;
+        assert_eq!(refused(Some(completed), &[4, 8]), None);
+        assert_eq!(refused(Some(r#"{"status": "failed", "steps": 0}"#), &[]), None);
+        assert_eq!(refused(None, &[]), None);
+        for (summary, checkpoint, words) in [
+            (Some(r#"{"status": "stopped", "steps": 8}"#), 8, "a run that was stopped, saved up to step 8"),
+            (Some(r#"{"status": "failed", "steps": 8}"#), 8, "a run that failed"),
+            // Killed: without a summary, with that of an earlier run, with one that was cut off.
+            (None, 8, "did not come to its end"),
+            (Some(completed), 9, "did not come to its end"),
+            (Some(&completed[..20]), 8, "did not come to its end"),
+        ] {
+            let said = refused(summary, &[checkpoint, 2]).expect("refused");
+            assert!(said.contains(words) && said.contains("--restart") && said.contains("--force"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_folder_is_writable_if_it_is_or_can_be_made() {
+        let folder = folder(Some("{}"), &[]);
+        let refused =
+            |path: &str| refuse_unwritable(&folder.path().join(path)).err().map(|error| error.to_string());
+        assert_eq!([refused(""), refused("new"), refused("deep/down/out")], [None, None, None]);
+        for path in [SUMMARY, "summary.json/out/deep"] {
+            let said = refused(path).expect("refused");
+            assert!(said.contains(&format!("cannot write {}", folder.path().join(path).display())), "{said}");
+            assert!(said.contains("summary.json is no folder"), "{said}");
+        }
+        // What root may not write either.
+        assert!(refuse_unwritable(Path::new("/proc/self/out")).is_err());
+    }
 }

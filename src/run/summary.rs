@@ -9,6 +9,9 @@ use crate::{
 use serde::Serialize;
 use std::path::Path;
 
+/// The file in the output folder.
+pub(super) const SUMMARY: &str = "summary.json";
+
 /// The object; names are part of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
@@ -109,7 +112,7 @@ impl Summary {
     pub fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::Internal(format!("the summary can't be written: {e}")))?;
-        write_whole(&folder.join("summary.json"), &(text + "\n"))
+        write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
     /// What a certificate did not cover and the run came to, in words, if there is any.

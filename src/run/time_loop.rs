@@ -3,7 +3,7 @@
 use super::{
     Clock, Inventory, Start, build,
     deadline::Deadline,
-    folder::{claim_folder, prepare_folder, refuse_foreign},
+    folder::{claim_folder, prepare_folder},
     outputs::{Outputs, Wanted},
     phases,
     restored::restore,
@@ -50,13 +50,12 @@ pub(super) fn run<const D: usize, const S: usize>(
     clock: Clock,
 ) -> Result<Exit, Agreed> {
     let job = &loaded.job;
-    session.agree(if session.is_first() { refuse_foreign(job, start) } else { Ok(()) })?;
-    let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let folder = job.output_folder();
+    let mut log = Log::new(session.is_first(), clock.on_terminal);
+    session.agree(if session.is_first() { claim_folder(job, start, &mut log) } else { Ok(()) })?;
+    let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
-    let mut log = Log::new(session.is_first(), clock.on_terminal);
-    session.agree(claim_folder(folder, &mut log))?;
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state)?;
     session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {

@@ -111,7 +111,7 @@ fn a_folder_that_may_only_be_read_is_named() {
     let case = saving();
     let script = format!("mount -o remount,ro \"$1\" && {LAUNCH} \"$0\" run \"$2\"; echo \"ended with $?\"");
     let Some(outcome) = on_small_disk(&case, "1m", &script) else { return };
-    outcome.expect(0).says("ended with 1").says("cannot write").says("Read-only file system");
+    outcome.expect(0).says("ended with 2").says("cannot write").says("Read-only file system");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Output stays in its folder, and results of another job stay what they are.
 
-use crate::{case::Case, results::names};
+use crate::{case::Case, launch::Target, results::names};
 use std::fs;
 
 fn small() -> Case {
@@ -53,6 +53,53 @@ fn the_same_job_runs_again_in_its_folder_with_other_output_and_another_end() {
     // The effective job that a run leaves is the same job.
     let effective = case.folder().join("out/job.toml");
     crate::launch::run(2, &["run", &effective.display().to_string()]).expect(0);
+}
+
+#[test]
+fn a_run_that_was_stopped_is_not_lost_by_starting_it_again() {
+    for ranks in [1, 2] {
+        let case = small().set("checkpoint.wall_limit", "1e-9");
+        case.run_with(ranks, &[]).expect(3);
+        let before = contents(&case);
+        let outcome = case.run_with(ranks, &[]).expect(2);
+        outcome.says("was stopped").says("checkpoint-1.h5").says("--restart").says("--force");
+        assert_eq!(contents(&case), before, "nothing is touched");
+        case.run_with(ranks, &["--restart", "--set", "checkpoint.wall_limit=1000"])
+            .expect(0)
+            .says("going on from");
+        // It has come to its end, and may run again.
+        case.run_with(ranks, &["--set", "checkpoint.wall_limit=1000"]).expect(0);
+    }
+}
+
+#[test]
+fn a_run_that_was_killed_or_failed_is_not_lost_by_starting_it_again() {
+    let case = small();
+    case.run(1);
+    // As one leaves it that was killed later: the summary of a run is removed when the next one begins.
+    fs::remove_file(case.folder().join("out/summary.json")).expect("removed");
+    let before = contents(&case);
+    case.run_with(2, &[]).expect(2).says("did not come to its end").says("checkpoint-4.h5");
+    assert_eq!(contents(&case), before);
+    case.run_with(1, &["--force"]).expect(0).says("checkpoint-4.h5 of an earlier run");
+    let failing = small().set("traction.0.value", "[0, '-10*sqrt(0.15 - t)']");
+    failing.run_with(1, &[]).expect(1);
+    failing.run_with(2, &[]).expect(2).says("a run that failed").says("--restart");
+    assert!(failing.results().path("checkpoint-2.h5").exists());
+}
+
+#[test]
+fn a_run_that_begins_removes_the_summary_of_the_one_before() {
+    let case = small();
+    case.run(1);
+    assert_eq!(case.results().summary()["status"], "completed");
+    let case = case.set("time.end", "1e4");
+    let mut running = case.start_with(2, &["--restart"]);
+    running.wait_for("checkpoint-6.h5");
+    running.signal("KILL", Target::OneRank);
+    running.wait();
+    assert!(!case.results().path("summary.json").exists());
+    case.run_with(2, &[]).expect(2).says("did not come to its end").says("--restart");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
 
 mod adaptive;
+mod batch;
 mod browser;
 mod case;
 mod certificates;

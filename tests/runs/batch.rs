@@ -1,0 +1,123 @@
+//! The batch scripts of `jobs/cluster` with stand-ins for the batch system: however a job spells its output folder, a run that
+//! stops with a checkpoint there is submitted again and goes on from it.
+
+use crate::{
+    case::Case,
+    launch::{Outcome, Running},
+};
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// What stands before all tables of a job, what stands behind them, an option, and the output folder that they make.
+const SPELLINGS: [(&str, &str, Option<&str>, &str); 7] = [
+    ("", "[output]\nfolder = \"double\"", None, "double"),
+    ("", "[output]\nfolder='single'", None, "single"),
+    ("output.folder = \"dotted\"", "", None, "dotted"),
+    ("", "[ output ] # where results go\n'folder' = \"spaced\"", None, "spaced"),
+    ("output = { folder = \"\"\"in \\\"one\\\" line\"\"\" }", "", None, "in \"one\" line"),
+    ("", "", None, "out/job"),
+    ("", "[output]\nfolder = \"file\"", Some("output.folder='option'"), "option"),
+];
+
+/// A job that stops with a checkpoint after its first step, in a folder with commands that only write down how they were called.
+struct Submission {
+    case: Case,
+    job: PathBuf,
+}
+
+impl Submission {
+    fn new(before: &str, behind: &str) -> Self {
+        let case =
+            Case::square(3).without("output").set("time.end", "0.25").set("checkpoint.wall_limit", "1e-9");
+        let job = case.written();
+        let text = fs::read_to_string(&job).expect("job");
+        fs::write(&job, format!("{before}\n{text}\n{behind}\n")).expect("written");
+        let submission = Self { case, job };
+        submission.command("squeue", "echo 2099-01-01T00:00:00");
+        submission.command("scontrol", "echo \"$@\" >>\"${0%/*}/submitted\"");
+        submission.command("qsub", "echo \"$@\" >>\"${0%/*}/submitted\"");
+        submission.command(
+            "qstat",
+            "echo '    Resource_List.walltime = 01:00:00'; echo '    Resource_List.select = 1'",
+        );
+        submission
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.case.folder().join(name)
+    }
+
+    fn command(&self, name: &str, body: &str) {
+        let file = self.path(name);
+        fs::write(&file, format!("#!/bin/bash\n{body}\n")).expect("written");
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o755)).expect("executable");
+    }
+
+    fn run(&self, script: &str, arguments: &[&str], variables: &[(&str, &str)]) -> Outcome {
+        let path = format!("{}:{}", self.case.folder().display(), std::env::var("PATH").expect("PATH"));
+        let mut command = Command::new("bash");
+        command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/cluster").join(script)).args(arguments);
+        command.current_dir(self.case.folder()).env("PATH", path).env_remove("OUTPUT");
+        command
+            .env("SOLVER", env!("CARGO_BIN_EXE_solver"))
+            .env("LAUNCHER", "env")
+            .envs(variables.iter().copied());
+        Running::spawn(command).wait()
+    }
+
+    fn submitted(&self) -> Option<String> {
+        let file = self.path("submitted");
+        let words = fs::read_to_string(&file).ok()?;
+        fs::remove_file(file).expect("removed");
+        Some(words)
+    }
+}
+
+#[test]
+fn a_requeued_job_goes_on_from_the_folder_that_it_names_however_it_spells_it() {
+    for (before, behind, option, folder) in SPELLINGS {
+        let submission = Submission::new(before, behind);
+        let mut arguments = vec!["job.toml"];
+        arguments.extend(option.iter().flat_map(|set| ["--set", set]));
+        let first = [&arguments[..], &["--force"]].concat();
+        submission.run("slurm.sbatch", &first, &[("SLURM_JOB_ID", "7")]).expect(3).says("requeueing job 7");
+        assert_eq!(submission.submitted().as_deref(), Some("requeue 7\n"), "{folder}");
+        let checkpoint = submission.path(folder).join("checkpoint-1.h5");
+        assert!(checkpoint.is_file(), "{folder}");
+        let again = [("SLURM_JOB_ID", "7"), ("SLURM_RESTART_COUNT", "1")];
+        submission
+            .run("slurm.sbatch", &first, &again)
+            .expect(3)
+            .says(&format!("going on from {}", checkpoint.display()));
+        assert_eq!(submission.submitted().as_deref(), Some("requeue 7\n"), "{folder}");
+        assert!(submission.path(folder).join("checkpoint-2.h5").is_file(), "{folder}");
+        // Submitted once more by mistake, it loses nothing.
+        submission.run("slurm.sbatch", &arguments, &[("SLURM_JOB_ID", "8")]).expect(2).says("--restart");
+        assert!(
+            submission.submitted().is_none() && submission.path(folder).join("checkpoint-2.h5").is_file()
+        );
+    }
+}
+
+#[test]
+fn a_job_that_is_submitted_to_pbs_again_goes_on_from_the_folder_that_it_names() {
+    for (before, behind, _, folder) in SPELLINGS.into_iter().filter(|spelling| spelling.2.is_none()) {
+        let submission = Submission::new(before, behind);
+        let here = submission.case.folder().display().to_string();
+        let job = submission.job.display().to_string();
+        let variables = [("PBS_O_WORKDIR", here.as_str()), ("PBS_JOBID", "7"), ("JOB", &job)];
+        submission.run("pbs.sh", &[], &variables).expect(3).says("submitting again");
+        let submitted = submission.submitted().expect("a submission");
+        assert!(submitted.contains("RESTART=yes"), "{submitted}");
+        let again = [&variables[..], &[("RESTART", "yes")]].concat();
+        let checkpoint = submission.path(folder).join("checkpoint-1.h5");
+        submission
+            .run("pbs.sh", &[], &again)
+            .expect(3)
+            .says(&format!("going on from {}", checkpoint.display()));
+    }
+}
