@@ -8,7 +8,9 @@ pub use traffic::PassBytes;
 
 use crate::{
     agreement::Agreed,
-    effect::{Contact, Effect, Energy, Form, Load, Phases, Step, SurfaceEffect, SurfaceState},
+    effect::{
+        Contact, Effect, Energy, Form, Load, PeakSquares, Peaks, Phases, Step, SurfaceEffect, SurfaceState,
+    },
     error::Result,
     lanes::Pack,
     material::Isotropic,
@@ -78,9 +80,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(energy)
     }
 
-    /// Energies of this rank's cells, contacts and surface after a committed step.
-    pub fn energy(&self, state: &State, step: Step) -> Result<Energy> {
-        let mut energy = Energy::default();
+    /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
+    pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
+        let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
         {
             let displacement = state.displacement.local()?;
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
@@ -91,16 +93,24 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 self.surface_effects.iter().for_each(|e| e.add_energy(step, nodal, &mut energy));
             })?;
         }
-        let Some(needs) = self.needs(|p| p.energy) else { return Ok(energy) };
-        let [weakening, called] =
-            [self.called(|e| e.phases().weakens), self.called(|e| e.phases().energy.is_some())];
+        let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
+        let weakening = self.called(|e| e.phases().weakens);
+        let with_energy = self.called(|e| e.phases().energy.is_some());
+        let with_stress = self.called(|e| e.phases().stress.is_some());
+        let strained = self.needs(|p| p.stress).is_some();
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
                 weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
-                called.among(&self.effects).for_each(|effect| effect.add_energy(step, batch, &mut energy));
+                with_energy
+                    .among(&self.effects)
+                    .for_each(|effect| effect.add_energy(step, batch, &mut energy));
+                with_stress.among(&self.effects).for_each(|effect| effect.add_stress(step, batch));
+                if strained {
+                    squares.take_in(batch.count, &batch.strain, &batch.stress);
+                }
             });
         })?;
-        Ok(energy)
+        Ok((energy, squares.peaks()))
     }
 
     /// Whether an effect stands for this form.
@@ -223,6 +233,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
     fn called(&self, holds: impl Fn(&dyn Effect<D, S>) -> bool) -> Called {
         let effects = self.effects.iter().enumerate();
         Called(effects.map(|(at, effect)| u64::from(holds(&**effect)) << at).sum())
+    }
+
+    /// What energies at the end of a step need and, where there is stress, the largest stress and strain.
+    fn needs_of_energy(&self) -> Option<Needs> {
+        let strained = self.needs(|p| p.stress).map(|needs| Needs { strain: true, ..needs });
+        self.needs(|p| p.energy).into_iter().chain(strained).reduce(Needs::or)
     }
 
     fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {

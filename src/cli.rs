@@ -245,8 +245,17 @@ fn told(session: &Session, error: &Agreed) -> Exit {
 
 fn print_error(error: &impl std::error::Error) {
     let words = error.to_string();
-    let prefix = if words.starts_with("error") { "" } else { "error: " };
+    let prefix = if says_error(&words) { "" } else { "error: " };
     let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
+}
+
+/// Whether the words begin with `error`, in whatever colour.
+fn says_error(words: &str) -> bool {
+    let mut rest = words;
+    while let Some(colour) = rest.strip_prefix("\u{1b}[") {
+        rest = colour.split_once('m').map_or("", |(_, rest)| rest);
+    }
+    rest.starts_with("error")
 }
 
 /// Prints on one process, before MPI has started.
@@ -364,4 +373,21 @@ fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit
         std::process::exit(i32::from(exit as u8));
     }
     Ok(exit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_says_error_once_in_colour_and_without() {
+        let job = tempfile::NamedTempFile::new().expect("file");
+        std::fs::write(job.path(), "[time]\nend = -1\n").expect("written");
+        for colour in [false, true] {
+            let words = Job::load_coloured(job.path(), &[], colour).expect_err("a fault").to_string();
+            assert_eq!(words.contains('\u{1b}'), colour);
+            assert!(says_error(&words), "{words:?}");
+        }
+        assert!(!says_error("cannot read nowhere.toml: no such file") && !says_error("\u{1b}[1"));
+    }
 }

@@ -113,6 +113,12 @@ pub fn apply<const D: usize, const S: usize>(t: &Mandel<S>, n: &Vector<D>) -> Ve
 /// Von Mises norm of a stress: `sqrt(3/2 dev : dev)`, for plane stress with the out-of-plane stress zero.
 #[inline(always)]
 pub fn von_mises<const S: usize>(t: &Mandel<S>) -> f64 {
+    von_mises_square(t).sqrt()
+}
+
+/// Square of the von Mises norm.
+#[inline(always)]
+pub fn von_mises_square<const S: usize>(t: &Mandel<S>) -> f64 {
     let shear: f64 = {
         let mut sum = 0.0;
         for c in normal_components::<S>()..S {
@@ -122,7 +128,7 @@ pub fn von_mises<const S: usize>(t: &Mandel<S>) -> f64 {
     };
     let zz = if S == 3 { 0.0 } else { t[2] };
     let (a, b, c) = (t[0] - t[1], t[1] - zz, zz - t[0]);
-    (0.5 * (a * a + b * b + c * c) + shear).sqrt()
+    0.5 * (a * a + b * b + c * c) + shear
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ pub struct PassBytes {
     pub explicit: u64,
     /// Flow and energies at the end of a step that is implicit in every stress.
     pub finish: u64,
-    /// The energy balance.
+    /// The energy balance, and the largest stress and strain.
     pub energy: u64,
 }
 
@@ -38,8 +38,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
             });
             self.pass(fields(needs) + 2) + histories
         });
-        let energy = self.needs(|p| p.energy).map(|needs| {
-            let histories = self.moved(|effect| effect.phases().energy.map(|_| Moved::Converged));
+        let energy = self.needs_of_energy().map(|needs| {
+            let histories = self.moved(|effect| {
+                let phases = effect.phases();
+                phases.energy.or(phases.stress).map(|_| Moved::Converged)
+            });
             self.pass(fields(needs)) + histories
         });
         let finish = self.pass(3) + self.moved(|effect| effect.flows().then_some(Moved::All));

@@ -62,7 +62,7 @@ impl<const D: usize> FieldOutput<D> {
             Ok(resumed) => Ok(Self(resumed)),
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
-                log.line(format!("warning: {error}; it is kept as {}, a new one is begun", aside.display()));
+                log.warning(format!("{error}; it is kept as {}, a new one is begun", aside.display()));
                 let moved = if session.is_first() { std::fs::rename(&file, &aside) } else { Ok(()) };
                 session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
                 Ok(Self(FieldFile::create(folder, session.world(), parts, compression)?))

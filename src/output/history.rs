@@ -52,6 +52,10 @@ pub struct Totals {
     pub max_energy_imbalance: f64,
     /// Largest inclusion residual of any step.
     pub max_inclusion_residual: f64,
+    /// Largest von Mises norm of the stress after any step, in Pa.
+    pub max_von_mises: f64,
+    /// Largest norm of the strain after any step.
+    pub max_strain: f64,
     /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
     pub max_slip_pressure: Option<f64>,
     /// Newton iterations.
@@ -127,6 +131,8 @@ impl Totals {
         self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
+        self.max_von_mises = larger(self.max_von_mises, outcome.peaks.von_mises);
+        self.max_strain = larger(self.max_strain, outcome.peaks.strain);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
         self.guessed_steps += u64::from(outcome.solutions > 0);
@@ -138,9 +144,14 @@ impl Totals {
 impl Totals {
     /// Whether all that was added up is finite: what is not in a step stays in the maxima.
     pub fn are_finite(&self) -> bool {
-        [self.turnover, self.max_energy_imbalance, self.max_inclusion_residual]
-            .iter()
-            .all(|most| most.is_finite())
+        let most = [
+            self.turnover,
+            self.max_energy_imbalance,
+            self.max_inclusion_residual,
+            self.max_von_mises,
+            self.max_strain,
+        ];
+        most.iter().all(|most| most.is_finite())
     }
 
     /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
@@ -207,6 +218,7 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effect::Peaks;
 
     #[test]
     fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {
@@ -247,5 +259,12 @@ mod tests {
         let mut totals = Totals::default();
         totals.add(&StepOutcome { inclusion_residual: f64::NAN, ..good });
         assert!(totals.max_inclusion_residual.is_nan() && !totals.are_finite());
+        for peaks in
+            [Peaks { von_mises: f64::NAN, strain: 0.0 }, Peaks { von_mises: 0.0, strain: f64::INFINITY }]
+        {
+            let mut totals = Totals::default();
+            totals.add(&StepOutcome { peaks, ..good });
+            assert!(!totals.are_finite(), "{peaks:?}");
+        }
     }
 }

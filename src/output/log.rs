@@ -15,12 +15,13 @@ pub struct Log {
     on_terminal: bool,
     file: Option<File>,
     bar: Option<ProgressBar>,
+    warnings: Vec<String>,
 }
 
 impl Log {
     /// A log that speaks on rank 0 only and has no file yet; without `on_terminal` its lines go to the file alone.
     pub fn new(speaks: bool, on_terminal: bool) -> Self {
-        Self { speaks, on_terminal, file: None, bar: None }
+        Self { speaks, on_terminal, file: None, bar: None, warnings: Vec::new() }
     }
 
     /// Takes this file for the run alone, as long as the log lives; one that is not there is made if `create` says so.
@@ -61,6 +62,18 @@ impl Log {
             None => {}
         }
         self.file_line(words.as_ref());
+    }
+
+    /// Writes a warning and keeps it for the summary.
+    pub fn warning(&mut self, words: impl Into<String>) {
+        let words = words.into();
+        self.line(format!("warning: {words}"));
+        self.warnings.push(words);
+    }
+
+    /// The warnings so far.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Writes lines to the file and, where no progress bar moves, to the terminal.

@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// Members of `summary.json` with their words, in the order of the page.
-const MEMBERS: [(&str, &str, &str); 22] = [
+const MEMBERS: [(&str, &str, &str); 24] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
@@ -20,7 +20,9 @@ const MEMBERS: [(&str, &str, &str); 22] = [
     ("rejected_steps", "steps taken back", ""),
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),
-    ("max_von_mises", "largest von Mises stress at the end", "Pa"),
+    ("final_von_mises", "largest von Mises stress at the end", "Pa"),
+    ("max_von_mises", "largest von Mises stress of the run", "Pa"),
+    ("max_strain", "largest strain of the run", ""),
     ("relative_error_indicator", "error indicator over the norm of the stress at the end", ""),
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
@@ -77,6 +79,17 @@ pub fn ending(summary: &Value) -> String {
         _ => "Ended",
     };
     format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
+}
+
+/// What the run warned of, if it did.
+pub fn warnings(summary: &Value) -> String {
+    let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let items: String =
+        warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(&plain(warning)))).collect();
+    if items.is_empty() {
+        return items;
+    }
+    format!("<div class=\"missing\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</div>\n")
 }
 
 /// The certificates and what they mean for the run.
@@ -201,5 +214,57 @@ fn plain(value: &Value) -> String {
         Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
         Value::Number(n) if n.is_f64() => number(n.as_f64().unwrap_or(f64::NAN)),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn row(name: &str, value: &str) -> String {
+        format!("<th scope=\"row\">{name}</th><td>{value}</td>")
+    }
+
+    #[test]
+    fn facts_come_with_their_units() {
+        let page = summary(&json!({
+            "time": 0.5, "max_von_mises": 2500.0, "final_von_mises": 2400.0, "max_strain": 0.03, "cells": 72,
+            "peak_memory_bytes": 53_600_000, "partition": { "edge_cut": 4, "imbalance": 1.25 }
+        }));
+        for (name, value) in [
+            ("time reached", "0.5 s"),
+            ("largest von Mises stress of the run", "2500 Pa"),
+            ("largest von Mises stress at the end", "2400 Pa"),
+            ("largest strain of the run", "0.03"),
+            ("cells", "72"),
+            ("peak memory of all ranks", "54 MB"),
+            ("facets between ranks", "4"),
+            ("cells of the fullest rank over the average", "1.25"),
+        ] {
+            assert!(page.contains(&row(name, value)), "{name}: {value}\n{page}");
+        }
+    }
+
+    #[test]
+    fn traffic_is_a_rate_where_bytes_and_seconds_are_known() {
+        let summary =
+            json!({ "traffic_bytes": { "solve": 6e9, "output": 6e9, "history": null, "balance": 0 } });
+        assert_eq!(rate(&summary, "solve", 1.5), ", 4 GB/s");
+        for (phase, seconds) in
+            [("output", 1.5), ("history", 1.5), ("balance", 1.5), ("setup", 1.5), ("solve", 0.0)]
+        {
+            assert_eq!(rate(&summary, phase, seconds), "", "{phase}");
+        }
+    }
+
+    #[test]
+    fn warnings_stand_in_a_list_and_nothing_where_there_are_none() {
+        assert_eq!(warnings(&json!({ "warnings": [] })) + &warnings(&json!({})), "");
+        let list = warnings(&json!({ "warnings": ["strain < 1", "b"] }));
+        assert!(
+            list.contains("<h2>Warnings</h2>") && list.contains("<li>strain &lt; 1</li>\n<li>b</li>"),
+            "{list}"
+        );
     }
 }

@@ -104,6 +104,7 @@ fn head(found: &Found) -> String {
     }
     if let Some(summary) = &found.summary {
         head += &paragraph(&facts::ending(summary));
+        head += &facts::warnings(summary);
     }
     if !found.gaps.is_empty() {
         head.push_str("<div class=\"missing\">\n<h2>Missing</h2>\n<ul>\n");

@@ -135,7 +135,7 @@ fn report<const D: usize, const S: usize>(
             poor_cells: quality.poor,
         },
         estimate: Estimate::new(session, body, &inventory, (preconditioner, precision), steps),
-        warnings: loaded.warnings.clone(),
+        warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         header: header::lines(session, loaded, ready)?,
     })
@@ -150,7 +150,8 @@ impl Report {
 
     /// Lines for a reader.
     pub fn text(&self) -> String {
-        self.header.iter().cloned().chain(self.lines()).collect::<Vec<_>>().join("\n")
+        let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
+        self.header.iter().cloned().chain(warnings).chain(self.lines()).collect::<Vec<_>>().join("\n")
     }
 
     /// What the log of a run doesn't say.

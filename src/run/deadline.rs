@@ -1,7 +1,7 @@
 //! When a run has to stop by itself: its own limit of wall time, and the end of the Slurm job it runs in.
 
 use super::Clock;
-use crate::{job::Job, session::Session};
+use crate::{job::Job, output::log::Log, session::Session};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Where Slurm tells the end of a job, in seconds since 1970.
@@ -11,14 +11,41 @@ const MARGIN: f64 = 30.0;
 /// The largest share of the time left at the start that is kept free, unless the job says how much.
 const LARGEST_SHARE: f64 = 0.1;
 
+/// What a run may spend, in s.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// From its launch on, by the job's own limit; infinite where there is none.
+    wall: f64,
+    /// From when the end of the Slurm job was learnt to that end; infinite where there is none.
+    slurm: f64,
+    /// Kept free before that end.
+    margin: f64,
+}
+
+/// What a run has spent, in s.
+#[derive(Debug, Clone, Copy)]
+struct Spent {
+    since_launch: f64,
+    since_learnt: f64,
+    longest_round: f64,
+    longest_save: f64,
+}
+
+impl Limits {
+    /// Whether the run's own limit is reached, and whether the Slurm job may end before another step is taken and saved.
+    fn reached(self, spent: Spent) -> [bool; 2] {
+        let left = self.slurm - spent.since_learnt;
+        [spent.since_launch >= self.wall, left <= self.margin + spent.longest_round + spent.longest_save]
+    }
+}
+
 /// The limits of a run, the same on all ranks.
 pub(super) struct Deadline {
     began: Instant,
-    wall_limit: f64,
-    /// Seconds from `known` to the end of the Slurm job; infinite where there is none.
-    left: f64,
-    known: Instant,
-    margin: f64,
+    limits: Limits,
+    /// Seconds by which the Slurm job was over at the start, if it was: that end is not one of this run.
+    over: Option<f64>,
+    learnt: Instant,
     checked: Instant,
     longest_round: Duration,
     longest_save: Duration,
@@ -31,35 +58,35 @@ impl Deadline {
             slurm_end(std::env::var(SLURM_END).ok().as_deref()).map_or(f64::INFINITY, |end| end - now());
         let left = -session.largest([-own])[0];
         let checkpoint = job.checkpoint.as_ref();
+        let over = (left <= 0.0).then_some(-left);
+        let limits = Limits {
+            wall: checkpoint.and_then(|c| c.wall_limit).unwrap_or(f64::INFINITY),
+            slurm: if over.is_some() { f64::INFINITY } else { left },
+            margin: checkpoint.and_then(|c| c.margin).unwrap_or(MARGIN.min(LARGEST_SHARE * left)),
+        };
+        let now = Instant::now();
+        let zero = Duration::ZERO;
         Self {
             began: clock.began,
-            wall_limit: checkpoint.and_then(|c| c.wall_limit).unwrap_or(f64::INFINITY),
-            left,
-            known: Instant::now(),
-            margin: checkpoint.and_then(|c| c.margin).unwrap_or(MARGIN.min(LARGEST_SHARE * left)),
-            checked: Instant::now(),
-            longest_round: Duration::ZERO,
-            longest_save: Duration::ZERO,
+            limits,
+            over,
+            learnt: now,
+            checked: now,
+            longest_round: zero,
+            longest_save: zero,
         }
     }
 
-    /// What the log says about the Slurm job, if there is one.
-    pub fn words(&self) -> Option<String> {
-        let (left, margin) = (self.left, self.margin);
-        if left.is_infinite() {
-            None
-        } else if self.is_over() {
-            Some(format!("warning: {SLURM_END} is over by {:.0} s; it is passed over", -left))
-        } else {
-            Some(format!(
-                "limit      the Slurm job ends in {left:.0} s; the run stops a step, a checkpoint and {margin:.0} s before"
-            ))
+    /// Tells the log about the Slurm job, if there is one.
+    pub fn tell(&self, log: &mut Log) {
+        let Limits { slurm, margin, .. } = self.limits;
+        if let Some(over) = self.over {
+            log.warning(format!("{SLURM_END} is over by {over:.0} s; it is passed over"));
+        } else if slurm.is_finite() {
+            log.line(format!(
+                "limit      the Slurm job ends in {slurm:.0} s; the run stops a step, a checkpoint and {margin:.0} s before"
+            ));
         }
-    }
-
-    /// A time that was over at the start is not that of this run.
-    fn is_over(&self) -> bool {
-        self.left <= 0.0
     }
 
     /// Learns how long a checkpoint took.
@@ -71,16 +98,17 @@ impl Deadline {
     pub fn passed(&mut self, session: &Session) -> Option<String> {
         self.longest_round = self.longest_round.max(self.checked.elapsed());
         self.checked = Instant::now();
-        let by_slurm = self.left.is_finite() && !self.is_over();
-        if self.wall_limit.is_infinite() && !by_slurm {
+        if self.limits.wall.is_infinite() && self.limits.slurm.is_infinite() {
             return None;
         }
-        let spent = self.began.elapsed().as_secs_f64();
-        let reserve = self.margin + (self.longest_round + self.longest_save).as_secs_f64();
-        let left = self.left - self.known.elapsed().as_secs_f64();
-        let flag = |late: bool| f64::from(u8::from(late));
-        match session.largest([flag(spent >= self.wall_limit), flag(by_slurm && left <= reserve)]) {
-            [late, _] if late > 0.0 => Some(format!("the wall-time limit of {} s", self.wall_limit)),
+        let reached = self.limits.reached(Spent {
+            since_launch: self.began.elapsed().as_secs_f64(),
+            since_learnt: self.learnt.elapsed().as_secs_f64(),
+            longest_round: self.longest_round.as_secs_f64(),
+            longest_save: self.longest_save.as_secs_f64(),
+        });
+        match session.largest(reached.map(|late| f64::from(u8::from(late)))) {
+            [late, _] if late > 0.0 => Some(format!("the wall-time limit of {} s", self.limits.wall)),
             [_, late] if late > 0.0 => Some("the end of the Slurm job".to_owned()),
             _ => None,
         }
@@ -98,7 +126,7 @@ fn slurm_end(value: Option<&str>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::slurm_end;
+    use super::*;
 
     #[test]
     fn only_a_time_is_an_end() {
@@ -106,5 +134,46 @@ mod tests {
         for none in [None, Some(""), Some("UNLIMITED"), Some("0"), Some("inf"), Some("NaN")] {
             assert_eq!(slurm_end(none), None);
         }
+    }
+
+    #[test]
+    fn the_end_of_the_slurm_job_leaves_time_for_a_step_a_checkpoint_and_the_margin() {
+        let limits = Limits { wall: f64::INFINITY, slurm: 100.0, margin: 30.0 };
+        let spent =
+            |since_learnt| Spent { since_launch: 1e6, since_learnt, longest_round: 7.0, longest_save: 5.0 };
+        // 100 - 30 - 7 - 5 = 58.
+        assert_eq!(limits.reached(spent(57.9)), [false, false]);
+        assert_eq!(limits.reached(spent(58.0)), [false, true]);
+        assert_eq!(limits.reached(Spent { longest_round: 7.2, ..spent(57.9) }), [false, true]);
+        assert_eq!(limits.reached(Spent { longest_save: 5.2, ..spent(57.9) }), [false, true]);
+        assert_eq!(Limits { margin: 30.2, ..limits }.reached(spent(57.9)), [false, true]);
+        assert_eq!(Limits { slurm: f64::INFINITY, ..limits }.reached(spent(1e9)), [false, false]);
+    }
+
+    #[test]
+    fn the_wall_time_limit_counts_from_the_launch() {
+        let limits = Limits { wall: 60.0, slurm: f64::INFINITY, margin: 30.0 };
+        let spent =
+            |since_launch| Spent { since_launch, since_learnt: 0.0, longest_round: 7.0, longest_save: 5.0 };
+        assert_eq!([59.9, 60.0].map(|seconds| limits.reached(spent(seconds))[0]), [false, true]);
+    }
+
+    #[test]
+    fn the_longest_checkpoint_counts() {
+        let limits = Limits { wall: f64::INFINITY, slurm: f64::INFINITY, margin: 0.0 };
+        let (now, zero) = (Instant::now(), Duration::ZERO);
+        let mut deadline = Deadline {
+            began: now,
+            limits,
+            over: None,
+            learnt: now,
+            checked: now,
+            longest_round: zero,
+            longest_save: zero,
+        };
+        for seconds in [2, 5, 3] {
+            deadline.saved(Duration::from_secs(seconds));
+        }
+        assert_eq!(deadline.longest_save, Duration::from_secs(5));
     }
 }

@@ -9,7 +9,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// Versions, title, mesh, partition, effects, solver, output folder, warnings: a line each. Collective.
+/// Versions, title, mesh, partition, effects, solver, output folder: a line each. Collective.
 pub(super) fn lines<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -51,9 +51,12 @@ pub(super) fn lines<const D: usize, const S: usize>(
     lines.push(format!("solver     {}: {reason}", preconditioner.name()));
     lines.extend(verdict.words.iter().map(|words| format!("certified  {words}")));
     lines.push(format!("output     {}", job.output_folder().display()));
-    lines
-        .extend(loaded.warnings.iter().chain(&verdict.warnings).map(|warning| format!("warning: {warning}")));
     Ok(lines)
+}
+
+/// What the user should know before the first step.
+pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
+    loaded.warnings.iter().chain(&ready.verdict.warnings).cloned().collect()
 }
 
 /// Status, sums, times.
@@ -61,16 +64,16 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     if let Some(error) = &summary.error {
         log.line(format!("error: {error}"));
     }
-    if let Some(warning) = summary.warning() {
-        log.line(format!("warning: {warning}"));
-    }
     log.line(format!(
         "{}     {} steps to t = {} s, {} Newton and {} linear iterations",
         summary.status, summary.steps, summary.time, summary.newton_iterations, summary.linear_iterations
     ));
     log.line(format!(
-        "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}",
-        summary.max_inclusion_residual, summary.max_energy_imbalance, summary.max_von_mises
+        "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}, at the end {:.6}",
+        summary.max_inclusion_residual,
+        summary.max_energy_imbalance,
+        summary.max_von_mises,
+        summary.final_von_mises
     ));
     if let (Some(total), Some(share)) = (summary.error_indicator, summary.relative_error_indicator) {
         log.line(format!("indicator  error of the stress {total:.4e}, {:.1} % of its norm", 100.0 * share));

@@ -20,8 +20,10 @@ use std::path::{Path, PathBuf};
 pub(super) struct Restored {
     pub file: String,
     pub totals: Totals,
-    /// What the log says about it.
-    pub words: Vec<String>,
+    /// Checkpoints that were passed over, and why.
+    pub faults: Vec<String>,
+    /// What the log says about the one that was taken.
+    pub words: String,
 }
 
 /// Puts the checkpoint that `start` asks for into the state. Collective.
@@ -43,9 +45,8 @@ pub(super) fn restore<const D: usize, const S: usize>(
         match session.agree(checkpoint::restore(session, path, identity, body, state)) {
             Ok(header) => {
                 let file = path.display().to_string();
-                let mut words: Vec<String> = faults.iter().map(|fault| format!("warning: {fault}")).collect();
-                words.push(format!("going on from {file} (step {}, t = {} s)", header.step, header.time));
-                return Ok(Some(Restored { file, totals: header.totals, words }));
+                let words = format!("going on from {file} (step {}, t = {} s)", header.step, header.time);
+                return Ok(Some(Restored { file, totals: header.totals, faults, words }));
             }
             Err(error) if error.exit() == Exit::Refused => return Err(error),
             Err(error) => faults.push(error.to_string()),

@@ -15,7 +15,7 @@ use crate::{
     session::Session,
 };
 use mpi::{topology::Communicator, traits::Root};
-use std::path::Path;
+use std::{fs::File, path::Path};
 
 /// Generated meshes of more cells than this are made in parts, each by its rank.
 const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
@@ -35,7 +35,10 @@ impl Scene {
         let scene = match &loaded.job.mesh {
             job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
             job::Mesh::Box(of) => generated(session, cuboid(of), of.partition).map(Self::Three)?,
-            job::Mesh::File(path) => from_file(session, path)?,
+            job::Mesh::File(path) => {
+                session.agree(if session.is_first() { refuse_missing(path, loaded) } else { Ok(()) })?;
+                from_file(session, path)?
+            }
         };
         match &scene {
             Self::Two(mesh) => hold(session, mesh, loaded)?,
@@ -70,6 +73,14 @@ fn generated<const D: usize, G: Grid<D>>(
     }
     let whole = session.is_first().then(|| grid.whole()).transpose();
     split(session, session.agree(whole)?)
+}
+
+/// Refuses a mesh file that can't be opened, at its place in the job.
+fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
+    File::open(path).map(drop).map_err(|error| {
+        let help = "a relative path starts from the folder of the job file";
+        loaded.fault("mesh.file", format!("cannot read {}: {error}", path.display()), help)
+    })
 }
 
 fn from_file(session: &Session, path: &Path) -> Result<Scene, Agreed> {

@@ -91,6 +91,6 @@ pub(super) fn totals_at_start<const D: usize, const S: usize>(
     state: &State,
 ) -> Result<Totals> {
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
-    let mine = session.agree(body.energy(state, rest))?;
+    let (mine, _) = session.agree(body.energy(state, rest))?;
     Ok(Totals::at_start(Energy::from_array(session.sum(mine.to_array()))))
 }

@@ -12,6 +12,9 @@ use std::path::Path;
 /// The file in the output folder.
 pub(super) const SUMMARY: &str = "summary.json";
 
+/// The norm of the strain up to which the theory of small strains is taken to hold.
+const LARGEST_STRAIN: f64 = 0.1;
+
 /// The object; names are part of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
@@ -19,6 +22,8 @@ pub struct Summary {
     pub status: &'static str,
     /// What went wrong, if something did.
     pub error: Option<String>,
+    /// What the user should know of the job, its certificates and the run.
+    pub warnings: Vec<String>,
     /// Version of the solver with the id of its source.
     pub version: &'static str,
     /// Version of PETSc.
@@ -56,7 +61,11 @@ pub struct Summary {
     /// The checkpoint this run went on from.
     pub restarted_from: Option<String>,
     /// Largest von Mises norm of sigma at the end, in Pa.
+    pub final_von_mises: f64,
+    /// Largest von Mises norm of sigma after any step, in Pa.
     pub max_von_mises: f64,
+    /// Largest norm of the strain after any step, in plane stress of its part in the plane.
+    pub max_strain: f64,
     /// Error indicator of the stress at the end, in J^(1/2), in two dimensions (J/m)^(1/2); absent unless asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_indicator: Option<f64>,
@@ -115,15 +124,23 @@ impl Summary {
         write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
-    /// What a certificate did not cover and the run came to, in words, if there is any.
-    pub fn warning(&self) -> Option<String> {
-        let (bound, most) = (self.certificates.slip_pressure_bound?, self.max_slip_pressure?);
-        (most > bound).then(|| {
+    /// What the theory or a certificate does not cover and the run came to, in words.
+    pub fn found_on_the_way(&self) -> impl Iterator<Item = String> {
+        let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
+        let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
             format!(
                 "the contact pressure reached {most:.4e} Pa, beyond the {bound:.4e} Pa up to which steps with slip weakening are \
                  known to have one solution; a smaller [time] step raises that bound"
             )
-        })
+        });
+        let strain = (self.max_strain > LARGEST_STRAIN).then(|| {
+            format!(
+                "the strain reached {:.3}, beyond {LARGEST_STRAIN}: the equations are those of small strains and take no account \
+                 of the change of shape",
+                self.max_strain
+            )
+        });
+        slip.into_iter().chain(strain)
     }
 
     /// The version, for use where the struct is filled.

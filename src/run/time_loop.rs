@@ -4,6 +4,7 @@ use super::{
     Clock, Inventory, Start, build,
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
+    header,
     outputs::{Outputs, Wanted},
     phases,
     restored::restore,
@@ -59,9 +60,11 @@ pub(super) fn run<const D: usize, const S: usize>(
     let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state)?;
     session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {
-        restored.words.iter().for_each(|words| log.line(words));
+        restored.faults.iter().for_each(|fault| log.warning(fault));
+        log.line(&restored.words);
     }
-    session.agree(super::header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
+    session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
+    header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
     let totals = match &restored {
         Some(restored) => restored.totals,
@@ -77,7 +80,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         adaptive.pace = pace;
     }
     let deadline = Deadline::new(session, job, clock);
-    deadline.words().iter().for_each(|words| log.line(words));
+    deadline.tell(&mut log);
     let mut run = Run {
         session,
         job,
@@ -197,7 +200,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             return Ok(());
         }
         Err(Error::Failed(format!(
-            "at t = {:.6e} s energies or residuals are not finite numbers: see whether loads, velocities and the [time] step, in \
+            "at t = {:.6e} s energies, stresses or residuals are not finite numbers: see whether loads, velocities and the [time] step, in \
              SI units, are of sensible size",
             self.state.time
         )))
@@ -300,10 +303,12 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             Err(error) => ("failed", Some(error.to_string())),
         };
         let summary = self.summary(status, error, restarted_from);
-        let written = self.session.agree(summary).and_then(|summary| {
+        let written = self.session.agree(summary).and_then(|mut summary| {
+            summary.found_on_the_way().for_each(|warning| self.log.warning(warning));
+            summary.warnings = self.log.warnings().to_vec();
             let mut written = Ok(());
             if self.session.is_first() {
-                super::header::closing(&mut self.log, &summary, self.job.output_folder());
+                header::closing(&mut self.log, &summary, self.job.output_folder());
                 written = summary.write(self.job.output_folder());
             }
             self.session.agree(written)
@@ -335,6 +340,7 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         Ok(Summary {
             status,
             error,
+            warnings: Vec::new(),
             version: Summary::version(),
             petsc_version: self.session.petsc().version()?,
             ranks: self.session.ranks(),
@@ -353,7 +359,9 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
             newton_iterations: self.totals.newton_iterations,
             linear_iterations: self.totals.linear_iterations,
             restarted_from,
-            max_von_mises: self.session.largest([von_mises])[0],
+            final_von_mises: self.session.largest([von_mises])[0],
+            max_von_mises: self.totals.max_von_mises,
+            max_strain: self.totals.max_strain,
             error_indicator: indicated.as_ref().map(|indicated| indicated.total),
             relative_error_indicator: indicated.as_ref().map(|indicated| indicated.relative),
             max_inclusion_residual: self.totals.max_inclusion_residual,

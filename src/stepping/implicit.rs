@@ -8,10 +8,10 @@
 //! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`, for the velocity in the
 //! metric of the mass and for the stress in that of the compliance. For implicit Euler only the last term is left.
 
-use super::{contacts::released_by_contact, flow::FlowStart};
+use super::{contacts::released_by_contact, flow::FlowStart, scheme::over_ranks};
 use crate::{
     body::Body,
-    effect::{Blend, Energy, Form, Step},
+    effect::{Blend, Energy, Form, Peaks, Step},
     error::Result,
     petsc::DistributedVector,
     session::Session,
@@ -147,14 +147,14 @@ impl Implicit {
         body: &Body<D, S>,
         state: &State,
         step: Step,
-    ) -> Result<Energy> {
-        let mut energy = body.energy(state, step)?;
+    ) -> Result<(Energy, Peaks)> {
+        let (mut energy, peaks) = body.energy(state, step)?;
         energy += self.solved;
         released_by_contact(body, state, step, &mut energy)?;
         if self.blend.earlier != 0.0 && body.has_form(Form::Mass) {
             energy.numerical += self.beside(body, state, step)?;
         }
-        Ok(Energy::from_array(session.sum(energy.to_array())))
+        Ok(over_ranks(session, energy, peaks))
     }
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells.

@@ -7,10 +7,10 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::contacts::released_by_contact;
+use super::{contacts::released_by_contact, scheme::over_ranks};
 use crate::{
     body::Body,
-    effect::{Energy, Step},
+    effect::{Energy, Peaks, Step},
     error::Result,
     session::Session,
     state::State,
@@ -41,10 +41,10 @@ impl LaggedEuler {
         body: &Body<D, S>,
         state: &State,
         step: Step,
-    ) -> Result<Energy> {
-        let mut energy = body.energy(state, step)?;
+    ) -> Result<(Energy, Peaks)> {
+        let (mut energy, peaks) = body.energy(state, step)?;
         energy += self.explicit;
         released_by_contact(body, state, step, &mut energy)?;
-        Ok(Energy::from_array(session.sum(energy.to_array())))
+        Ok(over_ranks(session, energy, peaks))
     }
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     body::Body,
-    effect::{COUNTS, Contact, Energy, PointCount, Step},
+    effect::{COUNTS, Contact, Energy, Peaks, PointCount, Step},
     error::{Error, Result},
     petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
     session::Session,
@@ -230,6 +230,7 @@ impl Newton {
             inclusion_residual: inclusion,
             solutions: 0,
             energy: Energy::default(),
+            peaks: Peaks::default(),
         })
     }
 

@@ -1,4 +1,4 @@
-use crate::effect::{Energy, PointCount};
+use crate::effect::{Energy, Peaks, PointCount};
 
 /// What a step cost and how well it was solved.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -19,4 +19,6 @@ pub struct StepOutcome {
     pub solutions: usize,
     /// Energies of the step, over all ranks.
     pub energy: Energy,
+    /// Largest stress and strain at its end, over all ranks.
+    pub peaks: Peaks,
 }

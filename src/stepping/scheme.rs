@@ -3,7 +3,7 @@
 use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
 use crate::{
     body::Body,
-    effect::{Energy, Step},
+    effect::{Energy, Peaks, Step},
     error::Result,
     petsc::DistributedVector,
     session::Session,
@@ -135,17 +135,24 @@ impl Method {
         }
     }
 
-    /// Energies of the step just committed, over all ranks, without the work of the loads. Collective.
+    /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks.
+    /// Collective.
     pub fn energy<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
         state: &State,
         step: Step,
-    ) -> Result<Energy> {
+    ) -> Result<(Energy, Peaks)> {
         match self {
             Self::LaggedEuler(scheme) => scheme.energy(session, body, state, step),
             Self::Implicit(scheme) => scheme.energy(session, body, state, step),
         }
     }
+}
+
+/// Sums and largest values over all ranks. Collective.
+pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
+    let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);
+    (Energy::from_array(session.sum(energy.to_array())), Peaks { von_mises, strain })
 }

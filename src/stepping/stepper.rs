@@ -241,7 +241,7 @@ impl Stepper {
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
-        outcome.energy = self.method.energy(session, body, state, step)?;
+        (outcome.energy, outcome.peaks) = self.method.energy(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
             outcome.energy.work = step.length * load.dot(&state.velocity)?;

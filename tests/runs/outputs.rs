@@ -4,8 +4,10 @@ use crate::{
     case::{Case, paper_job},
     hdf5_file::NumberFile,
     launch,
+    report::report,
     results::Results,
 };
+use clarke::tensor::larger;
 
 const HISTORY: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
@@ -97,7 +99,8 @@ fn the_summary_has_the_keys_of_the_contract() {
     );
     assert!(summary["petsc_version"].as_str().is_some_and(|version| version.starts_with("3.")));
     let positive = |value: &serde_json::Value| value.as_f64().is_some_and(|number| number > 0.0);
-    for key in ["newton_iterations", "linear_iterations", "max_von_mises", "peak_memory_bytes"] {
+    let sizes = ["final_von_mises", "max_von_mises", "max_strain", "peak_memory_bytes"];
+    for key in ["newton_iterations", "linear_iterations"].into_iter().chain(sizes) {
         assert!(positive(&summary[key]), "{key}");
     }
     for key in ["max_inclusion_residual", "max_energy_imbalance"] {
@@ -161,6 +164,51 @@ fn fields_are_written_when_the_job_says() {
     assert_eq!(field_times(&case().set("output.fields", "{interval = 0.25}")), [0.0, 0.25, 0.5, 0.6875]);
     assert_eq!(field_times(&case().set("output.fields", "{interval = 0.3}")), [0.0, 0.3125, 0.625, 0.6875]);
     assert_eq!(field_times(&case().without("output.fields")), [0.6875]);
+}
+
+#[test]
+fn the_largest_stress_of_the_run_is_that_of_any_step_and_the_final_one_that_of_the_last() {
+    for scheme in ["lagged_euler", "bdf2"] {
+        let case = Case::square(4)
+            .set("traction.0.value", "[0, '-10*sin(pi*t)^2']")
+            .set("time.scheme", &format!("'{scheme}'"))
+            .set("output.fields", "{every = 1}");
+        let results = case.run(2);
+        let file = NumberFile::open(&results.path("fields.vtkhdf"));
+        let largest = |step| file.field("von_mises", step).into_iter().fold(0.0, larger);
+        let steps = file.times().len();
+        let most = (1..steps).map(largest).fold(0.0, larger);
+        let [found, last] = ["max_von_mises", "final_von_mises"].map(|name| results.number(name));
+        assert!((found / most - 1.0).abs() < 1e-12, "{scheme}: {found} instead of {most}");
+        assert!((last / largest(steps - 1) - 1.0).abs() < 1e-12, "{scheme}: {last}");
+        assert!(found > 1.5 * last, "{scheme}: {found} and {last}: the load has gone");
+    }
+}
+
+#[test]
+fn warnings_of_a_run_are_in_its_summary_and_strains_beyond_small_ones_are_among_them() {
+    let case = Case::square(4);
+    let summary = case.run(2).summary();
+    assert_eq!(summary["warnings"], serde_json::json!([]));
+    assert!(summary["max_strain"].as_f64().is_some_and(|strain| 0.0 < strain && strain < 0.1));
+    let case =
+        Case::square(4).set("traction.0.value", "[0, -100]").set("material.elasticity.poisson_ratio", "0.46");
+    let outcome = case.run_with(2, &[]).expect(0);
+    let summary = case.results().summary();
+    let warnings: Vec<&str> = summary["warnings"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|warning| warning.as_str().expect("words"))
+        .collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].contains("Poisson") || warnings[0].contains("poisson"), "{warnings:?}");
+    assert!(warnings[1].contains("beyond 0.1") && warnings[1].contains("small strains"), "{warnings:?}");
+    for warning in &warnings {
+        assert_eq!(outcome.stdout.matches(&format!("warning: {warning}")).count(), 1, "{}", outcome.stdout);
+    }
+    let html = std::fs::read_to_string(report(&case.folder().join("out"))).expect("page");
+    assert!(html.contains("<h2>Warnings</h2>"), "{html}");
 }
 
 /// The paper's law (72).

@@ -55,7 +55,15 @@ fn assert_identical(straight: &Results, results: &Results, what: &str) {
         );
     }
     let (one, other) = (straight.summary(), results.summary());
-    let same = ["steps", "newton_iterations", "linear_iterations", "max_von_mises", "max_energy_imbalance"];
+    let same = [
+        "steps",
+        "newton_iterations",
+        "linear_iterations",
+        "final_von_mises",
+        "max_von_mises",
+        "max_strain",
+        "max_energy_imbalance",
+    ];
     let more = ["max_inclusion_residual", "max_slip_pressure", "inventory", "effects"];
     for key in same.into_iter().chain(more) {
         assert_eq!(one[key], other[key], "{what}: {key}");

@@ -77,7 +77,7 @@ pub struct Job {
     /// When the complete state is saved; absent: only when the run is stopped or fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<Checkpoint>,
-    /// Numbers this job is known to give, by the quoted name of the quantity, such as "max_von_mises" or
+    /// Numbers this job is known to give, by the quoted name of the quantity, such as "final_von_mises" or
     /// "probe.tip.velocity_y"; every example job is a regression test.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("key_help" = "quote the whole name: \"probe.tip.velocity_y\" = { value = .., relative = .. }"))]
