@@ -7,6 +7,7 @@ ARGS ?=
 DEPS ?= yes
 # A PETSc with 64-bit indices, where Debian and Ubuntu put it.
 PETSC64_DIR ?= /usr/lib/petscdir/petsc64-real
+TARGET64 ?= target/petsc64
 
 binary := $(or $(CARGO_TARGET_DIR),target)/release/solver
 share := $(DESTDIR)$(PREFIX)/share/clarke
@@ -26,7 +27,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run test test64 check64 hard bench bench-runs lint install clean
+.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -34,8 +35,9 @@ help:
 	@echo 'make build     compile the solver: $(binary)'
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
-	@echo 'make test      deps, then every test'
+	@echo 'make test      deps, then every test, and 20 s of random input for each reader of files'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
+	@echo 'make test64-lib  only the tests of the library there'
 	@echo 'make check64   only whether it compiles there'
 	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost; ARGS=--write puts the tables into docs'
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
@@ -64,11 +66,14 @@ run: deps
 
 test: deps
 	cargo test --release --locked
+	fuzz/run.sh 20
 
 # Everything compiled for these indices stays in a folder of its own.
-test64: deps64
-	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir target/petsc64 --lib
-	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir target/petsc64 --test jobs on_two_ranks
+test64: test64-lib
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test jobs on_two_ranks
+
+test64-lib: deps64
+	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --lib
 
 check64: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings

@@ -18,7 +18,7 @@ flags="--cfg fuzzing -Cpasses=sancov-module -Clink-dead-code"
 for argument in level=4 inline-8bit-counters pc-table trace-compares; do
     flags+=" -Cllvm-args=-sanitizer-coverage-$argument"
 done
-RUSTFLAGS="$flags" cargo build --release --target "$host"
+RUSTFLAGS="$flags" cargo build --release --locked --target "$host"
 
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 for target in "${targets[@]}"; do
@@ -26,10 +26,11 @@ for target in "${targets[@]}"; do
     [[ $target == job ]] && more=(../tests/refusals ../jobs)
     [[ $target == mesh ]] && more=(../tests/meshes)
     mkdir -p "target/corpus/$target"
+    found=0
     # Memory stays bounded: no input may make a reader take more.
     "target/$host/release/$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 \
         -print_final_stats=1 -verbosity=0 -artifact_prefix="target/$target-" \
         "target/corpus/$target" "corpus/$target" "${more[@]}" 2>&1 |
-        grep -E 'stat::number_of_executed|ERROR|SUMMARY|panicked|Test unit' || true
-    [[ ${PIPESTATUS[0]} -eq 0 ]] || exit 1
+        grep -E 'stat::number_of_executed|ERROR|SUMMARY|panicked|Test unit' || found=${PIPESTATUS[0]}
+    [[ $found -eq 0 ]] || exit 1
 done
