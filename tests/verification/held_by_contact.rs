@@ -4,7 +4,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
-    error::Error,
+    error::Exit,
     job::Job,
     mesh::{
         GlobalMesh,
@@ -88,10 +88,9 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
     // More than friction bears, and a pull that lifts it off.
     for (pressure, shear) in [(PRESSURE, 1.01 * FRICTION * PRESSURE), (-PRESSURE, 0.0)] {
         let mut run = simulation::<D, S>(session, &job::<D>(pressure, shear, solvers[0]), mesh);
-        let found = run.advance(session);
-        let Err(Error::Failed(words) | Error::Elsewhere { message: words, .. }) = found else {
-            panic!("{pressure}, {shear}: {found:?}");
-        };
+        let found = session.agree(run.advance(session)).expect_err("a failure");
+        assert_eq!(found.exit(), Exit::Failed);
+        let words = found.to_string();
         assert!(words.contains("contact and friction alone hold these motions"), "{words}");
         assert!(words.contains("translation along x"), "{words}");
     }
