@@ -38,7 +38,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         step: Step,
         forces: &mut [f64],
     ) -> f64 {
-        self.effects.iter_mut().for_each(|effect| effect.begin(blend));
+        self.effects.iter_mut().for_each(|effect| effect.begin(blend, step.length));
         let Some(needs) = self.needs(|p| p.explicit) else { return 0.0 };
         let (mesh, effects) = (&self.mesh, &mut self.effects);
         let start = Step { length: blend.length, ..step };

@@ -22,9 +22,7 @@ pub struct PassBytes {
 #[derive(Clone, Copy)]
 enum Moved {
     Converged,
-    /// With the values of the step before, where a scheme keeps them.
-    Start,
-    /// The start is read, the trial values are written.
+    /// With the values of the step before, where a scheme keeps them; the trial values are written.
     All,
 }
 
@@ -33,7 +31,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn pass_bytes(&self) -> PassBytes {
         let explicit = self.needs(|p| p.explicit).map(|needs| {
             let histories = self.moved(|effect| {
-                let moved = if effect.flows() { Moved::Start } else { Moved::All };
+                let moved = if effect.flows() { Moved::Converged } else { Moved::All };
                 effect.phases().explicit.map(|_| moved)
             });
             self.pass(fields(needs) + 2) + histories
@@ -67,7 +65,6 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let earlier: usize = effect.earlier_histories().iter().map(|history| history.bytes).sum();
             match moved {
                 Moved::Converged => both / 2,
-                Moved::Start => both / 2 + earlier,
                 Moved::All => both + earlier,
             }
         };

@@ -1,4 +1,4 @@
-use super::{Blend, History};
+use super::History;
 use crate::{lanes::Pack, space::CellRun};
 use std::borrow::Cow;
 
@@ -35,15 +35,11 @@ impl<const W: usize> CellHistory<W> {
         self.earlier = Some((name, self.converged.clone()));
     }
 
-    /// What an implicit step starts from in a cell, by its run and lane; zeros where none are kept.
+    /// What the last step added in a cell; zeros where that is not kept.
     #[inline]
-    pub fn start(&self, run: usize, lane: usize, blend: Blend) -> [f64; W] {
-        let Some(place) = self.place(run) else { return [0.0; W] };
-        let recent = self.converged[place].lane(lane);
-        match &self.earlier {
-            Some((_, earlier)) => std::array::from_fn(|i| blend.of(recent[i], earlier[place].0[i][lane])),
-            None => recent,
-        }
+    pub fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
+        let (Some(place), Some((_, earlier))) = (self.place(run), &self.earlier) else { return [0.0; W] };
+        std::array::from_fn(|i| self.converged[place].0[i][lane] - earlier[place].0[i][lane])
     }
 
     /// Writes the trial values of a cell, if its run keeps any.
@@ -154,6 +150,11 @@ mod tests {
         assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
         other.restore("h", &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [7.0, 8.0]);
-        assert_eq!(other.start(2, 1, Blend::euler(1.0)), [7.0, 8.0]);
+        assert_eq!(other.last_change(2, 1), [0.0; 2], "not kept");
+        other.keep_earlier("before");
+        other.both(2).expect("values").1.set(1, [7.5, 6.0]);
+        other.commit();
+        assert_eq!(other.last_change(2, 1), [0.5, -2.0]);
+        assert_eq!(other.last_change(1, 0), [0.0; 2], "no such cell");
     }
 }

@@ -1,4 +1,4 @@
-use super::{Blend, Effect, ElasticLaw, Energy, Form, Phases, Step, isotropic};
+use super::{Effect, ElasticLaw, Energy, Form, Phases, Step, isotropic};
 use crate::{
     material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Needs, Simplex},
@@ -10,13 +10,12 @@ use crate::{
 #[derive(Debug)]
 pub struct ImplicitElasticity {
     law: ByMaterial<ElasticLaw>,
-    blend: Blend,
 }
 
 impl ImplicitElasticity {
     /// Elasticity of these materials.
     pub fn new(law: ByMaterial<ElasticLaw>) -> Self {
-        Self { law, blend: Blend::euler(0.0) }
+        Self { law }
     }
 }
 
@@ -44,10 +43,6 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
         if let Some(law) = self.law.get(material) {
             matrix.add_isotropic(cell, length * law.tensor.volumetric, length * law.tensor.shear);
         }
-    }
-
-    fn begin(&mut self, blend: Blend) {
-        self.blend = blend;
     }
 
     fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {

@@ -141,8 +141,8 @@ pub trait Effect<const D: usize, const S: usize> {
     /// weakens weakens the batch as its trial history has it.
     fn add_explicit(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
 
-    /// Takes in how an implicit step starts.
-    fn begin(&mut self, _blend: Blend) {}
+    /// Takes in how an implicit step of this length in s starts.
+    fn begin(&mut self, _blend: Blend, _length: f64) {}
 
     /// Whether its stress at the end of an implicit step is no linear function of the velocity, so that
     /// [`Effect::add_flow`] has something to add.

@@ -1,19 +1,22 @@
 use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory, isotropic};
 use crate::{
     lanes::Pack,
-    material::{ByMaterial, Returned, Tangent, Viscoplasticity},
+    material::{ByMaterial, Extrapolated, Returned, Tangent, Viscoplasticity},
     space::{Batch, CellRun, Needs},
     tensor::{Mandel, add_scaled, dot},
 };
 
 /// Viscoplastic flow at the end of the step: `H_n = H~ + k' G(s_n)` with `s_n = E e(u_n) + H_n`, solved in each cell by the
-/// law's return mapping, and the viscoplastic strain that hardening cells accumulate.
+/// law's return mapping, and the viscoplastic strain that hardening cells accumulate. Of the flow `H_{n-1} - H~` that a two-step
+/// formula extrapolates a cell takes the share that [`Viscoplasticity::continue_flow`] finds: what does not yield keeps
+/// `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run does.
 #[derive(Debug)]
 pub struct ViscoplasticFlow<const S: usize> {
     laws: ByMaterial<Viscoplasticity>,
     stress: CellHistory<S>,
     accumulated: Option<CellHistory<1>>,
     blend: Blend,
+    step_length: f64,
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {
@@ -30,11 +33,11 @@ impl<const S: usize> ViscoplasticFlow<S> {
             stress.keep_earlier("previous_viscoplastic_history");
             accumulated.iter_mut().for_each(|a| a.keep_earlier("previous_equivalent_viscoplastic_strain"));
         }
-        Self { laws, stress, accumulated, blend: Blend::euler(0.0) }
+        Self { laws, stress, accumulated, blend: Blend::euler(0.0), step_length: 0.0 }
     }
 
-    /// Lets each cell of the batch flow; `visit` gets the cell's lane, the history `H~` of the start, its law,
-    /// the stress without flow and what the mapping found.
+    /// Lets each cell of the batch flow; `visit` gets the cell's lane, its law, the stress without flow and what flow made of
+    /// it.
     #[inline(always)]
     fn advance<const D: usize>(
         &mut self,
@@ -43,29 +46,38 @@ impl<const S: usize> ViscoplasticFlow<S> {
         mut visit: impl FnMut(&mut Batch<D, S>, usize, &Viscoplasticity, &Mandel<S>, Option<&Returned<S>>),
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let blend = self.blend;
+        let Some(&converged) = self.stress.converged(batch.number) else { return };
+        let Blend { length, earlier, .. } = self.blend;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
         for lane in 0..batch.count {
-            let start = self.stress.start(batch.number, lane, blend);
-            let trial = add_scaled(&law.elasticity().apply(&batch.strain.lane(lane)), 1.0, &start);
-            let [before] = accumulated.as_ref().map_or([0.0], |a| a.start(batch.number, lane, blend));
+            let history = converged.lane(lane);
+            let elastic = add_scaled(&law.elasticity().apply(&batch.strain.lane(lane)), 1.0, &history);
+            let before = accumulated.as_ref().and_then(|a| a.converged(batch.number));
+            let before = before.map_or(0.0, |before| before.0[0][lane]);
+            let change = if earlier == 0.0 { [0.0; S] } else { self.stress.last_change(batch.number, lane) };
             let mut tangent = [[0.0; S]; S];
             let wanted = tangents.is_some().then_some(&mut tangent);
-            let found = law.return_stress(&trial, blend.length, before, wanted);
-            let mut history = start;
-            let mut after = before;
-            if let Some(found) = &found {
-                history = add_scaled(&start, -1.0, &law.elasticity().apply(&found.flow));
-                after = found.accumulated;
+            let found = if change == [0.0; S] {
+                law.return_stress(&elastic, self.step_length, before, wanted).map(|found| (found, true))
+            } else {
+                let flow = law.elasticity().solve(&change.map(|change| earlier * change));
+                let [growth] = accumulated.as_ref().map_or([0.0], |a| a.last_change(batch.number, lane));
+                let last = Extrapolated { flow, growth: -earlier * growth };
+                law.continue_flow(&elastic, &last, length, before, wanted)
+            };
+            let (mut after, mut total) = (history, before);
+            if let Some((found, symmetric)) = &found {
+                after = add_scaled(&history, -1.0, &law.elasticity().apply(&found.flow));
+                total = found.accumulated;
                 if let Some(tangents) = &mut tangents {
-                    tangents.push(batch.first + lane, &loss(law, &tangent, blend.length));
+                    tangents.push(batch.first + lane, &loss(law, &tangent, length), *symmetric);
                 }
             }
-            self.stress.set_trial(batch.number, lane, history);
+            self.stress.set_trial(batch.number, lane, after);
             if let Some(accumulated) = &mut accumulated {
-                accumulated.set_trial(batch.number, lane, [after]);
+                accumulated.set_trial(batch.number, lane, [total]);
             }
-            visit(batch, lane, law, &trial, found.as_ref());
+            visit(batch, lane, law, &elastic, found.as_ref().map(|(found, _)| found));
         }
     }
 }
@@ -101,17 +113,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         self.laws.is_everywhere()
     }
 
-    fn begin(&mut self, blend: Blend) {
-        self.blend = blend;
+    fn begin(&mut self, blend: Blend, length: f64) {
+        (self.blend, self.step_length) = (blend, length);
     }
 
     fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
-        if self.laws.get(batch.material).is_none() {
-            return;
-        }
-        for lane in 0..batch.count {
-            add_to(&mut batch.stress, lane, &self.stress.start(batch.number, lane, self.blend));
-        }
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
     fn flows(&self) -> bool {
@@ -135,23 +143,23 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
         let Some(&converged) = self.stress.converged(batch.number) else { return };
-        let blend = self.blend;
-        self.advance(batch, None, |batch, lane, law, trial, found| {
+        let two_steps = self.blend.earlier != 0.0;
+        self.advance(batch, None, |batch, lane, law, elastic, found| {
             let elasticity = law.elasticity();
-            let stress = found.map_or(*trial, |found| found.stress);
-            let before = elasticity.apply(&batch.strain_before.lane(lane));
-            let before = add_scaled(&before, 1.0, &converged.lane(lane));
-            let change = add_scaled(&stress, -1.0, &before);
-            // k times the elastic strain rate: the step's strain without its flow.
-            let mut rate = batch.strain_rate.lane(lane).map(|rate| step.length * rate);
+            let stress = found.map_or(*elastic, |found| found.stress);
+            let before = batch.strain_before.lane(lane);
+            let change = add_scaled(&batch.strain.lane(lane), -1.0, &before);
+            let before = add_scaled(&elasticity.apply(&before), 1.0, &converged.lane(lane));
+            let jump = add_scaled(&stress, -1.0, &before);
+            let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
             let volume = batch.cells.volume[lane];
-            if let Some(found) = found {
-                let share = step.length / blend.length;
-                rate = add_scaled(&rate, -share, &found.flow);
-                energy.viscoplastic += volume * share * dot(&stress, &found.flow);
-            }
-            let beside = add_scaled(&elasticity.solve(&change), -1.0, &rate);
-            energy.numerical += volume * (dot(&stress, &beside) - 0.5 * elasticity.inverse_square(&change));
+            let taken = found.map_or(0.0, |found| dot(&stress, &found.flow));
+            // Of second order with the formula. What it extrapolates beyond the rest of the stress gives back, and is its own.
+            let with = |found: &Returned<S>| 0.5 * (taken + dot(&before, &found.flow));
+            let dissipated = found.filter(|_| two_steps).map_or(taken, with).max(0.0);
+            energy.viscoplastic += volume * dissipated;
+            let own = dot(&stress, &beside) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
+            energy.numerical += volume * own;
         });
     }
 

@@ -18,5 +18,5 @@ pub use hardening::Hardening;
 pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};
 pub use maxwell::Maxwell;
 pub use perzyna::{Metric, Perzyna};
-pub use return_mapping::{Returned, Tangent};
+pub use return_mapping::{Extrapolated, Returned, Tangent};
 pub use viscoplasticity::Viscoplasticity;

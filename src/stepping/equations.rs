@@ -47,7 +47,7 @@ pub trait CellForces {
     /// Takes a velocity as the point of linearisation.
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()>;
 
-    /// Whether the derivative is symmetric.
+    /// Whether the derivative is symmetric in this rank's cells.
     fn is_symmetric(&self) -> bool;
 
     /// Adds the change of the forces with a change of the velocity.
@@ -267,7 +267,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     ) -> Result<()> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
-        let skew = cells.as_ref().is_some_and(|cells| !cells.is_symmetric());
+        let skew = cells.is_some()
+            && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
             && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
         let coupled = coupled || skew;

@@ -88,7 +88,7 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     }
 
     fn is_symmetric(&self) -> bool {
-        self.symmetric
+        self.symmetric && self.flow.tangents.are_symmetric()
     }
 
     fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {

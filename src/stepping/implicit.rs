@@ -1,12 +1,13 @@
 //! What implicit Euler and the two-step formula share: a step of length `k'` from a blend `x~` of the states before.
 //!
 //! ```text
-//! (M / k' + A + k' E) v_n + C(v_n) + B^T (s_n - s*) = f_n + M v~ / k' - B^T s~,   s* = s~ + k' E e(v_n)
+//! (M / k' + A + k' E) v_n + C(v_n) + B^T (s_n - s*) = f_n + M v~ / k' - B^T s~,   s~ = E e(u~) + H_{n-1},   s* = s~ + k' E e(v_n)
 //! ```
 //!
-//! Energy: tested with `k v_n`, the change of any energy `1/2 (x, x)` and what the formula makes of it differ by
-//! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`, for the velocity in the
-//! metric of the mass and for the stress in that of the compliance. For implicit Euler only the last term is left.
+//! Energy: tested with `k v_n`, the change of the kinetic energy `1/2 (x, x)` and what the formula makes of it differ by
+//! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`. The elastic energy differs
+//! from the work of the stress less that on the flow of the step by `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`,
+//! in the metric of the compliance. For implicit Euler only the last terms are left.
 
 use super::{contacts::released_by_contact, flow::FlowStart, scheme::over_ranks};
 use crate::{

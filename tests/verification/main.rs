@@ -32,6 +32,7 @@ mod scenes;
 mod schemes;
 mod subspace;
 mod taken_back;
+mod unloading;
 mod wave;
 
 use clarke::session::Mpi;
@@ -79,6 +80,7 @@ fn scenario() {
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
         "taken_back" => taken_back::in_the_plane(&session),
+        "unloading" => unloading::all(&session),
         "orders_space" => orders::space(&session),
         "ladder_plane" => ladder::plane(&session),
         "ladder_space" => ladder::space(&session),

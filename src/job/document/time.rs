@@ -33,7 +33,7 @@ pub enum Scheme {
     LaggedEuler,
     /// Every stress at the end of the step: no bound on the step.
     ImplicitEuler,
-    /// Second order in time.
+    /// Second order in time. What does not yield does not flow, as under implicit_euler.
     Bdf2,
 }
 

@@ -9,9 +9,12 @@
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3; E. de Souza Neto, D. Peric, D. Owen,
 //! Computational Methods for Plasticity, 2008, chapters 7 to 11.)
 
+mod extrapolated;
 mod linear;
 mod plane_stress;
 mod radial;
+
+pub use extrapolated::Extrapolated;
 
 use super::{Hardening, Viscoplasticity};
 use crate::tensor::{Mandel, add_scaled};

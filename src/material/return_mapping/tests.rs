@@ -274,3 +274,119 @@ fn stresses_far_beyond_the_yield_stress_flow_as_their_law_says() {
         }
     }
 }
+
+/// Lets a cell flow on from a step that ended its flow at `before` to the stress `elastic`: whether extrapolated flow was
+/// limited there, and whether the law's tangent was compared with differences.
+fn check_continued<const S: usize>(
+    law: &Viscoplasticity,
+    before: &Mandel<S>,
+    elastic: &Mandel<S>,
+    length: f64,
+) -> [usize; 2] {
+    let earlier = law.return_stress(before, length, 0.01, None).expect("flow");
+    let flow = earlier.flow.map(|flow| flow / 3.0);
+    let last = Extrapolated { flow, growth: (earlier.accumulated - 0.01) / 3.0 };
+    let at = |stress: &Mandel<S>| law.continue_flow(stress, &last, length, earlier.accumulated, None);
+    let mut tangent = [[0.0; S]; S];
+    let found = law.continue_flow(elastic, &last, length, earlier.accumulated, Some(&mut tangent));
+    let yields = law.return_stress(elastic, length, earlier.accumulated, None).is_some();
+    assert_eq!(found.is_some(), yields, "{law:?} at {elastic:?} flows only where it yields");
+    let Some((found, smooth)) = found else { return [0; 2] };
+    let what = format!("{law:?} from {before:?} to {elastic:?} in {length} s");
+    let size = largest(elastic);
+    let beyond = found.stress.map(|s| s * (1.0 + 1e-9));
+    assert!(law.return_stress(&beyond, length, found.accumulated, None).is_some(), "{what}: inside");
+    let taken = dot(&found.stress, &found.flow);
+    let radial = S != 3 && !matches!(law, Viscoplasticity::Maxwell(_));
+    assert!(!radial || taken >= -1e-12 * size * largest(&found.flow), "{what}: dissipates {taken:e}");
+    assert!(found.accumulated >= earlier.accumulated, "{what}: growth");
+    let step = 1e-6 * size;
+    let mut compared = true;
+    for j in 0..S {
+        let moved = |by: f64| {
+            let mut moved = *elastic;
+            moved[j] += by;
+            at(&moved).map_or(moved, |(found, _)| found.stress)
+        };
+        let (above, below) = (moved(step), moved(-step));
+        for i in 0..S {
+            let sides = [(above[i] - found.stress[i]) / step, (found.stress[i] - below[i]) / step];
+            assert!(sides.iter().all(|side| side.abs() < 20.0), "{what}: jumps by {sides:?}");
+            // Not at a kink.
+            if (sides[0] - sides[1]).abs() < 1e-3 {
+                let error = (0.5 * (sides[0] + sides[1]) - tangent[i][j]).abs();
+                assert!(error < 1e-4, "{what}: tangent {i} {j}: {} or {sides:?}", tangent[i][j]);
+            } else {
+                compared = false;
+            }
+        }
+    }
+    [usize::from(!smooth), usize::from(!smooth && compared)]
+}
+
+#[test]
+fn extrapolated_flow_stays_outside_the_yield_surface_dissipates_and_has_its_tangent() {
+    let mut random = proptest::test_runner::TestRng::deterministic_rng(Default::default());
+    let mut counts = [[0; 2]; 3];
+    for _ in 0..150 {
+        let mut number = || f64::from(random.next_u32()) / f64::from(u32::MAX);
+        let before: [f64; 6] = std::array::from_fn(|_| 200.0 * number() - 100.0);
+        let turned = 0.3 * number();
+        let other: [f64; 6] = std::array::from_fn(|_| 200.0 * number() - 100.0);
+        let scale = 1.4 * number() - 0.2;
+        let elastic: [f64; 6] = std::array::from_fn(|i| scale * (before[i] + turned * other[i]));
+        let length = 10f64.powf(4.0 * number() - 2.0);
+        let mut add = |kind: usize, [limited, compared]: [usize; 2]| {
+            counts[kind][0] += limited;
+            counts[kind][1] += compared;
+        };
+        for law in laws(Hypothesis::PlaneStress) {
+            let [before, elastic] = [before, elastic].map(|s| [s[0], s[1], s[3]]);
+            if law.return_stress(&before, length, 0.01, None).is_some() {
+                add(0, check_continued(&law, &before, &elastic, length));
+            }
+        }
+        for law in laws(Hypothesis::PlaneStrain) {
+            let [before, elastic] = [before, elastic].map(|s| [s[0], s[1], s[2], s[3]]);
+            if law.return_stress(&before, length, 0.01, None).is_some() {
+                add(1, check_continued(&law, &before, &elastic, length));
+            }
+        }
+        for law in laws(Hypothesis::Space) {
+            if law.return_stress(&before, length, 0.01, None).is_some() {
+                add(2, check_continued(&law, &before, &elastic, length));
+            }
+        }
+    }
+    println!("limited, and compared with differences: {counts:?}");
+    assert!(
+        counts.iter().all(|[limited, compared]| *limited > 50 && compared * 10 > limited * 8),
+        "{counts:?}"
+    );
+}
+
+#[test]
+fn a_share_of_extrapolated_flow_by_hand() {
+    // q = 31, Y = 19 + 100 x 0.02 = 21: f = 10. With m = 0.016 along the axis q(E m) = 3 G m = 1500 / 1.3 x 0.016, h p_m = 1.6.
+    let perzyna = perzyna(Hypothesis::Space, Metric::Frobenius, 1.0);
+    let law = Viscoplasticity::Hardening(Hardening { perzyna, modulus: 100.0 });
+    let last = Extrapolated { flow: [0.016, -0.008, -0.008, 0.0, 0.0, 0.0], growth: 0.016 };
+    let axial = |stress: f64| law.continue_flow(&[stress, 0.0, 0.0, 0.0, 0.0, 0.0], &last, 1.0, 0.02, None);
+    // A share that takes half of f = 10; the rest flows at its rate: dp = f / 300 / (1 + (3 G + h) / 300).
+    let (stiff, viscous) = (1500.0 / 1.3, 300.0 + 1500.0 / 1.3 + 100.0);
+    let share = 5.0 / (stiff * 0.016 + 1.6);
+    let growth = 0.016 * share + 5.0 / viscous;
+    let (found, smooth) = axial(31.0).expect("flow");
+    assert!(!smooth && (found.accumulated - 0.02 - growth).abs() < 1e-15);
+    assert!((found.flow[0] - growth).abs() < 1e-15);
+    assert!((von_mises(&found.stress) - 31.0 + stiff * growth).abs() < 1e-12);
+    assert_eq!(axial(20.9), None, "what does not yield does not flow");
+    // All of it, and on from q = 71 - 3 G 0.016 and Y = 22.6.
+    let (found, smooth) = axial(71.0).expect("flow");
+    let growth = (71.0 - stiff * 0.016 - 22.6) / viscous;
+    assert!(smooth && (found.accumulated - 0.036 - growth).abs() < 1e-15);
+    assert!((von_mises(&found.stress) - 71.0 + stiff * (0.016 + growth)).abs() < 1e-12);
+    // Pulled the other way, the flow before is not taken on.
+    let (found, _) = axial(-31.0).expect("flow");
+    assert!((found.accumulated - 0.02 - 10.0 / viscous).abs() < 1e-15);
+}
