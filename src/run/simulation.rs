@@ -15,7 +15,7 @@ use crate::{
     output::history::Totals,
     session::Session,
     state::State,
-    stepping::{Adaptive, StepOutcome, Stepper, next_step},
+    stepping::{Adaptive, Pace, StepOutcome, Stepper, next_step},
     tensor::larger,
 };
 
@@ -48,6 +48,11 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         let totals = totals_at_start(session, &body, &state)?;
         let (time, adaptive) = (loaded.job.time.clone(), build::adaptive(&loaded.job));
         Ok(Self { body, state, scheme, totals, time, adaptive })
+    }
+
+    /// Where adaptive steps are on their ladder, if there are any.
+    pub fn pace(&self) -> Option<Pace> {
+        self.adaptive.map(|adaptive| adaptive.pace)
     }
 
     /// Takes the next step; `None` at the end time. Collective.

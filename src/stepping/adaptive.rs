@@ -100,15 +100,11 @@ impl Adaptive {
             self.look_ahead(session, stepper, body, state, target)?;
         }
         loop {
-            let step = next_step(state, self.next_length(state, target), target);
-            match session.agree(stepper.attempt(session, body, state, step)) {
-                Ok(mut outcome) => {
-                    let [error, size] = session.agree(stepper.error(session, body, state, step))?;
-                    let error = self.relative(error, size);
-                    if error > self.settings.tolerance && self.level_of(step) > self.lowest {
-                        self.reject(step, self.fitting(step, error));
-                        continue;
-                    }
+            let length = self.next_length(target - state.time, state.step_length);
+            let step = next_step(state, length, target);
+            let is_shortest = self.level_of(step) <= self.lowest;
+            match self.attempt(session, stepper, body, state, step) {
+                Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
                     let stress = (2.0 * outcome.energy.elastic).max(0.0).sqrt();
                     self.pace.velocity = self.pace.velocity.max(size.velocity);
@@ -116,12 +112,34 @@ impl Adaptive {
                     self.grow(step, error);
                     return Ok(outcome);
                 }
-                Err(error) if error.is_failure() && self.level_of(step) > self.lowest => {
-                    self.reject(step, self.level_of(step) - 1);
-                }
+                Ok((_, error, _)) => self.reject(step, self.fitting(step, error)),
+                Err(error) if error.is_failure() && !is_shortest => self.reject(step, self.level_of(step) - 1),
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    /// Solves a step without taking it; gives its relative error, and the norms at its end. A step whose error is not a number
+    /// has failed. Collective.
+    fn attempt<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<(StepOutcome, f64, Norms), Agreed> {
+        let outcome = session.agree(stepper.attempt(session, body, state, step))?;
+        let [error, size] = session.agree(stepper.error(session, body, state, step))?;
+        let error = self.relative(error, size);
+        let failed = || {
+            Error::Failed(format!(
+                "the error of the step to t = {:.6e} s is not a number: values of the state, the loads or the material have no \
+                 limit; see what the job makes them of",
+                step.time
+            ))
+        };
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, size)) })
     }
 
     /// At the start nothing tells how large velocity and stress will be: a step of the largest length does, which is then
@@ -135,9 +153,8 @@ impl Adaptive {
         target: f64,
     ) -> Result<(), Agreed> {
         let step = next_step(state, self.longest(), target);
-        match session.agree(stepper.attempt(session, body, state, step)) {
-            Ok(_) => {
-                let [_, size] = session.agree(stepper.error(session, body, state, step))?;
+        match self.attempt(session, stepper, body, state, step) {
+            Ok((_, _, size)) => {
                 (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
                 Ok(())
             }
@@ -146,14 +163,14 @@ impl Adaptive {
         }
     }
 
-    /// The length of the next step: at most twice the last one, and half of what is left to the target where a whole one would
-    /// leave a sliver.
-    fn next_length(&self, state: &State, target: f64) -> f64 {
+    /// The length of the next step, with so much `left` to the target, after a step of the length `last` (0 before the first): at
+    /// most twice that, and half of what is left where a whole one would leave a sliver.
+    fn next_length(&self, left: f64, last: f64) -> f64 {
         let mut level = self.pace.level.clamp(self.lowest, self.highest);
-        while state.step > 0 && level > self.lowest && self.length(level) > 2.000_001 * state.step_length {
+        while last > 0.0 && level > self.lowest && self.length(level) > 2.000_001 * last {
             level -= 1;
         }
-        let (length, left) = (self.length(level), target - state.time);
+        let length = self.length(level);
         let leaves_a_sliver = left > (1.0 + SNAP) * length && left < (2.0 - SNAP) * length;
         if leaves_a_sliver { 0.5 * left } else { length }
     }
@@ -163,10 +180,12 @@ impl Adaptive {
         ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
     }
 
+    /// The error beside the largest norms so far; not a number where the error of either is none.
     fn relative(&self, error: Norms, size: Norms) -> f64 {
-        let share = |error: f64, largest: f64| if error > 0.0 { error / largest } else { 0.0 };
+        let share = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let velocity = share(error.velocity, self.pace.velocity.max(size.velocity));
-        velocity.hypot(share(error.stress, self.pace.stress.max(size.stress)))
+        let stress = share(error.stress, self.pace.stress.max(size.stress));
+        (velocity * velocity + stress * stress).sqrt()
     }
 
     /// The level whose steps would have an error within the tolerance: it falls with the square of the length.
@@ -239,5 +258,49 @@ mod tests {
         adaptive.reject(step(0.01), level);
         assert_eq!((adaptive.pace.level, adaptive.pace.rejected), (-2, 1));
         assert_eq!(adaptive.fitting(step(0.01), f64::NAN), -1);
+    }
+
+    #[test]
+    fn the_error_is_relative_to_the_largest_norms_and_never_hides_what_is_no_number() {
+        let norms = |velocity: f64, stress: f64| Norms { velocity, stress };
+        let mut adaptive = adaptive();
+        (adaptive.pace.velocity, adaptive.pace.stress) = (2.0, 0.5);
+        assert_eq!(adaptive.relative(norms(0.6, 0.0), norms(1.0, 1.0)), 0.3, "the largest velocity was 2");
+        assert_eq!(
+            adaptive.relative(norms(0.0, 0.8), norms(1.0, 2.0)),
+            0.4,
+            "the largest stress is that of now"
+        );
+        assert!((adaptive.relative(norms(0.6, 0.8), norms(1.0, 2.0)) - 0.5).abs() < 1e-15);
+        assert_eq!(adaptive.relative(norms(-1e-30, -0.0), norms(1.0, 1.0)), 0.0, "rounding below zero");
+        (adaptive.pace.velocity, adaptive.pace.stress) = (0.0, 0.0);
+        assert_eq!(adaptive.relative(norms(0.0, 0.0), norms(0.0, 0.0)), 0.0, "nothing moves");
+        for bad in [norms(f64::NAN, 0.1), norms(0.1, f64::NAN), norms(f64::INFINITY, f64::NAN)] {
+            assert!(adaptive.relative(bad, norms(1.0, 1.0)).is_nan(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn lengths_double_at_most_and_leave_no_sliver() {
+        let mut adaptive = adaptive();
+        adaptive.pace.level = 3;
+        assert_eq!(adaptive.next_length(100.0, 0.0), 0.08, "nothing was before the first");
+        assert_eq!(adaptive.next_length(100.0, 0.01), 0.02);
+        assert_eq!(adaptive.next_length(100.0, 0.005), 0.01);
+        assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a rung of the ladder");
+        assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the ladder");
+        assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of what is left");
+        assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "cut by the target, not here");
+        assert_eq!(adaptive.next_length(0.16, 0.08), 0.08, "two steps are left");
+        adaptive.pace.level = -9;
+        assert_eq!(adaptive.next_length(100.0, 0.08), 0.00125);
+    }
+
+    #[test]
+    fn the_level_of_a_step_is_the_highest_that_is_not_longer() {
+        let adaptive = adaptive();
+        for (length, level) in [(0.01, 0), (0.0199, 0), (0.02, 1), (0.005, -1), (0.0049, -2), (0.08, 3)] {
+            assert_eq!(adaptive.level_of(step(length)), level, "{length}");
+        }
     }
 }

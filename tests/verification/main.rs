@@ -3,6 +3,7 @@
 //!
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
 
+mod adaptive;
 mod adhesion;
 mod allocations;
 mod assembly;
@@ -47,6 +48,7 @@ fn scenario() {
     let mpi = Mpi::start().expect("MPI");
     let session = mpi.session().expect("PETSc");
     match name.as_str() {
+        "adaptive_errors" => adaptive::errors(&session),
         "vectors" => petsc_boundary::exchange_vectors(&session),
         "matrices" => petsc_boundary::multiply_matrices(&session),
         "linear" => petsc_boundary::solve_linear(&session),

@@ -1,0 +1,130 @@
+//! Steps chosen by their error: what the error of a step is, and that steps taken back leave nothing.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, simulation};
+use clarke::{
+    effect::Step,
+    error::Error,
+    mesh::{
+        GlobalMesh,
+        generate::{Diagonal, rectangle},
+    },
+    run::Simulation,
+    session::Session,
+};
+
+fn square(cells: usize) -> GlobalMesh<2> {
+    rectangle([1.0, 1.0], [cells, cells], Diagonal::Right, [1.0, 1.0]).expect("mesh")
+}
+
+/// `[time]` with adaptive steps.
+fn time(scheme: &str, end: f64, step: f64, tolerance: f64, bounds: [f64; 2]) -> String {
+    let [smallest, largest] = bounds;
+    format!(
+        "{}[time]\nend = {end}\nstep = {step}\nscheme = \"{scheme}\"\nadaptive = {{ tolerance = {tolerance:e}, \
+         smallest_step = {smallest:e}, largest_step = {largest:e} }}\n",
+        any_mesh::<2>()
+    )
+}
+
+/// A free block that a force moves as a whole: its velocity is known in closed form after any steps, and with it the error by
+/// hand, `k_n / (k_n + k_{n-1}) |dv_n - w dv_{n-1}|` in the norm of the mass.
+fn by_hand(session: &Session) {
+    let density = 4.0;
+    let job = time("implicit_euler", 1.0, 0.1, 1e-3, [1e-6, 0.5])
+        + &format!("[material]\nhypothesis = \"plane_strain\"\ndensity = {density}\n")
+        + "elasticity = { youngs_modulus = 100, poisson_ratio = 0.3 }\nviscosity = { volumetric = 0, shear = 1 }\n"
+        + &format!(
+            "[[body_force]]\nvalue = [\"{density}*t\", 0]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n"
+        );
+    let mut run = simulation::<2, 4>(session, &job, &square(2));
+    let (mut time, mut velocity, mut last) = (0.0, 0.0, [0.0; 2]);
+    for length in [0.1, 0.2, 0.1, 0.1] {
+        time += length;
+        let step = Step { time, length, previous_length: last[0] };
+        let mut outcome = run.scheme.attempt(session, &mut run.body, &run.state, step).expect("a step");
+        let [error, size] = run.scheme.error(session, &run.body, &run.state, step).expect("an error");
+        run.scheme.accept(session, &mut run.body, &mut run.state, step, &mut outcome).expect("committed");
+        let change = length * time;
+        velocity += change;
+        let (ratio, share) =
+            if last[0] > 0.0 { (length / last[0], length / (length + last[0])) } else { (0.0, 0.5) };
+        let expected = 2.0 * share * (change - ratio * last[1]).abs();
+        assert!(
+            (error.velocity - expected).abs() < 1e-9,
+            "w = {ratio}: {} is not {expected}",
+            error.velocity
+        );
+        assert!((size.velocity - 2.0 * velocity).abs() < 1e-9, "{} {velocity}", size.velocity);
+        assert!(error.stress < 1e-6 * size.stress, "it flies without stress: {error:?} {size:?}");
+        last = [length, change];
+    }
+}
+
+/// The paper's square, small, with flow and contact, under a load that grows and ends.
+fn paper(scheme: &str) -> String {
+    time(scheme, 0.5, 0.03125, 0.02, [1e-5, 0.0625])
+        + "[material]\nhypothesis = \"plane_stress\"\ndensity = 1\n\
+           elasticity = { youngs_modulus = 1000, poisson_ratio = 0.4 }\nviscosity = { volumetric = 25, shear = 50 }\n\
+           viscoplasticity.perzyna = { relaxation = 100, yield_stress = 5 }\n\
+           [[support]]\non = [\"left\"]\nfix = \"all\"\n[[traction]]\non = [\"top\"]\nvalue = [0, \"-10*cos(9*t)\"]\n\
+           [[contact]]\non = [\"bottom\"]\n\
+           normal.damped_response = { breakpoints = [0.003, 0.005], slopes = [10, -10, 10] }\n"
+}
+
+/// All that a run has come to.
+fn fields(run: &Simulation<2, 3>) -> Vec<Vec<f64>> {
+    let state = &run.state;
+    let mut all: Vec<Vec<f64>> = [&state.displacement, &state.velocity, &state.previous_velocity]
+        .map(|field| field.owned().expect("values").to_vec())
+        .into();
+    all.extend(run.body.effects.iter().flat_map(|e| e.histories()).map(|h| h.values.into_owned()));
+    all
+}
+
+/// The lengths that an adaptive run took, taken as they are without any step taken back, give the same bits.
+fn replay(session: &Session, scheme: &str) {
+    let mesh = square(4);
+    let mut run = simulation::<2, 3>(session, &paper(scheme), &mesh);
+    let mut steps = Vec::new();
+    while run.advance(session).expect("a step").is_some() {
+        steps.push((run.state.time, run.state.step_length));
+    }
+    let rejected = run.pace().expect("adaptive").rejected;
+    let shortened = steps.windows(2).filter(|pair| pair[1].1 < 0.9 * pair[0].1).count();
+    assert!(rejected > 0 && shortened > 0, "{scheme}: {rejected} taken back, {steps:?}");
+    let mut other = simulation::<2, 3>(session, &paper(scheme), &mesh);
+    let mut previous_length = 0.0;
+    for (time, length) in steps {
+        let step = Step { time, length, previous_length };
+        other.scheme.advance(session, &mut other.body, &mut other.state, step).expect("a step");
+        previous_length = length;
+    }
+    for (one, other) in fields(&run).iter().zip(&fields(&other)) {
+        assert_eq!(one, other, "{scheme}");
+    }
+}
+
+/// A step whose error is not a number is never taken.
+fn no_number(session: &Session) {
+    let mut run = simulation::<2, 3>(session, &paper("implicit_euler"), &square(2));
+    run.advance(session).expect("a step");
+    run.state.previous_velocity.owned_mut().expect("values").fill(f64::NAN);
+    run.state.previous_velocity.update_ghosts().expect("ghosts");
+    let outcome = run.advance(session);
+    assert!(matches!(&outcome, Err(Error::Failed(words)) if words.contains("not a number")), "{outcome:?}");
+    assert_eq!(run.state.step, 1);
+}
+
+pub fn errors(session: &Session) {
+    by_hand(session);
+    no_number(session);
+    for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
+        replay(session, scheme);
+    }
+}
+
+#[test]
+fn the_error_of_a_step_is_that_by_hand_and_steps_taken_back_leave_nothing() {
+    run_on(&[1, 2], "adaptive_errors");
+}
