@@ -9,7 +9,8 @@ pub use traffic::PassBytes;
 use crate::{
     agreement::Agreed,
     effect::{
-        Contact, Effect, Energy, Form, Load, PeakSquares, Peaks, Phases, Step, SurfaceEffect, SurfaceState,
+        Contact, Curvature, Effect, Energy, Form, Load, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect,
+        SurfaceState,
     },
     error::Result,
     lanes::Pack,
@@ -167,6 +168,39 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         let velocity = state.velocity.local()?;
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
+    }
+
+    /// Keeps what [`Body::stress_error`] needs from now on.
+    pub fn keep_earlier(&mut self) {
+        self.effects.iter_mut().for_each(|effect| effect.keep_earlier());
+        self.surface_effects.iter_mut().for_each(|effect| effect.keep_earlier());
+    }
+
+    /// The stress without viscosity at the end of a step that was solved and not yet committed, and the error that trial histories
+    /// make in it, of this rank, given the displacement at the end.
+    pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
+        let mut error = StressError::default();
+        let state = SurfaceState { displacement, velocity: displacement, contact_traction: None };
+        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, state, &mut error));
+        let Some(needs) = self.needs(|p| p.error) else { return error };
+        // Those that weaken before the others.
+        let called = [true, false]
+            .map(|weakens| self.called(|e| e.phases().error.is_some() && e.phases().weakens == weakens));
+        let nodal = Nodal {
+            displacement,
+            previous_displacement: displacement,
+            velocity: displacement,
+            previous_velocity: displacement,
+        };
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if needs.elastic_stress {
+                self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+            }
+            for called in called {
+                called.among(&self.effects).for_each(|e| e.add_error(curvature, batch, &mut error));
+            }
+        });
+        error
     }
 
     /// Total stress in Pa after a committed step, one a cell.

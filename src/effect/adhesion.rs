@@ -1,4 +1,6 @@
-use super::{Energy, History, Step, SurfaceEffect, SurfaceState, node_history::NodeHistory};
+use super::{
+    Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, node_history::NodeHistory,
+};
 use crate::{
     contact,
     space::SurfacePoint,
@@ -113,6 +115,23 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
+    /// Bonds count as springs: an error `e` of `b^2` is one of `e` times the force of whole bonds.
+    fn add_error(&self, curvature: Curvature, state: SurfaceState<'_>, error: &mut StressError) {
+        for (group, bonding) in self.groups().zip(self.bonding.last_three()) {
+            let off = curvature.error(bonding.map(|b| b * b));
+            for (law, point) in group {
+                let potential = self.laws[*law].potential(&at(state.displacement, point), &point.normal);
+                let twice = 2.0 * point.weight * potential;
+                error.error += off * off * twice;
+                error.size += bonding[0] * bonding[0] * twice;
+            }
+        }
+    }
+
+    fn keep_earlier(&mut self) {
+        self.bonding.keep_earlier("previous_bonding");
+    }
+
     fn is_elastic(&self) -> bool {
         true
     }
@@ -133,6 +152,10 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
 
     fn histories(&self) -> Vec<History<'_>> {
         vec![self.bonding.history()]
+    }
+
+    fn earlier_histories(&self) -> Vec<History<'_>> {
+        self.bonding.earlier_history().into_iter().collect()
     }
 
     fn restore(&mut self, name: &str, values: &[f64]) {

@@ -30,9 +30,9 @@ impl<const W: usize> CellHistory<W> {
         Self { name, runs: runs.to_vec(), places, converged: zeros.clone(), trial: zeros, earlier: None }
     }
 
-    /// Keeps the values before the last step, too, under this name.
+    /// Keeps the values before the last step, too, under this name, if they are not kept yet.
     pub fn keep_earlier(&mut self, name: &'static str) {
-        self.earlier = Some((name, self.converged.clone()));
+        self.earlier.get_or_insert_with(|| (name, self.converged.clone()));
     }
 
     /// What the last step added in a cell; zeros where that is not kept.
@@ -67,6 +67,13 @@ impl<const W: usize> CellHistory<W> {
             self.trial[next].prefetch();
         }
         self.place(run).map(|place| (&self.converged[place], &mut self.trial[place]))
+    }
+
+    /// Trial and converged values of a run of cells and those before the last step, if all are kept.
+    #[inline]
+    pub fn last_three(&self, run: usize) -> Option<[&Pack<W>; 3]> {
+        let (place, (_, earlier)) = (self.place(run)?, self.earlier.as_ref()?);
+        Some([&self.trial[place], &self.converged[place], &earlier[place]])
     }
 
     #[inline]

@@ -1,4 +1,6 @@
-use super::{Energy, History, Step, SurfaceEffect, SurfaceState, node_history::NodeHistory};
+use super::{
+    Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, node_history::NodeHistory,
+};
 use crate::{
     contact::Memory,
     error::{Error, Result},
@@ -67,6 +69,22 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         }
     }
 
+    /// The foundation counts as the spring that it is against what is held for long.
+    fn add_error(&self, curvature: Curvature, _: SurfaceState<'_>, error: &mut StressError) {
+        for ((law, point), pressure) in self.points.iter().zip(self.pressure.last_three()) {
+            let stiffness = law.stiffness();
+            if stiffness > 0.0 {
+                let off = curvature.error(pressure);
+                error.error += point.weight * off * off / stiffness;
+                error.size += point.weight * pressure[0] * pressure[0] / stiffness;
+            }
+        }
+    }
+
+    fn keep_earlier(&mut self) {
+        self.pressure.keep_earlier("previous_memory_pressure");
+    }
+
     fn is_elastic(&self) -> bool {
         true
     }
@@ -83,6 +101,10 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
 
     fn histories(&self) -> Vec<History<'_>> {
         vec![self.pressure.history()]
+    }
+
+    fn earlier_histories(&self) -> Vec<History<'_>> {
+        self.pressure.earlier_history().into_iter().collect()
     }
 
     fn restore(&mut self, name: &str, values: &[f64]) {

@@ -1,4 +1,4 @@
-use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory};
+use super::{Curvature, Effect, Energy, History, Phases, Step, StressError, cell_history::CellHistory};
 use crate::{
     lanes::{LANES, Pack},
     material::{self, ByMaterial},
@@ -37,7 +37,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
 
     fn phases(&self) -> Phases {
         let stress = Needs { strain: true, elastic_stress: true, ..Needs::default() };
-        Phases { explicit: Some(stress), weakens: true, ..Phases::default() }
+        Phases { explicit: Some(stress), error: Some(stress), weakens: true, ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {
@@ -61,12 +61,35 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
+    /// An error `e` of the damage is one of `e` times the stress of the sound cell.
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some([Pack([now]), Pack([before]), Pack([earlier])]) = self.damage.last_three(batch.number)
+        else {
+            return;
+        };
+        for lane in 0..batch.count {
+            let off = curvature.error([now[lane], before[lane], earlier[lane]]);
+            let twice = 2.0 * law.release_rate(&batch.elastic_stress.lane(lane));
+            error.error += batch.cells.volume[lane] * off * off * twice;
+        }
+        batch.integrity.weaken(left(now));
+    }
+
+    fn keep_earlier(&mut self) {
+        self.damage.keep_earlier("previous_damage");
+    }
+
     fn commit(&mut self) {
         self.damage.commit();
     }
 
     fn histories(&self) -> Vec<History<'_>> {
         vec![self.damage.history()]
+    }
+
+    fn earlier_histories(&self) -> Vec<History<'_>> {
+        self.damage.earlier_history().into_iter().collect()
     }
 
     fn restore(&mut self, name: &str, values: &[f64]) {

@@ -1,4 +1,4 @@
-use super::{Effect, Energy, Form, Phases, Step, isotropic};
+use super::{Curvature, Effect, Energy, Form, Phases, Step, StressError, isotropic};
 use crate::{
     lanes::Pack,
     material::{ByMaterial, Isotropic},
@@ -30,7 +30,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
         let both = Needs { strain_rate: true, ..strain };
-        Phases { explicit: Some(strain), energy: Some(both), stress: Some(both), ..Phases::default() }
+        Phases {
+            explicit: Some(strain),
+            energy: Some(both),
+            stress: Some(both),
+            error: Some(strain),
+            ..Phases::default()
+        }
     }
 
     fn is_everywhere(&self) -> bool {
@@ -55,6 +61,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
             energy.elastic += 0.5 * square(&batch.strain);
         }
         energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
+    }
+
+    fn add_error(&self, _curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
+        error.size += isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
     }
 
     fn form(&self) -> Option<Form> {

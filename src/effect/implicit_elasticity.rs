@@ -1,4 +1,4 @@
-use super::{Effect, ElasticLaw, Energy, Form, Phases, Step, isotropic};
+use super::{Curvature, Effect, ElasticLaw, Energy, Form, Phases, Step, StressError, isotropic};
 use crate::{
     material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Needs, Simplex},
@@ -31,6 +31,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
             explicit: Some(strain),
             energy: Some(strain),
             stress: Some(strain),
+            error: Some(strain),
             weakens: false,
         }
     }
@@ -65,6 +66,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ImplicitElasticity {
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
         energy.elastic += 0.5 * isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
+    }
+
+    fn add_error(&self, _curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
+        error.size += isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
     }
 
     fn form(&self) -> Option<Form> {

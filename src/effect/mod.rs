@@ -15,6 +15,7 @@ mod isotropic;
 mod load;
 mod node_history;
 mod peaks;
+mod step_error;
 mod support;
 mod surface;
 mod tangents;
@@ -34,6 +35,7 @@ pub use implicit_elasticity::ImplicitElasticity;
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
 pub use peaks::{PeakSquares, Peaks};
+pub use step_error::{Curvature, StressError};
 pub use support::{Held, Support, fixed_components};
 pub use surface::{SurfaceEffect, SurfaceState};
 pub use tangents::Tangents;
@@ -92,6 +94,8 @@ pub struct Phases {
     pub energy: Option<Needs>,
     /// Adds to the total stress that is written to files; what that needs.
     pub stress: Option<Needs>,
+    /// Adds to the error of an adaptive step, given the strain at its end; what that needs.
+    pub error: Option<Needs>,
     /// Weakens the elastic stress of other effects: it is called before them in the other phases.
     pub weakens: bool,
 }
@@ -170,6 +174,14 @@ pub trait Effect<const D: usize, const S: usize> {
 
     /// Adds its part of the total stress after the step was committed.
     fn add_stress(&self, _step: Step, _batch: &mut Batch<D, S>) {}
+
+    /// Adds the stress without viscosity at the end of a step that was solved and not yet committed, and the error that its trial
+    /// histories make in it, beside those before; called if [`Effect::keep_earlier`] was. One that weakens weakens the batch as
+    /// its trial history has it.
+    fn add_error(&self, _curvature: Curvature, _batch: &mut Batch<D, S>, _error: &mut StressError) {}
+
+    /// Keeps the histories before the last step from now on that [`Effect::add_error`] needs.
+    fn keep_earlier(&mut self) {}
 
     /// The form it stands for, if any.
     fn form(&self) -> Option<Form> {

@@ -1,4 +1,4 @@
-use super::{Energy, History, Step};
+use super::{Curvature, Energy, History, Step, StressError};
 
 /// Nodal fields of the converged state, `D` values a node, with ghosts where not said otherwise.
 #[derive(Debug, Clone, Copy)]
@@ -24,6 +24,13 @@ pub trait SurfaceEffect<const D: usize> {
     /// Adds its energies after the step was committed.
     fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
 
+    /// Adds the force at the end of a step that was solved and not yet committed, given the displacement there, and the error that
+    /// its trial history makes in it, beside those before: see [`super::Effect::add_error`].
+    fn add_error(&self, curvature: Curvature, state: SurfaceState<'_>, error: &mut StressError);
+
+    /// Keeps the histories before the last step from now on that [`SurfaceEffect::add_error`] needs.
+    fn keep_earlier(&mut self);
+
     /// Whether its force follows the displacement, which bounds the step.
     fn is_elastic(&self) -> bool {
         false
@@ -37,6 +44,11 @@ pub trait SurfaceEffect<const D: usize> {
 
     /// The converged histories that it keeps at nodes.
     fn histories(&self) -> Vec<History<'_>> {
+        Vec::new()
+    }
+
+    /// Histories before the last step that it keeps.
+    fn earlier_histories(&self) -> Vec<History<'_>> {
         Vec::new()
     }
 

@@ -1,4 +1,7 @@
-use super::{Blend, Effect, Energy, History, Phases, Step, Tangents, cell_history::CellHistory, isotropic};
+use super::{
+    Blend, Curvature, Effect, Energy, History, Phases, Step, StressError, Tangents,
+    cell_history::CellHistory, isotropic,
+};
 use crate::{
     lanes::Pack,
     material::{ByMaterial, Extrapolated, Returned, Tangent, Viscoplasticity},
@@ -106,7 +109,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
         let none = Needs::default();
-        Phases { explicit: Some(none), energy: Some(strain), stress: Some(none), ..Phases::default() }
+        Phases {
+            explicit: Some(none),
+            energy: Some(strain),
+            stress: Some(none),
+            error: Some(strain),
+            ..Phases::default()
+        }
     }
 
     fn is_everywhere(&self) -> bool {
@@ -174,6 +183,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
         let Some(history) = self.stress.converged(batch.number) else { return };
         isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
+    }
+
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(histories) = self.stress.last_three(batch.number) else { return };
+        let cells = (batch.cells, &batch.integrity);
+        error.add_history(law.elasticity(), cells, &batch.strain, curvature, histories);
+    }
+
+    fn keep_earlier(&mut self) {
+        self.stress.keep_earlier("previous_viscoplastic_history");
     }
 
     fn commit(&mut self) {

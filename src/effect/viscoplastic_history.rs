@@ -1,4 +1,6 @@
-use super::{Effect, Energy, History, Phases, Step, cell_history::CellHistory, isotropic};
+use super::{
+    Curvature, Effect, Energy, History, Phases, Step, StressError, cell_history::CellHistory, isotropic,
+};
 use crate::{
     lanes::{LANES, Pack, sum},
     material::{ByMaterial, Isotropic, Viscoplasticity},
@@ -99,6 +101,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
             explicit: Some(both),
             energy: Some(strain),
             stress: Some(Needs::default()),
+            error: Some(strain),
             ..Phases::default()
         }
     }
@@ -163,6 +166,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(histories) = self.stress.last_three(batch.number) else { return };
+        let cells = (batch.cells, &batch.integrity);
+        error.add_history(law.elasticity(), cells, &batch.strain, curvature, histories);
+    }
+
+    fn keep_earlier(&mut self) {
+        self.stress.keep_earlier("previous_viscoplastic_history");
+    }
+
     fn flow_step_bound(&self) -> Option<f64> {
         self.laws.laws().map(|law| 2.0 / law.fastest_rate::<S>()).reduce(f64::min)
     }
@@ -175,6 +189,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     fn histories(&self) -> Vec<History<'_>> {
         let accumulated = self.accumulated.as_ref().map(CellHistory::history);
         std::iter::once(self.stress.history()).chain(accumulated).collect()
+    }
+
+    fn earlier_histories(&self) -> Vec<History<'_>> {
+        self.stress.earlier_history().into_iter().collect()
     }
 
     fn restore(&mut self, name: &str, values: &[f64]) {

@@ -101,7 +101,9 @@ pub fn save<const D: usize, const S: usize>(
     }));
     let kept = body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
     let of_cells: Vec<History> = kept.collect();
-    let of_nodes: Vec<History> = body.surface_effects.iter().flat_map(|e| e.histories()).collect();
+    let kept =
+        body.surface_effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
+    let of_nodes: Vec<History> = kept.collect();
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
         let table = |h| {
             let History { name, width, values, .. }: &History = h;
@@ -150,7 +152,8 @@ pub fn restore<const D: usize, const S: usize>(
         }
     }
     for effect in &mut body.surface_effects {
-        let kept: Vec<(&str, usize)> = effect.histories().iter().map(|h| (h.name, h.width)).collect();
+        let kept: Vec<(&str, usize)> =
+            effect.histories().iter().chain(&effect.earlier_histories()).map(|h| (h.name, h.width)).collect();
         let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &kept, &nodes)?;
         for ((name, _), values) in kept.iter().zip(&values) {
             effect.restore(name, values);

@@ -63,7 +63,11 @@ pub(super) fn body<const D: usize, const S: usize>(
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
-    Ok((Body { mesh, geometry, effects, contacts, surface_effects, load, fixed }, state))
+    let mut body = Body { mesh, geometry, effects, contacts, surface_effects, load, fixed };
+    if job.time.adaptive.is_some() {
+        body.keep_earlier();
+    }
+    Ok((body, state))
 }
 
 /// What the stresses of this many components stand for.

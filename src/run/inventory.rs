@@ -27,7 +27,8 @@ impl Inventory {
         scheme: &Stepper,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        let of_nodes = body.surface_effects.iter().flat_map(|e| e.histories());
+        let of_nodes =
+            body.surface_effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
         let of_cells =
             body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
         for history in of_cells.chain(of_nodes) {

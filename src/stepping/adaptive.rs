@@ -1,17 +1,19 @@
 //! Steps chosen by their error, from a ladder: powers of two times the first one, so that matrices and preconditioners serve
 //! for many steps.
 //!
-//! The error of a step is the part of the velocity that no straight line through the velocities before has, `k_n / (k_n +
-//! k_{n-1}) (v_n - v_{n-1} - w (v_{n-1} - v_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes
-//! of second order a bound that also holds where contact or flow set in. It counts in the norm of the mass (of the
-//! viscosity, without inertia) beside the largest velocity so far, and the stress it makes in a step in the norm of the
-//! compliance beside the largest stress so far.
+//! The error of a step is the part of a quantity `x` that no straight line through its values before has, `k_n / (k_n + k_{n-1})
+//! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes of second
+//! order a bound that also holds where contact or flow set in. The velocity counts in the norm of the mass (of the viscosity,
+//! without inertia) beside the largest so far. The stress counts in the norm of the compliance beside the largest stress without
+//! viscosity so far: what the error of the velocity makes of it in the step, and the errors of viscoplastic histories, of
+//! damage, of the bonding of adhesion and of the pressure that contact remembers. The strain that hardening cells accumulate grows
+//! no faster than the flow, whose error counts with the histories.
 
 use super::{
-    StepOutcome, Stepper,
+    Norms, StepError, StepOutcome, Stepper,
     step_length::{SNAP, next_step},
 };
-use crate::{agreement::Agreed, body::Body, effect::Step, error::Result, session::Session, state::State};
+use crate::{agreement::Agreed, body::Body, effect::Step, error::{Error, Result}, session::Session, state::State};
 use serde::{Deserialize, Serialize};
 
 /// Steps of one length between two growths of it.
@@ -46,15 +48,6 @@ pub struct Pace {
     pub stress: f64,
     /// Steps that were taken back.
     pub rejected: u64,
-}
-
-/// Norms of velocity and stress.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Norms {
-    /// Of the velocity.
-    pub velocity: f64,
-    /// Of the stress.
-    pub stress: f64,
 }
 
 /// Takes steps of adapted length.
@@ -106,9 +99,8 @@ impl Adaptive {
             match self.attempt(session, stepper, body, state, step) {
                 Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
-                    let stress = (2.0 * outcome.energy.elastic).max(0.0).sqrt();
                     self.pace.velocity = self.pace.velocity.max(size.velocity);
-                    self.pace.stress = self.pace.stress.max(stress);
+                    self.pace.stress = self.pace.stress.max(size.stress);
                     self.grow(step, error);
                     return Ok(outcome);
                 }
@@ -130,8 +122,8 @@ impl Adaptive {
         step: Step,
     ) -> Result<(StepOutcome, f64, Norms), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
-        let [error, size] = session.agree(stepper.error(session, body, state, step))?;
-        let error = self.relative(error, size);
+        let found = session.agree(stepper.error(session, body, state, step))?;
+        let error = self.relative(found);
         let failed = || {
             Error::Failed(format!(
                 "the error of the step to t = {:.6e} s is not a number: values of the state, the loads or the material have no \
@@ -139,7 +131,7 @@ impl Adaptive {
                 step.time
             ))
         };
-        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, size)) })
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
     }
 
     /// At the start nothing tells how large velocity and stress will be: a step of the largest length does, which is then
@@ -180,11 +172,13 @@ impl Adaptive {
         ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
     }
 
-    /// The error beside the largest norms so far; not a number where the error of either is none.
-    fn relative(&self, error: Norms, size: Norms) -> f64 {
+    /// The error beside the largest norms so far; not a number where that of either is none.
+    fn relative(&self, StepError { error, size, negligible }: StepError) -> f64 {
         let share = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
-        let velocity = share(error.velocity, self.pace.velocity.max(size.velocity));
-        let stress = share(error.stress, self.pace.stress.max(size.stress));
+        let largest_velocity = self.pace.velocity.max(size.velocity);
+        let largest_stress = self.pace.stress.max(size.stress);
+        let velocity = share(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
+        let stress = share(error.stress, largest_stress.max(negligible.stress * largest_velocity));
         (velocity * velocity + stress * stress).sqrt()
     }
 
@@ -262,22 +256,32 @@ mod tests {
 
     #[test]
     fn the_error_is_relative_to_the_largest_norms_and_never_hides_what_is_no_number() {
-        let norms = |velocity: f64, stress: f64| Norms { velocity, stress };
+        let norms = |[velocity, stress]: [f64; 2]| Norms { velocity, stress };
+        let found = |error: [f64; 2], size: [f64; 2]| StepError {
+            error: norms(error),
+            size: norms(size),
+            negligible: norms([1e-3, 1e-2]),
+        };
         let mut adaptive = adaptive();
         (adaptive.pace.velocity, adaptive.pace.stress) = (2.0, 0.5);
-        assert_eq!(adaptive.relative(norms(0.6, 0.0), norms(1.0, 1.0)), 0.3, "the largest velocity was 2");
-        assert_eq!(
-            adaptive.relative(norms(0.0, 0.8), norms(1.0, 2.0)),
-            0.4,
-            "the largest stress is that of now"
-        );
-        assert!((adaptive.relative(norms(0.6, 0.8), norms(1.0, 2.0)) - 0.5).abs() < 1e-15);
-        assert_eq!(adaptive.relative(norms(-1e-30, -0.0), norms(1.0, 1.0)), 0.0, "rounding below zero");
-        (adaptive.pace.velocity, adaptive.pace.stress) = (0.0, 0.0);
-        assert_eq!(adaptive.relative(norms(0.0, 0.0), norms(0.0, 0.0)), 0.0, "nothing moves");
-        for bad in [norms(f64::NAN, 0.1), norms(0.1, f64::NAN), norms(f64::INFINITY, f64::NAN)] {
-            assert!(adaptive.relative(bad, norms(1.0, 1.0)).is_nan(), "{bad:?}");
+        assert_eq!(adaptive.relative(found([0.6, 0.0], [1.0, 1.0])), 0.3, "the largest velocity was 2");
+        assert_eq!(adaptive.relative(found([0.0, 0.8], [1.0, 2.0])), 0.4, "the stress was never larger");
+        assert!((adaptive.relative(found([0.6, 0.8], [1.0, 2.0])) - 0.5).abs() < 1e-15);
+        assert_eq!(adaptive.relative(found([-1e-30, -0.0], [1.0, 1.0])), 0.0, "rounding below zero");
+        let [nan, infinite] = [f64::NAN, f64::INFINITY];
+        for error in [[nan, 0.1], [0.1, nan], [infinite, nan]] {
+            assert!(adaptive.relative(found(error, [1.0, 1.0])).is_nan(), "{error:?}");
         }
+        (adaptive.pace.velocity, adaptive.pace.stress) = (0.0, 0.0);
+        assert_eq!(adaptive.relative(found([0.0, 0.0], [0.0, 0.0])), 0.0, "nothing moves");
+        assert!(
+            (adaptive.relative(found([1e-4, 0.0], [1e-9, 5.0])) - 0.02).abs() < 1e-15,
+            "held: 1e-4 of 5e-3"
+        );
+        assert!(
+            (adaptive.relative(found([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
+            "flying: 1e-4 of 5e-2"
+        );
     }
 
     #[test]

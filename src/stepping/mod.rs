@@ -23,11 +23,12 @@ mod rungs;
 mod scheme;
 mod springs;
 mod step_clock;
+mod step_error;
 mod step_length;
 mod step_solver;
 mod stepper;
 
-pub use adaptive::{Adaptive, AdaptiveSettings, Norms, Pace};
+pub use adaptive::{Adaptive, AdaptiveSettings, Pace};
 pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use linear_solver::{
@@ -36,5 +37,6 @@ pub use linear_solver::{
 pub use outcome::StepOutcome;
 pub use scheme::Scheme;
 pub use step_clock::{StepClock, StepTraffic};
+pub use step_error::{Norms, StepError};
 pub use step_length::{SNAP, next_step};
 pub use stepper::Stepper;

@@ -2,18 +2,18 @@
 
 use super::{
     StepOutcome,
-    adaptive::Norms,
     contacts::{commit_tractions, prepare_contacts},
     guesses::{is_new, other_solutions},
     linear_solver::{Preconditioner, SolverSettings},
     rungs::nearest,
     scheme::{Method, Scheme},
     step_clock::{Stages, StepClock, StepTraffic},
+    step_error::ErrorRoom,
     step_solver::{Known, Lengths, StepSolver},
 };
 use crate::{
     body::{Body, PassBytes},
-    effect::{Form, Step},
+    effect::Step,
     error::{Error, Result},
     petsc::{DistributedVector, Precision},
     session::Session,
@@ -21,21 +21,20 @@ use crate::{
 };
 use std::time::Instant;
 
-/// Share of the root of the kinetic energy up to which that of the elastic energy does not matter.
-const NEGLIGIBLE: f64 = 1e-6;
-
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
-    scheme: Scheme,
-    method: Method,
+    pub(super) scheme: Scheme,
+    pub(super) method: Method,
     stages: Stages,
     solver: StepSolver,
     load: Option<DistributedVector>,
     load_is_current: bool,
     right_hand_side: DistributedVector,
-    trial: DistributedVector,
-    /// Room for the error of a step: two changes of the velocity, and forces.
-    room: [Vec<f64>; 3],
+    pub(super) trial: DistributedVector,
+    /// Whether the scheme has finished the step that was attempted last, so that trial histories are those of its solution.
+    is_finished: bool,
+    /// Room for the error of a step.
+    pub(super) room: ErrorRoom,
     /// Length in s through which the ladder of preconditioners goes.
     ladder: f64,
     /// Other starts from which steps with contact are solved, to look for other solutions.
@@ -67,7 +66,8 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
-            room: Default::default(),
+            is_finished: false,
+            room: ErrorRoom::default(),
             ladder: 1.0,
             guesses: 0,
             set_ups: 0,
@@ -169,6 +169,7 @@ impl Stepper {
         step: Step,
     ) -> Result<StepOutcome> {
         self.prepare_matrix(session, body, step)?;
+        self.is_finished = false;
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
         self.write_right_hand_side(session, body, state, step)?;
@@ -219,6 +220,24 @@ impl Stepper {
         }
     }
 
+    /// Does what the scheme has left to do for the step that was attempted last, once. Collective.
+    pub(super) fn finish<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if self.is_finished {
+            return Ok(());
+        }
+        self.method.finish(body, state, &mut self.trial, step)?;
+        if self.scheme.is_implicit() {
+            self.traffic.add_solve(Some(self.passes.finish));
+        }
+        self.is_finished = true;
+        Ok(())
+    }
+
     /// Commits the step that was attempted last, and completes its outcome. Collective.
     pub fn accept<const D: usize, const S: usize>(
         &mut self,
@@ -249,51 +268,6 @@ impl Stepper {
         }
         self.clock.balance += balancing.elapsed();
         Ok(())
-    }
-
-    /// The error of the step that was attempted last, and the sizes that it has to be compared with. Collective.
-    pub fn error<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<[Norms; 2]> {
-        self.trial.update_ghosts()?;
-        let trial = self.trial.local()?;
-        let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
-        let is_second = step.previous_length > 0.0;
-        let ratio = if is_second { step.length / step.previous_length } else { 0.0 };
-        let share = if is_second { ratio / (1.0 + ratio) } else { 0.5 };
-        let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let [curved, strained, forces] = &mut self.room;
-        write(curved, values.clone().map(|(t, (v, p))| share * (t - v - ratio * (v - p))));
-        // Displacements, and stresses with them, are one order better in the formula of second order.
-        let length = if self.scheme.is_two_step() && is_second {
-            strained.clone_from(curved);
-            self.method.matrix_length(step)
-        } else {
-            write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
-            step.length
-        };
-        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
-        let mut square = |form: Option<Form>, x: &[f64]| {
-            let Some(form) = form else { return 0.0 };
-            write(forces, x.iter().map(|_| 0.0));
-            body.add_form(form, x, forces);
-            forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
-        };
-        let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
-        let mine =
-            [square(form, curved), square(elastic, strained), square(form, &trial), square(elastic, &trial)];
-        let [velocity, stress, all_velocity, all_stress] =
-            session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
-        // Both are roots of energies where there is mass: a body that flies free of stress has some from rounding.
-        let flying = if form == Some(Form::Mass) { NEGLIGIBLE * all_velocity } else { 0.0 };
-        Ok([
-            Norms { velocity, stress: length * stress },
-            Norms { velocity: all_velocity, stress: (step.length * all_stress).max(flying) },
-        ])
     }
 
     /// Loads and what the scheme knows of the other forces, zero at held components.
@@ -363,12 +337,6 @@ impl Stepper {
 /// What the scheme brings to the solution of a step under these forces.
 fn known<'a>(session: &Session, method: &'a Method, forces: &'a DistributedVector) -> Known<'a> {
     Known { forces, rounding: method.rounding(session), start: method.flow_start() }
-}
-
-/// Writes these values in place of the ones before.
-fn write(room: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
-    room.clear();
-    room.extend(values);
 }
 
 /// Whether there are two velocities to start a step from.

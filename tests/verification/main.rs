@@ -33,6 +33,7 @@ mod scenes;
 mod schemes;
 mod subspace;
 mod taken_back;
+mod tolerance;
 mod unloading;
 mod wave;
 
@@ -49,6 +50,7 @@ fn scenario() {
     let session = mpi.session().expect("PETSc");
     match name.as_str() {
         "adaptive_errors" => adaptive::errors(&session),
+        "tolerance" => tolerance::all(&session),
         "vectors" => petsc_boundary::exchange_vectors(&session),
         "matrices" => petsc_boundary::multiply_matrices(&session),
         "linear" => petsc_boundary::solve_linear(&session),
