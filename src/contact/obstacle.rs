@@ -73,6 +73,15 @@ impl Gap {
         )))
     }
 
+    /// What it depends on time by.
+    pub fn expressions(&self) -> Vec<&[Scalar]> {
+        match self {
+            Self::Distance(gap) => vec![std::slice::from_ref(gap)],
+            Self::Plane { point, normal, .. } => vec![point, normal],
+            Self::Sphere { centre, .. } => vec![centre],
+        }
+    }
+
     /// The same, not a number where the obstacle is nowhere.
     fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         match self {

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
 /// Raised whenever a file written before can't be read any more.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// Everything of a checkpoint that is not a field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,5 +1,6 @@
 //! From the job's tables to a body: a table that is absent leaves nothing behind.
 
+use super::steps;
 use crate::{
     body::Body,
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
@@ -18,10 +19,7 @@ use crate::{
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{
-        Adaptive, AdaptiveSettings, FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme,
-        SolverSettings,
-    },
+    stepping::{FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme, SolverSettings},
     tensor::Vector,
 };
 
@@ -351,27 +349,6 @@ pub(super) fn scheme(job: &Job) -> Scheme {
     }
 }
 
-/// How the job adapts its steps, if it does.
-pub(super) fn adaptive(job: &Job) -> Option<Adaptive> {
-    job.time.adaptive.as_ref().map(|adaptive| {
-        Adaptive::new(AdaptiveSettings {
-            tolerance: adaptive.tolerance,
-            first: job.time.step,
-            smallest: adaptive.smallest_step,
-            largest: adaptive.largest_step,
-        })
-    })
-}
-
-/// Steps that one matrix is for: adaptive steps change their length every other time.
-pub(super) fn steps_a_matrix(job: &Job) -> u64 {
-    if job.time.adaptive.is_some() {
-        2
-    } else {
-        super::time_loop::steps_between(0.0, job.time.end, job.time.step)
-    }
-}
-
 /// The job's wishes for the solver.
 pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
@@ -392,7 +369,7 @@ pub(super) fn settings(job: &Job) -> SolverSettings {
             job::FactorPrecision::Single => FactorPrecision::Single,
             job::FactorPrecision::Double => FactorPrecision::Double,
         },
-        steps: steps_a_matrix(job),
+        steps: steps::steps_a_matrix(job),
         newton_iterations: job.solver.max_newton_iterations as usize,
         friction: match job.solver.friction {
             job::FrictionIteration::Newton => FrictionIteration::Newton,

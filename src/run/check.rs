@@ -6,8 +6,8 @@ use super::{
     folder::refuse_unwritable,
     header,
     setup::{Setup, setup},
+    steps,
     summary::PartitionQuality,
-    time_loop::steps_between,
 };
 use crate::{
     agreement::Agreed,
@@ -100,8 +100,8 @@ fn report<const D: usize, const S: usize>(
 ) -> Result<Report> {
     let (job, body, scheme) = (&loaded.job, &ready.body, &ready.scheme);
     let mesh = &body.mesh;
-    let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
-    let steps = steps_between(0.0, job.time.end, longest);
+    let longest = steps::longest_step(job);
+    let steps = steps::landings(job).steps_after(0.0, longest);
     let inventory = Inventory::of(session, body, scheme);
     let (preconditioner, reason) = scheme.preconditioner();
     let precision = build::settings(job).factor_precision;

@@ -15,6 +15,7 @@ mod scene;
 mod setup;
 mod simulation;
 mod step_line;
+mod steps;
 mod summary;
 mod time_loop;
 

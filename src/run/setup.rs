@@ -1,6 +1,6 @@
 //! What a run starts from and a check describes: nothing of it touches the output folder.
 
-use super::{build, hold::refuse_free_bodies};
+use super::{build, hold::refuse_free_bodies, steps};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},
@@ -47,7 +47,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
         ),
         _ => error.into(),
     })?;
-    let longest = build::adaptive(job).map_or(job.time.step, |adaptive| adaptive.longest());
+    let longest = steps::longest_step(job);
     let prepared = scheme.prepare_length(session, &mut body, longest);
     session.agree(prepared).map_err(|error| match error.exit() {
         Exit::Internal => loaded.fault(

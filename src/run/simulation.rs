@@ -1,10 +1,10 @@
 //! A job in memory: set up and stepped without a file.
 
 use super::{
-    build,
     hold::hold,
     scene::split,
     setup::{Setup, setup},
+    steps,
 };
 use crate::{
     body::Body,
@@ -15,7 +15,7 @@ use crate::{
     output::history::Totals,
     session::Session,
     state::State,
-    stepping::{Adaptive, Pace, StepOutcome, Stepper, next_step},
+    stepping::{Adaptive, Landings, Pace, StepOutcome, Stepper, next_step},
     tensor::larger,
 };
 
@@ -30,7 +30,8 @@ pub struct Simulation<const D: usize, const S: usize> {
     /// What adds up over the steps.
     pub totals: Totals,
     time: Time,
-    adaptive: Option<Adaptive>,
+    landings: Landings,
+    adaptive: Option<Adaptive<D>>,
 }
 
 impl<const D: usize, const S: usize> Simulation<D, S> {
@@ -46,13 +47,14 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
         let totals = totals_at_start(session, &body, &state)?;
-        let (time, adaptive) = (loaded.job.time.clone(), build::adaptive(&loaded.job));
-        Ok(Self { body, state, scheme, totals, time, adaptive })
+        let (time, adaptive) = (loaded.job.time.clone(), steps::adaptive(&loaded.job));
+        let landings = steps::landings(&loaded.job);
+        Ok(Self { body, state, scheme, totals, time, landings, adaptive })
     }
 
     /// Where adaptive steps are on their ladder, if there are any.
     pub fn pace(&self) -> Option<Pace> {
-        self.adaptive.map(|adaptive| adaptive.pace)
+        self.adaptive.as_ref().map(|adaptive| adaptive.pace)
     }
 
     /// Takes the next step; `None` at the end time. Collective.
@@ -61,10 +63,11 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             return Ok(None);
         }
         let (body, state) = (&mut self.body, &mut self.state);
+        let target = self.landings.next(state.time);
         let outcome = match &mut self.adaptive {
-            Some(adaptive) => adaptive.advance(session, &mut self.scheme, body, state, self.time.end)?,
+            Some(adaptive) => adaptive.advance(session, &mut self.scheme, body, state, target)?,
             None => {
-                let step = next_step(state, self.time.step, self.time.end);
+                let step = next_step(state, self.time.step, target.time);
                 self.scheme.advance(session, body, state, step)?
             }
         };

@@ -1,7 +1,7 @@
 //! The run itself: set-up, steps, checkpoints, the end.
 
 use super::{
-    Clock, Inventory, Start, build,
+    Clock, Inventory, Start,
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header,
@@ -11,6 +11,7 @@ use super::{
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
     step_line::StepLine,
+    steps,
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -18,13 +19,13 @@ use crate::{
     body::Body,
     certificate::Certificates,
     error::{Error, Exit, Result},
-    job::{Accept, Every, Job, Loaded},
+    job::{Accept, Job, Loaded},
     mesh::Mesh,
     output::{checkpoint::Identity, history::Totals, log::Log},
     petsc::Precision,
     session::Session,
     state::State,
-    stepping::{Adaptive, SNAP, StepOutcome, Stepper, next_step},
+    stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
     tensor::{larger, von_mises},
 };
 use std::{
@@ -75,7 +76,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     session.agree(outputs.at_start(session, &body, &state))?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
-    let mut adaptive = build::adaptive(job);
+    let mut adaptive = steps::adaptive(job);
     if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
         adaptive.pace = pace;
     }
@@ -89,6 +90,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         scheme,
         certificates,
         adaptive,
+        landings: steps::landings(job),
+        landed: 0,
         totals,
         outputs,
         log,
@@ -100,11 +103,6 @@ pub(super) fn run<const D: usize, const S: usize>(
     };
     let ended = run.advance();
     run.finish(ended, restored.map(|r| r.file))
-}
-
-/// Steps of this length from a time to the end.
-pub(super) fn steps_between(time: f64, end: f64, length: f64) -> u64 {
-    ((end - time) / length - SNAP).ceil().max(0.0) as u64
 }
 
 /// Why the steps ended.
@@ -120,7 +118,10 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     state: State,
     scheme: Stepper,
     certificates: Certificates,
-    adaptive: Option<Adaptive>,
+    adaptive: Option<Adaptive<D>>,
+    landings: Landings,
+    /// Lines of the log that told what a step landed on.
+    landed: u64,
     totals: Totals,
     outputs: Outputs<D, S>,
     log: Log,
@@ -137,16 +138,16 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     /// Steps to the end, to a request to stop, or to a failure. Collective.
     fn advance(&mut self) -> Result<Ended> {
         let (end, length) = (self.job.time.end, self.job.time.step);
-        let left = steps_between(self.state.time, end, length);
+        let left = self.landings.steps_after(self.state.time, length);
         let last = self.state.step + left;
         self.log.start_progress(last, self.state.step);
         let mut saved_at = Instant::now();
         while self.state.time < end {
-            let outcome = self.take_step(length, end).or_else(|error| self.explain(error))?;
+            let outcome = self.take_step(length).or_else(|error| self.explain(error))?;
             self.totals.add(&outcome);
             watch_slip(self.session, &self.body, &self.state, &mut self.totals)?;
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
-            let steps_left = steps_between(self.state.time, end, self.state.step_length);
+            let steps_left = self.landings.steps_after(self.state.time, self.state.step_length);
             let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
             self.refuse_overflow()?;
@@ -165,20 +166,17 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         Ok(Ended::Completed)
     }
 
-    /// Takes a step of the job's length, or of an adapted one that lands on the next output time. Collective.
-    fn take_step(&mut self, length: f64, end: f64) -> Result<StepOutcome, Agreed> {
+    /// Takes a step of the job's length, or of an adapted one, that ends where one has to. Collective.
+    fn take_step(&mut self, length: f64) -> Result<StepOutcome, Agreed> {
         let (body, state) = (&mut self.body, &mut self.state);
+        let target = self.landings.next(state.time);
         let Some(adaptive) = &mut self.adaptive else {
-            let step = next_step(state, length, end);
-            return self.session.agree(self.scheme.advance(self.session, body, state, step));
+            let step = next_step(state, length, target.time);
+            let mut outcome = self.session.agree(self.scheme.advance(self.session, body, state, step))?;
+            outcome.landed_on = target.what.filter(|_| step.time == target.time);
+            return Ok(outcome);
         };
-        let target = match self.job.output.fields {
-            Some(Every::Interval(interval)) => {
-                interval * ((state.time / interval * (1.0 + 1e-12)).floor() + 1.0)
-            }
-            _ => end,
-        };
-        let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target.min(end))?;
+        let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target)?;
         self.totals.pace = Some(adaptive.pace);
         Ok(outcome)
     }
@@ -224,6 +222,10 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
         let step = self.state.step;
         if self.log.has_bar() {
             self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
+        }
+        if let Some(what) = outcome.landed_on.filter(|_| self.landed < LOGGED_STEPS) {
+            self.landed += 1;
+            self.log.quiet_line(format!("step {step} lands on t = {:.9} s: {what}", self.state.time));
         }
         if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
             return;

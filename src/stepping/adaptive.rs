@@ -11,7 +11,8 @@
 
 use super::{
     Norms, StepError, StepOutcome, Stepper,
-    step_length::{SNAP, next_step},
+    drives::Drives,
+    step_length::{Landing, SNAP, next_step},
 };
 use crate::{agreement::Agreed, body::Body, effect::Step, error::{Error, Result}, session::Session, state::State};
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,8 @@ pub struct AdaptiveSettings {
     pub smallest: f64,
     /// Longest step in s.
     pub largest: f64,
+    /// The end of the run in s.
+    pub end: f64,
 }
 
 /// Where on its ladder a run is; saved in checkpoints.
@@ -51,22 +54,24 @@ pub struct Pace {
 }
 
 /// Takes steps of adapted length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Adaptive {
+#[derive(Debug)]
+pub struct Adaptive<const D: usize> {
     settings: AdaptiveSettings,
+    /// What acts on the body in time, once it is known.
+    drives: Option<Drives<D>>,
     lowest: i32,
     highest: i32,
     /// Where on the ladder it is.
     pub pace: Pace,
 }
 
-impl Adaptive {
+impl<const D: usize> Adaptive<D> {
     /// On the ladder through the first length.
     pub fn new(settings: AdaptiveSettings) -> Self {
         let level = |length: f64| (length / settings.first).log2();
         let (lowest, highest) =
             ((level(settings.smallest) - 1e-9).ceil(), (level(settings.largest) + 1e-9).floor());
-        Self { settings, lowest: lowest as i32, highest: highest as i32, pace: Pace::default() }
+        Self { settings, drives: None, lowest: lowest as i32, highest: highest as i32, pace: Pace::default() }
     }
 
     /// Length in s of its longest steps.
@@ -81,24 +86,27 @@ impl Adaptive {
 
     /// Takes a step that ends at `target` at the latest, and commits it; steps with too large an error or without a solution
     /// are taken back and tried again shorter. Collective.
-    pub fn advance<const D: usize, const S: usize>(
+    pub fn advance<const S: usize>(
         &mut self,
         session: &Session,
         stepper: &mut Stepper,
         body: &mut Body<D, S>,
         state: &mut State,
-        target: f64,
+        target: Landing,
     ) -> Result<StepOutcome, Agreed> {
-        if state.step == 0 {
+        if self.drives.is_none() {
+            self.drives = Some(Drives::of(session, body, self.settings.end));
+        }
+        if self.pace.velocity == 0.0 && self.pace.stress == 0.0 {
             self.look_ahead(session, stepper, body, state, target)?;
         }
         loop {
-            let length = self.next_length(target - state.time, state.step_length);
-            let step = next_step(state, length, target);
+            let (step, landing) = self.choose(session, state, target);
             let is_shortest = self.level_of(step) <= self.lowest;
             match self.attempt(session, stepper, body, state, step) {
                 Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
+                    outcome.landed_on = landing.what.filter(|_| step.time == landing.time);
                     self.pace.velocity = self.pace.velocity.max(size.velocity);
                     self.pace.stress = self.pace.stress.max(size.stress);
                     self.grow(step, error);
@@ -111,9 +119,34 @@ impl Adaptive {
         }
     }
 
+    /// The step to try next and what it must not go beyond: so short that loads and obstacles change along straight lines within
+    /// it, up to the tolerance. Collective.
+    fn choose(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
+        loop {
+            let length = self.next_length(target.time - state.time, state.step_length);
+            let landing = self.landing(session, state, target, length);
+            let length = self.next_length(landing.time - state.time, state.step_length);
+            let step = next_step(state, length, landing.time);
+            let departure = self.drives.as_ref().map_or(0.0, |drives| drives.departure(session, step));
+            if departure <= self.settings.tolerance || self.level_of(step) <= self.lowest {
+                return (step, landing);
+            }
+            self.shorten(step, self.fitting(step, departure));
+        }
+    }
+
+    /// The target, or the end of a piece of a load or an obstacle that comes before it within two steps of this length. Collective.
+    fn landing(&self, session: &Session, state: &State, target: Landing, length: f64) -> Landing {
+        let last = target.time.min(state.time + 2.0 * length);
+        let least = (1.0 - SNAP) * self.settings.smallest;
+        let drives = self.drives.as_ref();
+        let end = drives.and_then(|d| d.first_end(session, [state.time, last], [least, length]));
+        end.unwrap_or(target)
+    }
+
     /// Solves a step without taking it; gives its relative error, and the norms at its end. A step whose error is not a number
     /// has failed. Collective.
-    fn attempt<const D: usize, const S: usize>(
+    fn attempt<const S: usize>(
         &self,
         session: &Session,
         stepper: &mut Stepper,
@@ -134,17 +167,18 @@ impl Adaptive {
         session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
     }
 
-    /// At the start nothing tells how large velocity and stress will be: a step of the largest length does, which is then
-    /// taken back.
-    fn look_ahead<const D: usize, const S: usize>(
+    /// As long as all is at rest nothing tells how large velocity and stress will be: a step of the largest length does, or one to
+    /// where the piece of a load ends, which is then taken back.
+    fn look_ahead<const S: usize>(
         &mut self,
         session: &Session,
         stepper: &mut Stepper,
         body: &mut Body<D, S>,
         state: &State,
-        target: f64,
+        target: Landing,
     ) -> Result<(), Agreed> {
-        let step = next_step(state, self.longest(), target);
+        let landing = self.landing(session, state, target, self.longest());
+        let step = next_step(state, self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, _, size)) => {
                 (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
@@ -191,6 +225,10 @@ impl Adaptive {
 
     fn reject(&mut self, step: Step, level: i32) {
         self.pace.rejected += 1;
+        self.shorten(step, level);
+    }
+
+    fn shorten(&mut self, step: Step, level: i32) {
         self.pace.taken = 0;
         self.pace.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
     }
@@ -215,8 +253,10 @@ impl Adaptive {
 mod tests {
     use super::*;
 
-    fn adaptive() -> Adaptive {
-        Adaptive::new(AdaptiveSettings { tolerance: 1e-2, first: 0.01, smallest: 0.001, largest: 0.1 })
+    fn adaptive() -> Adaptive<2> {
+        let settings =
+            AdaptiveSettings { tolerance: 1e-2, first: 0.01, smallest: 0.001, largest: 0.1, end: 1.0 };
+        Adaptive::new(settings)
     }
 
     fn step(length: f64) -> Step {

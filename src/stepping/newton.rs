@@ -229,6 +229,7 @@ impl Newton {
             indefinite_solves: effort.indefinite,
             inclusion_residual: inclusion,
             solutions: 0,
+            landed_on: None,
             energy: Energy::default(),
             peaks: Peaks::default(),
         })

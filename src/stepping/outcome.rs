@@ -17,6 +17,8 @@ pub struct StepOutcome {
     pub inclusion_residual: f64,
     /// Different solutions that were found, where others were looked for; else 0.
     pub solutions: usize,
+    /// What the step landed on, where the log should tell.
+    pub landed_on: Option<&'static str>,
     /// Energies of the step, over all ranks.
     pub energy: Energy,
     /// Largest stress and strain at its end, over all ranks.

@@ -28,6 +28,7 @@ mod one_cell;
 mod orders;
 mod patch;
 mod petsc_boundary;
+mod pulses;
 mod random_laws;
 mod scenes;
 mod schemes;
@@ -51,6 +52,7 @@ fn scenario() {
     match name.as_str() {
         "adaptive_errors" => adaptive::errors(&session),
         "tolerance" => tolerance::all(&session),
+        "pulses" => pulses::all(&session),
         "vectors" => petsc_boundary::exchange_vectors(&session),
         "matrices" => petsc_boundary::multiply_matrices(&session),
         "linear" => petsc_boundary::solve_linear(&session),

@@ -18,6 +18,11 @@ pub struct Time {
     /// How a step is taken.
     #[serde(default)]
     pub scheme: Scheme,
+    /// Times at which a step has to end, rising, within the run. A step that would go beyond is cut; fixed steps go on from there in
+    /// their full length.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("unit" = "s"), example = [0.25, 0.6])]
+    pub land_on: Vec<f64>,
     /// Steps chosen by their error; absent: fixed steps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Adaptive>,
@@ -41,7 +46,8 @@ pub enum Scheme {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// Accepted error of a step, relative to the largest velocity and stress so far.
+    /// Accepted error of a step in velocities, stresses and histories, relative to the largest velocity and stress so far; and of loads
+    /// and obstacles within a step in a straight line, relative to the largest of the run.
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,

@@ -15,12 +15,12 @@ const LONGEST: usize = 10_000;
 /// Deepest nesting of parentheses, signs and powers.
 const DEEPEST: usize = 200;
 
-const ADD: Binary = Binary(|a, b| a + b);
-const SUBTRACT: Binary = Binary(|a, b| a - b);
-const MULTIPLY: Binary = Binary(|a, b| a * b);
-const DIVIDE: Binary = Binary(|a, b| a / b);
-const POWER: Binary = Binary(f64::powf);
-const NEGATE: Unary = Unary(|a| -a);
+const ADD: Binary = Binary::smooth(|a, b| a + b);
+const SUBTRACT: Binary = Binary::smooth(|a, b| a - b);
+const MULTIPLY: Binary = Binary::smooth(|a, b| a * b);
+const DIVIDE: Binary = Binary::smooth(|a, b| a / b);
+const POWER: Binary = Binary::smooth(f64::powf);
+const NEGATE: Unary = Unary::smooth(|a| -a);
 
 /// What is wrong with an expression, and where in its text.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -22,29 +22,29 @@ const NAMES: &[(&str, Meaning)] = &[
     ("z", Meaning::Value(Instruction::Variable(Variable::Z))),
     ("pi", Meaning::Value(Instruction::Number(std::f64::consts::PI))),
     ("e", Meaning::Value(Instruction::Number(std::f64::consts::E))),
-    ("min", Meaning::Many(Binary(f64::min))),
-    ("max", Meaning::Many(Binary(f64::max))),
-    ("atan2", Meaning::Two(Binary(f64::atan2))),
-    ("hypot", Meaning::Two(Binary(f64::hypot))),
-    ("abs", Meaning::One(Unary(f64::abs))),
-    ("sign", Meaning::One(Unary(sign))),
-    ("floor", Meaning::One(Unary(f64::floor))),
-    ("ceil", Meaning::One(Unary(f64::ceil))),
-    ("round", Meaning::One(Unary(f64::round))),
-    ("sqrt", Meaning::One(Unary(f64::sqrt))),
-    ("cbrt", Meaning::One(Unary(f64::cbrt))),
-    ("exp", Meaning::One(Unary(f64::exp))),
-    ("ln", Meaning::One(Unary(f64::ln))),
-    ("log10", Meaning::One(Unary(f64::log10))),
-    ("sin", Meaning::One(Unary(f64::sin))),
-    ("cos", Meaning::One(Unary(f64::cos))),
-    ("tan", Meaning::One(Unary(f64::tan))),
-    ("asin", Meaning::One(Unary(f64::asin))),
-    ("acos", Meaning::One(Unary(f64::acos))),
-    ("atan", Meaning::One(Unary(f64::atan))),
-    ("sinh", Meaning::One(Unary(f64::sinh))),
-    ("cosh", Meaning::One(Unary(f64::cosh))),
-    ("tanh", Meaning::One(Unary(f64::tanh))),
+    ("min", Meaning::Many(Binary::of_pieces(f64::min, below))),
+    ("max", Meaning::Many(Binary::of_pieces(f64::max, below))),
+    ("atan2", Meaning::Two(Binary::smooth(f64::atan2))),
+    ("hypot", Meaning::Two(Binary::smooth(f64::hypot))),
+    ("abs", Meaning::One(Unary::of_pieces(f64::abs, negative))),
+    ("sign", Meaning::One(Unary::of_pieces(sign, sign))),
+    ("floor", Meaning::One(Unary::of_pieces(f64::floor, f64::floor))),
+    ("ceil", Meaning::One(Unary::of_pieces(f64::ceil, f64::ceil))),
+    ("round", Meaning::One(Unary::of_pieces(f64::round, f64::round))),
+    ("sqrt", Meaning::One(Unary::smooth(f64::sqrt))),
+    ("cbrt", Meaning::One(Unary::smooth(f64::cbrt))),
+    ("exp", Meaning::One(Unary::smooth(f64::exp))),
+    ("ln", Meaning::One(Unary::smooth(f64::ln))),
+    ("log10", Meaning::One(Unary::smooth(f64::log10))),
+    ("sin", Meaning::One(Unary::smooth(f64::sin))),
+    ("cos", Meaning::One(Unary::smooth(f64::cos))),
+    ("tan", Meaning::One(Unary::smooth(f64::tan))),
+    ("asin", Meaning::One(Unary::smooth(f64::asin))),
+    ("acos", Meaning::One(Unary::smooth(f64::acos))),
+    ("atan", Meaning::One(Unary::smooth(f64::atan))),
+    ("sinh", Meaning::One(Unary::smooth(f64::sinh))),
+    ("cosh", Meaning::One(Unary::smooth(f64::cosh))),
+    ("tanh", Meaning::One(Unary::smooth(f64::tanh))),
 ];
 
 /// What `name` stands for.
@@ -60,4 +60,14 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// -1, 0 or 1.
 fn sign(number: f64) -> f64 {
     if number == 0.0 { 0.0 } else { number.signum() }
+}
+
+/// Whether a number is below zero.
+fn negative(number: f64) -> f64 {
+    f64::from(u8::from(number < 0.0))
+}
+
+/// Whether the left number is below the right one.
+fn below(left: f64, right: f64) -> f64 {
+    f64::from(u8::from(left < right))
 }

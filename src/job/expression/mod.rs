@@ -52,6 +52,24 @@ impl Scalar {
         [Variable::X, Variable::Y, Variable::Z].into_iter().any(|variable| self.uses(variable))
     }
 
+    /// Whether it is made of pieces, as by min or abs.
+    pub fn has_pieces(&self) -> bool {
+        let Self::Expression(expression) = self else { return false };
+        expression.program.iter().any(|instruction| match instruction {
+            Instruction::Unary(function) => function.piece.is_some(),
+            Instruction::Binary(function) => function.piece.is_some(),
+            _ => false,
+        })
+    }
+
+    /// A digest of the pieces that its value at `time` and `point` comes from: another one where another piece holds.
+    pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
+        match self {
+            Self::Number(_) => 0,
+            Self::Expression(expression) => expression.pieces(time, point),
+        }
+    }
+
     /// Whether `variable` occurs in it.
     pub fn uses(&self, variable: Variable) -> bool {
         matches!(self, Self::Expression(expression) if expression.program.contains(&Instruction::Variable(variable)))
@@ -100,15 +118,21 @@ impl Expression {
 
     /// Value at `time` and `point`; not finite where the expression has no value, as in sqrt(-1).
     pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
-        if self.depth <= SMALL {
-            self.run(&mut [0.0; SMALL], time, point)
-        } else {
-            self.run(&mut vec![0.0; self.depth], time, point)
-        }
+        self.with_stack(|stack| self.run::<false>(stack, time, point).0)
     }
 
-    fn run(&self, stack: &mut [f64], time: f64, point: &[f64]) -> f64 {
-        let mut top = 0;
+    fn pieces(&self, time: f64, point: &[f64]) -> u64 {
+        self.with_stack(|stack| self.run::<true>(stack, time, point).1)
+    }
+
+    fn with_stack<T>(&self, run: impl FnOnce(&mut [f64]) -> T) -> T {
+        if self.depth <= SMALL { run(&mut [0.0; SMALL]) } else { run(&mut vec![0.0; self.depth]) }
+    }
+
+    /// The value, and the digest of its pieces if that is wanted.
+    fn run<const PIECES: bool>(&self, stack: &mut [f64], time: f64, point: &[f64]) -> (f64, u64) {
+        let (mut top, mut digest) = (0, 0);
+        let mut note = |piece: f64| digest = mix(digest, piece);
         for instruction in self.program.iter() {
             match instruction {
                 Instruction::Number(number) => {
@@ -122,14 +146,24 @@ impl Expression {
                     };
                     top += 1;
                 }
-                Instruction::Unary(function) => stack[top - 1] = (function.0)(stack[top - 1]),
+                Instruction::Unary(function) => {
+                    let argument = stack[top - 1];
+                    if let (true, Some(piece)) = (PIECES, function.piece) {
+                        note(piece(argument));
+                    }
+                    stack[top - 1] = (function.value)(argument);
+                }
                 Instruction::Binary(function) => {
                     top -= 1;
-                    stack[top - 1] = (function.0)(stack[top - 1], stack[top]);
+                    let (left, right) = (stack[top - 1], stack[top]);
+                    if let (true, Some(piece)) = (PIECES, function.piece) {
+                        note(piece(left, right));
+                    }
+                    stack[top - 1] = (function.value)(left, right);
                 }
             }
         }
-        stack[0]
+        (stack[0], digest)
     }
 }
 
@@ -150,11 +184,44 @@ enum Instruction {
 
 /// A function of the topmost value.
 #[derive(Clone, Copy)]
-struct Unary(fn(f64) -> f64);
+struct Unary {
+    value: fn(f64) -> f64,
+    /// Tells which piece holds, if it has several.
+    piece: Option<fn(f64) -> f64>,
+}
+
+impl Unary {
+    const fn smooth(value: fn(f64) -> f64) -> Self {
+        Self { value, piece: None }
+    }
+
+    const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
+        Self { value, piece: Some(piece) }
+    }
+}
 
 /// A function of the two topmost values.
 #[derive(Clone, Copy)]
-struct Binary(fn(f64, f64) -> f64);
+struct Binary {
+    value: fn(f64, f64) -> f64,
+    /// Tells which piece holds, if it has several.
+    piece: Option<fn(f64, f64) -> f64>,
+}
+
+impl Binary {
+    const fn smooth(value: fn(f64, f64) -> f64) -> Self {
+        Self { value, piece: None }
+    }
+
+    const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
+        Self { value, piece: Some(piece) }
+    }
+}
+
+/// A digest with one more number in it.
+fn mix(digest: u64, number: f64) -> u64 {
+    (digest ^ number.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+}
 
 impl fmt::Debug for Unary {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -170,13 +237,13 @@ impl fmt::Debug for Binary {
 
 impl PartialEq for Unary {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::fn_addr_eq(self.0, other.0)
+        std::ptr::fn_addr_eq(self.value, other.value)
     }
 }
 
 impl PartialEq for Binary {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::fn_addr_eq(self.0, other.0)
+        std::ptr::fn_addr_eq(self.value, other.value)
     }
 }
 

@@ -92,3 +92,27 @@ fn dependence_follows_the_variables_that_occur() {
     assert!(scalar("2*t").depends_on_time() && !scalar("2*t").depends_on_position());
     assert!(scalar("y").depends_on_position() && !scalar("y").depends_on_time());
 }
+
+#[test]
+fn pieces_change_where_another_one_holds() {
+    let scalar = |text: &str| Scalar::Expression(Expression::parse(text).expect(text));
+    for (text, before, after) in [
+        ("min(t/0.1, 1)", 0.099, 0.101),
+        ("max(0, 1 - abs(t - 0.6)/0.01)", 0.58, 0.605),
+        ("1 - abs(t - x)", 0.49, 0.51),
+        ("sign(t - 0.5)", 0.4, 0.6),
+        ("floor(10*t)", 0.19, 0.21),
+        ("ceil(10*t) + round(t)", 0.19, 0.21),
+    ] {
+        let scalar = scalar(text);
+        let pieces = |time: f64| scalar.pieces(time, &[0.5]);
+        assert!(scalar.has_pieces(), "{text}");
+        assert_ne!(pieces(before), pieces(after), "{text}");
+        assert_eq!(pieces(before), pieces(before - 1e-3), "{text}");
+    }
+    for smooth in ["sin(t)^2", "-t + exp(x)/2", "hypot(t, 1)"] {
+        assert!(!scalar(smooth).has_pieces(), "{smooth}");
+        assert_eq!(scalar(smooth).pieces(0.1, &[]), scalar(smooth).pieces(0.9, &[]), "{smooth}");
+    }
+    assert!(!Scalar::Number(1.0).has_pieces() && Scalar::Number(1.0).pieces(0.5, &[]) == 0);
+}

@@ -9,6 +9,7 @@ const MOST_STEPS: f64 = 1e12;
 /// Steps that fit into the time, checkpoints that have an occasion, PETSc options as PETSc spells them.
 pub fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
+    check_landings(findings);
     check_scheme(findings);
     check_checkpoint(findings);
     if let Some(Value::Table(options)) = findings.root.find("solver.petsc").map(|node| &node.value) {
@@ -56,6 +57,27 @@ fn check_steps(findings: &mut Findings<'_>) {
             "the first step is longer than the largest",
             format!("at most {largest}"),
         );
+    }
+}
+
+/// Times to land on rise and lie within the run.
+fn check_landings(findings: &mut Findings<'_>) {
+    let end = findings.root.read::<f64>("time.end").filter(|end| end.is_finite());
+    let mut before = 0.0;
+    for at in 0..findings.root.count("time.land_on") {
+        let place = format!("time.land_on.{at}");
+        let Some(time) = findings.root.read::<f64>(&place) else { continue };
+        if time <= before {
+            let message = "times to land on must rise from above 0";
+            findings.fault(&place, message, format!("a time after {before}, or leave it out"));
+        } else if let Some(end) = end.filter(|end| time > *end) {
+            findings.fault(
+                &place,
+                "this time to land on is after the end of the run",
+                format!("at most {end}"),
+            );
+        }
+        before = before.max(time);
     }
 }
 

@@ -1,0 +1,38 @@
+//! From the job's tables to the steps that a run takes.
+
+use crate::{
+    job::{Every, Job},
+    stepping::{Adaptive, AdaptiveSettings, Landings},
+};
+
+/// How the job adapts its steps, if it does.
+pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
+    job.time.adaptive.as_ref().map(|adaptive| {
+        Adaptive::new(AdaptiveSettings {
+            tolerance: adaptive.tolerance,
+            first: job.time.step,
+            smallest: adaptive.smallest_step,
+            largest: adaptive.largest_step,
+            end: job.time.end,
+        })
+    })
+}
+
+/// The longest step of a job.
+pub(super) fn longest_step(job: &Job) -> f64 {
+    adaptive::<2>(job).map_or(job.time.step, |adaptive| adaptive.longest())
+}
+
+/// Where steps of a job have to end; adaptive ones at output times, too.
+pub(super) fn landings(job: &Job) -> Landings {
+    let interval = match (&job.time.adaptive, job.output.fields) {
+        (Some(_), Some(Every::Interval(interval))) => Some(interval),
+        _ => None,
+    };
+    Landings { times: job.time.land_on.clone(), interval, end: job.time.end }
+}
+
+/// Steps that one matrix is for: adaptive steps change their length every other time.
+pub(super) fn steps_a_matrix(job: &Job) -> u64 {
+    if job.time.adaptive.is_some() { 2 } else { landings(job).steps_after(0.0, job.time.step) }
+}
