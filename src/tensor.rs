@@ -50,6 +50,11 @@ pub fn larger(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
 
+/// Vector product.
+pub fn cross(a: &Vector<3>, b: &Vector<3>) -> Vector<3> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// The tensor indices and the Mandel factor of component `c` among `S`.
 #[inline(always)]
 pub const fn component<const S: usize>(c: usize) -> (usize, usize, f64) {

@@ -8,6 +8,7 @@ mod graph;
 mod memory;
 mod normal_law;
 mod obstacle;
+mod obstacle_motion;
 
 pub use adhesion::Adhesion;
 pub use compliance::Compliance;
@@ -17,3 +18,4 @@ pub use graph::Graph;
 pub use memory::Memory;
 pub use normal_law::{NodeContext, NormalLaw, Resolved};
 pub use obstacle::Gap;
+pub use obstacle_motion::{ObstacleMotion, Rate};

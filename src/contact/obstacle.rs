@@ -33,6 +33,8 @@ pub enum Gap {
         point: Vec<Scalar>,
         /// Its normal of any length, out of the obstacle toward the body.
         normal: Vec<Scalar>,
+        /// Velocity in rad/s at which it turns in itself about its normal through the point, in space.
+        rotation: Scalar,
     },
     /// A sphere, in 2D a disc.
     Sphere {
@@ -42,6 +44,10 @@ pub enum Gap {
         radius: f64,
         /// Whether the obstacle is all outside of it.
         hollow: bool,
+        /// Velocity in rad/s at which it turns about its centre.
+        rotation: Scalar,
+        /// What it turns about in space, of any length; nothing in the plane.
+        axis: Vec<f64>,
     },
 }
 
@@ -86,14 +92,14 @@ impl Gap {
     fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         match self {
             Self::Distance(gap) => gap.evaluate(time, place),
-            Self::Plane { point, normal: facing } => {
+            Self::Plane { point, normal: facing, .. } => {
                 let (point, facing) = (vector::<D>(point, time), vector::<D>(facing, time));
                 let length = norm(&facing);
                 let toward: Vector<D> = std::array::from_fn(|i| point[i] - place[i]);
                 let (height, cosine) = (dot(&toward, &facing) / length, dot(normal, &facing) / length);
                 if height.is_finite() && cosine >= -PARALLEL { f64::INFINITY } else { height / cosine }
             }
-            Self::Sphere { centre, radius, hollow } => {
+            Self::Sphere { centre, radius, hollow, .. } => {
                 let centre = vector::<D>(centre, time);
                 let offset: Vector<D> = std::array::from_fn(|i| place[i] - centre[i]);
                 to_sphere(&offset, normal, *radius, *hollow)
@@ -102,7 +108,7 @@ impl Gap {
     }
 }
 
-fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
+pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
     std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
 }
 
@@ -136,12 +142,20 @@ mod tests {
         Scalar::Expression(crate::job::Expression::parse(text).unwrap())
     }
 
+    fn plane(point: Vec<Scalar>, normal: Vec<Scalar>) -> Gap {
+        Gap::Plane { point, normal, rotation: Scalar::default() }
+    }
+
+    fn sphere(centre: Vec<Scalar>, radius: f64, hollow: bool) -> Gap {
+        Gap::Sphere { centre, radius, hollow, rotation: Scalar::default(), axis: vec![] }
+    }
+
     fn floor(height: f64) -> Gap {
-        Gap::Plane { point: numbers(&[7.0, height]), normal: numbers(&[0.0, 3.0]) }
+        plane(numbers(&[7.0, height]), numbers(&[0.0, 3.0]))
     }
 
     fn disc(centre: [f64; 2], hollow: bool) -> Gap {
-        Gap::Sphere { centre: numbers(&centre), radius: 2.0, hollow }
+        sphere(numbers(&centre), 2.0, hollow)
     }
 
     const DOWN: Vector<2> = [0.0, -1.0];
@@ -164,11 +178,9 @@ mod tests {
 
     #[test]
     fn obstacles_move_with_time() {
-        let rising =
-            Gap::Plane { point: vec![Scalar::default(), expression("-1 + t")], normal: numbers(&[0.0, 1.0]) };
+        let rising = plane(vec![Scalar::default(), expression("-1 + t")], numbers(&[0.0, 1.0]));
         assert_eq!(rising.at(0.25, &[0.0, 0.0], &DOWN).unwrap(), 0.75);
-        let turning =
-            Gap::Plane { point: numbers(&[0.0, -1.0]), normal: vec![expression("-t"), Scalar::Number(1.0)] };
+        let turning = plane(numbers(&[0.0, -1.0]), vec![expression("-t"), Scalar::Number(1.0)]);
         assert_eq!(turning.at(1.0, &[0.5, 0.0], &DOWN).unwrap(), 0.5);
     }
 
@@ -199,16 +211,10 @@ mod tests {
         let bad = [
             Gap::Distance(expression("sqrt(0.5 - t)")),
             Gap::Distance(expression("-1/(t - 1)^2")),
-            Gap::Plane { point: numbers(&[0.0, 0.0]), normal: vec![Scalar::default(), expression("t - 1")] },
-            Gap::Plane {
-                point: vec![Scalar::default(), expression("sqrt(t - 2)")],
-                normal: numbers(&[0.0, 1.0]),
-            },
-            Gap::Plane {
-                point: vec![Scalar::default(), expression("1/(t - 1)")],
-                normal: numbers(&[0.0, -1.0]),
-            },
-            Gap::Sphere { centre: vec![expression("sqrt(0.5 - t)")], radius: 1.0, hollow: false },
+            plane(numbers(&[0.0, 0.0]), vec![Scalar::default(), expression("t - 1")]),
+            plane(vec![Scalar::default(), expression("sqrt(t - 2)")], numbers(&[0.0, 1.0])),
+            plane(vec![Scalar::default(), expression("1/(t - 1)")], numbers(&[0.0, -1.0])),
+            sphere(vec![expression("sqrt(0.5 - t)")], 1.0, false),
         ];
         for gap in bad {
             let error = gap.at(1.0, &[0.25, 0.0], &DOWN).unwrap_err().to_string();
@@ -226,7 +232,7 @@ mod tests {
             prop_assume!(norm(&direction) > 0.1);
             let normal = direction.map(|x| x / norm(&direction));
             let centre = [0.3, -0.2, 0.1];
-            let gap = Gap::Sphere { centre: numbers(&centre), radius, hollow }.at(0.0, &place, &normal).unwrap();
+            let gap = sphere(numbers(&centre), radius, hollow).at(0.0, &place, &normal).unwrap();
             prop_assume!(gap.is_finite());
             let end: Vector<3> = std::array::from_fn(|i| place[i] + gap * normal[i] - centre[i]);
             prop_assert!((norm(&end) - radius).abs() < 1e-12 * (1.0 + gap.abs()));
@@ -244,7 +250,7 @@ mod tests {
             prop_assume!(norm(&direction) > 0.1 && norm(&facing) > 0.1);
             let normal = direction.map(|x| x / norm(&direction));
             let point = [0.3, -0.2, 0.1];
-            let gap = Gap::Plane { point: numbers(&point), normal: numbers(&facing) }.at(0.0, &place, &normal).unwrap();
+            let gap = plane(numbers(&point), numbers(&facing)).at(0.0, &place, &normal).unwrap();
             prop_assert_eq!(gap.is_infinite(), dot(&normal, &facing) / norm(&facing) >= -PARALLEL);
             prop_assume!(gap.abs() < 1e3);
             let end: Vector<3> = std::array::from_fn(|i| place[i] + gap * normal[i] - point[i]);

@@ -27,9 +27,9 @@ pub struct Energy {
     pub viscous: f64,
     /// Taken up by viscoplastic flow in the step: dissipated, or stored by hardening.
     pub viscoplastic: f64,
-    /// Dissipated by contact in the step, given to a moving obstacle, or taken up by a foundation that remembers.
+    /// Dissipated by contact in the step, or taken up by a foundation that remembers.
     pub contact: f64,
-    /// Work of loads in the step.
+    /// Work of loads and of obstacles that move in the step.
     pub work: f64,
     /// The scheme's own terms in the step, known exactly.
     pub numerical: f64,

@@ -6,7 +6,7 @@ use super::tags::place;
 use crate::agreement::Agreed;
 use crate::error::Result;
 use crate::session::Session;
-use crate::tensor::{Vector, add_scaled, dot, norm};
+use crate::tensor::{Vector, add_scaled, cross, dot, norm};
 
 /// A rigid motion: translation, then rotation about x, y, z through the body's centre, lengths in units of its radius.
 pub(super) type Motion = [f64; 6];
@@ -160,10 +160,6 @@ pub(super) fn absent<const D: usize>() -> Vec<Motion> {
 
 fn unit(axis: usize) -> Motion {
     std::array::from_fn(|i| (i == axis) as u8 as f64)
-}
-
-fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Extends an orthonormal basis by the span of rows, the most independent row first; gives the positions of the rows taken.

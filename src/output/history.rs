@@ -38,11 +38,12 @@ pub struct Totals {
     pub adhesion_energy: f64,
     /// Dissipated by adhesive bonds that gave way.
     pub adhesion_dissipation: f64,
-    /// Work of the loads.
+    /// Work of loads and of obstacles that move.
     pub external_work: f64,
     /// Dissipated by the scheme: what the exact terms of its time discretisation took out.
     pub numerical_dissipation: f64,
-    /// Energy that was there at first or came in since: work of loads and of moving obstacles, without signs.
+    /// Energy that was there at first or came in since, without signs: work of loads and of obstacles, and what foundations
+    /// that remember gave back.
     pub supplied: f64,
     /// Largest amount of energy seen in any of these, the scale of the imbalance.
     pub turnover: f64,

@@ -30,6 +30,8 @@ pub struct Boundary<'a> {
     pub time: f64,
     law: Option<&'a Law>,
     friction: Option<FrictionLaw>,
+    /// Length in s of the step that ended then.
+    step: Option<f64>,
     table: Table,
     points: Vec<[f64; 3]>,
     arc: Vec<f64>,
@@ -50,6 +52,8 @@ pub struct Laws {
     pub normal: Law,
     /// In sliding.
     pub friction: Option<FrictionLaw>,
+    /// Times in s at the ends of the steps, and their lengths in s.
+    pub steps: Vec<[f64; 2]>,
 }
 
 impl<'a> Boundary<'a> {
@@ -66,8 +70,10 @@ impl<'a> Boundary<'a> {
         let axes = ["x", "y", "z"].map(|axis| table.column(axis).unwrap_or_else(|| vec![0.0; table.len()]));
         let points: Vec<[f64; 3]> = (0..table.len()).map(|n| [0, 1, 2].map(|axis| axes[axis][n])).collect();
         let time = table.column("time").and_then(|times| times.last().copied()).unwrap_or(0.0);
+        let steps = laws.iter().flat_map(|laws| &laws.steps);
+        let step = steps.into_iter().find(|[end, _]| *end == time).map(|[_, length]| *length);
         let mut boundary =
-            Self { name, time, law, friction, table, points, arc: vec![], dimension, behind: None };
+            Self { name, time, law, friction, step, table, points, arc: vec![], dimension, behind: None };
         if dimension == 2 {
             let (order, arc) = along_curve(&boundary.points);
             boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
@@ -300,6 +306,10 @@ impl<'a> Boundary<'a> {
         }
         let sliding = |n: usize| {
             let (v, normal) = (velocity[nodes[n]], normals[n]);
+            let beside = (&self.points[n], &normal);
+            let obstacle =
+                self.law.zip(self.step).map(|(law, step)| law.obstacle_velocity(self.time, step, beside));
+            let v = obstacle.map_or(v, |obstacle| std::array::from_fn(|i| v[i] - obstacle[i]));
             let along: f64 = (0..3).map(|i| v[i] * normal[i]).sum();
             (0..3).map(|i| (v[i] - along * normal[i]).powi(2)).sum::<f64>().sqrt()
         };

@@ -2,7 +2,7 @@
 
 use super::scale::{extent, number};
 use crate::{
-    contact::{Gap, Graph, NormalLaw},
+    contact::{Gap, Graph, NormalLaw, Rate},
     error::Result,
     job::Contact,
     run::normal_law,
@@ -64,6 +64,22 @@ impl Law {
     ) -> f64 {
         let Some(gap) = &self.gap else { return velocity };
         gap.at(time, point, normal).map_or(f64::NAN, |gap| displacement - gap)
+    }
+
+    /// Velocity in m/s of the obstacle's material where the normal of a node meets it, at the end of a step of this length; zero
+    /// where nothing is known of it.
+    pub fn obstacle_velocity(
+        &self,
+        time: f64,
+        length: f64,
+        (point, normal): (&[f64; 3], &[f64; 3]),
+    ) -> [f64; 3] {
+        let moving = self.gap.as_ref().filter(|gap| gap.may_drag());
+        let velocity = moving.and_then(|gap| {
+            let motion = gap.motion(Rate::euler(time, length)).ok()?;
+            gap.velocity_along(&motion, time, point, normal).ok()
+        });
+        velocity.unwrap_or_default()
     }
 
     /// Whether the normals of the nodes matter.
@@ -175,7 +191,9 @@ fn graph_branches(graph: &Graph, unit: &str) -> Vec<Branch> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{self, Bound, Compliance, NormalLaw, Obstacle, Plane, Quadrature, Scalar, Unilateral};
+    use crate::job::{
+        self, Bound, Compliance, NormalLaw, Obstacle, Plane, Quadrature, Scalar, Sphere, Unilateral,
+    };
 
     const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
 
@@ -243,10 +261,29 @@ mod tests {
     #[test]
     fn the_gap_to_a_plane_that_moves_is_measured_along_the_normal() {
         let numbers = |values: [f64; 2]| values.map(Scalar::Number).to_vec();
-        let plane = Plane { point: numbers([0.0, -0.5]), normal: numbers([0.0, 1.0]) };
+        let plane = Plane { point: numbers([0.0, -0.5]), normal: numbers([0.0, 1.0]), rotation: None };
         let spring = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
         let law = against(NormalLaw::Compliance(spring), Some(Obstacle::Plane(plane)));
         assert!(law.needs_normals());
         assert!((law.abscissa(0.0, (&[3.0, 0.0, 0.0], &DOWN), 0.6, 0.0) - 0.1).abs() < 1e-15);
+        assert_eq!(law.obstacle_velocity(1.0, 0.1, (&[3.0, 0.0, 0.0], &DOWN)), [0.0; 3]);
+    }
+
+    #[test]
+    fn a_disc_that_turns_moves_where_the_normal_of_a_node_meets_it() {
+        let disc = Sphere {
+            centre: [0.0, -2.0].map(Scalar::Number).to_vec(),
+            radius: 2.0,
+            hollow: false,
+            rotation: Some(Scalar::Number(3.0)),
+            axis: None,
+        };
+        let law = against(
+            NormalLaw::Compliance(Compliance { stiffness: 100.0, exponent: 1.0, gap: None }),
+            Some(Obstacle::Sphere(disc)),
+        );
+        // To the left on top, however far the node is above.
+        let found = law.obstacle_velocity(1.0, 0.1, (&[0.0, 0.5, 0.0], &DOWN));
+        assert!((found[0] + 6.0).abs() < 1e-14 && found[1] == 0.0 && found[2] == 0.0, "{found:?}");
     }
 }

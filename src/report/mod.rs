@@ -139,7 +139,11 @@ fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
     let mut contacts: Vec<(&[String], Laws)> = Vec::new();
     for contact in found.job.iter().flat_map(|job| &job.contact) {
         let friction = contact.friction.as_ref().map(friction_law);
-        contacts.push((&contact.on, Laws { normal: Law::of(contact)?, friction }));
+        let steps = match (&found.history, &contact.obstacle) {
+            (Some(history), Some(_)) => history.curve("time", "dt"),
+            _ => Vec::new(),
+        };
+        contacts.push((&contact.on, Laws { normal: Law::of(contact)?, friction, steps }));
     }
     let mut seen = Vec::new();
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {

@@ -1,6 +1,6 @@
 //! From the job's tables to a body: a table that is absent leaves nothing behind.
 
-use super::steps;
+use super::{obstacles, steps};
 use crate::{
     body::Body,
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
@@ -10,7 +10,7 @@ use crate::{
         ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Obstacle, Scalar},
+    job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Scalar},
     material::{
         self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
         Perzyna, Viscoplasticity,
@@ -230,7 +230,7 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 pub fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
     let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
     let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Gap::default());
-    let gap = |given: &Option<Scalar>| gap(contact.obstacle.as_ref(), given.as_ref());
+    let gap = |given: &Option<Scalar>| obstacles::gap(contact.obstacle.as_ref(), given.as_ref());
     Ok(match &contact.normal {
         NormalLaw::DampedResponse(d) => {
             let symmetry = match d.symmetry {
@@ -252,17 +252,6 @@ pub fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
             job::Bound::Velocity => of_velocity(wall()?),
         },
     })
-}
-
-/// What the gap of a contact is measured to.
-fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
-    match obstacle {
-        None => Gap::Distance(given.cloned().unwrap_or_default()),
-        Some(Obstacle::Plane(p)) => Gap::Plane { point: p.point.clone(), normal: p.normal.clone() },
-        Some(Obstacle::Sphere(s)) => {
-            Gap::Sphere { centre: s.centre.clone(), radius: s.radius, hollow: s.hollow }
-        }
-    }
 }
 
 /// The friction law that a job describes.

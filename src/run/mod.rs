@@ -8,6 +8,7 @@ mod folder;
 mod header;
 mod hold;
 mod inventory;
+mod obstacles;
 mod outputs;
 mod phases;
 mod restored;

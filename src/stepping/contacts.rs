@@ -16,9 +16,10 @@ pub(super) fn released_by_contact<const D: usize, const S: usize>(
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
     for contact in &body.contacts {
-        let [given, numerical] = contact.release(&velocity, step.length);
-        energy.contact += given;
+        let [dissipated, numerical, work] = contact.release(&velocity, step.length);
+        energy.contact += dissipated;
         energy.numerical += numerical;
+        energy.work += work;
     }
     Ok(())
 }

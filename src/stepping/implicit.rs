@@ -85,6 +85,7 @@ impl Implicit {
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
+        step: Step,
     ) -> Result<()> {
         if self.blend.earlier == 0.0 || !body.contacts.iter().any(|c| c.law.depends_on_displacement()) {
             return Ok(());
@@ -95,8 +96,7 @@ impl Implicit {
             shift.iter_mut().zip(start.iter().zip(before.iter())).for_each(|(s, (a, b))| *s = a - b);
         }
         let shift = self.end.local()?;
-        body.contacts.iter_mut().for_each(|contact| contact.blend(self.blend.length, &shift));
-        Ok(())
+        body.contacts.iter_mut().try_for_each(|contact| contact.blend(step, self.blend, &shift))
     }
 
     /// Where the displacement starts, for cells that flow.

@@ -90,10 +90,11 @@ impl Method {
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
+        step: Step,
     ) -> Result<()> {
         match self {
             Self::LaggedEuler(_) => Ok(()),
-            Self::Implicit(scheme) => scheme.prepare_contacts(body, state),
+            Self::Implicit(scheme) => scheme.prepare_contacts(body, state, step),
         }
     }
 

@@ -263,7 +263,7 @@ impl Stepper {
         (outcome.energy, outcome.peaks) = self.method.energy(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
-            outcome.energy.work = step.length * load.dot(&state.velocity)?;
+            outcome.energy.work += step.length * load.dot(&state.velocity)?;
             self.traffic.balance += 2 * vector_bytes(body);
         }
         self.clock.balance += balancing.elapsed();
@@ -307,8 +307,8 @@ impl Stepper {
         step: Step,
     ) -> Result<()> {
         self.extrapolate(state, step)?;
-        session.agree(prepare_contacts(body, state, step))?;
-        self.method.prepare_contacts(body, state)
+        let prepared = prepare_contacts(body, state, step);
+        session.agree(prepared.and_then(|()| self.method.prepare_contacts(body, state, step)))
     }
 
     /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.

@@ -76,8 +76,8 @@ fn friction_keeps_the_direction_of_sliding_in_space() {
 
 #[test]
 fn friction_gives_the_same_answer_on_any_number_of_ranks() {
-    for (job, end) in [("sliding_block", "0.21"), ("oblique_sliding", "0.5"), ("slip_weakening_block", "2.8")]
-    {
+    let jobs = ["sliding_block", "oblique_sliding", "slip_weakening_block", "conveyor_belt"];
+    for (job, end) in jobs.into_iter().zip(["0.21", "0.5", "2.8", "0.21"]) {
         let make = || Case::of(job).set("time.end", end).set("solver.tolerance", "1e-11");
         let alone = make().run_and_keep(1);
         for ranks in [2, 3] {
@@ -151,4 +151,34 @@ fn friction_and_another_contact_share_an_edge() {
     assert!((found - 0.3).abs() < 1e-3, "{found}");
     let tractions = results.table("profiles.csv").numbers("friction_traction_y");
     assert!(relative_difference(&tractions[tractions.len() - 20..], &[20.0; 20]) < 0.01);
+}
+
+#[test]
+fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_goes_on_to_the_last_bit() {
+    let make = || Case::of("conveyor_belt").set("output.fields", "{ every = 10 }");
+    let straight = make().run_and_keep(2);
+    let rubbing = straight.results().table("profiles.csv");
+    let columns = ["time", "contact_pressure", "friction_traction_x"].map(|name| rubbing.numbers(name));
+    let [times, pressures, tractions] = &columns;
+    let (mut slides, mut rides, mut carried) = (0, 0, [0.0; 2]);
+    for ((time, pressure), traction) in times.iter().zip(pressures).zip(tractions) {
+        if *time > 0.0 && *time < 0.2 {
+            // -sigma_tau points against the sliding over the belt, which is backward.
+            assert!((traction + 0.5 * pressure).abs() <= 1e-6 * pressure, "{traction} Pa at {time} s");
+            slides += 1;
+        } else if *time > 0.23 {
+            // Its own weight spreads it, so that its sides rub apart: all together they carry nothing.
+            carried[0] += traction;
+            carried[1] += pressure;
+            rides += 1;
+        }
+    }
+    assert!(carried[0].abs() < 1e-3 * carried[1], "{carried:?}");
+    assert!(slides > 100 && rides > 20, "{slides} rows of sliding, {rides} of riding");
+    let stopped = make().set("checkpoint.every", "100");
+    stopped.run_with(2, &["--set", "time.end=0.1"]).expect(0);
+    stopped.run_with(2, &["--restart"]).expect(0).says("going on from");
+    for name in ["probes.csv", "history.csv", "profiles.csv"] {
+        assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
+    }
 }

@@ -127,16 +127,22 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
         "wall" => format!("[contact.normal.unilateral]\ngap = {gap}\n"),
         "moving wall" => format!("[contact.normal.unilateral]\ngap = \"{gap} - {high}*t + 0.01*x\"\n"),
         "rigid plane" => {
-            let (point, normal) = if D == 2 { ("0, ", "0.1, 1") } else { ("0, 0, ", "0.1, 0.05, 1") };
+            let (point, normal, turn) = if D == 2 {
+                ("\"0.5*t\", ", "0.1, 1", "")
+            } else {
+                ("\"0.5*t\", 0, ", "\"0.1+t\", 0.05, 1", "rotation = \"1+20*t\"\n")
+            };
             format!(
-                "[contact.normal.unilateral]\n[contact.obstacle.plane]\npoint = [{point}\"{high}*t-0.06\"]\nnormal = [{normal}]\n"
+                "[contact.normal.unilateral]\n[contact.obstacle.plane]\npoint = [{point}\"{high}*t-0.06\"]\nnormal = [{normal}]\n\
+                 {turn}"
             )
         }
         "springy sphere" => {
-            let centre = if D == 2 { "0.5, " } else { "0.5, 0.4, " };
+            let (centre, axis) = if D == 2 { ("0.5, ", "") } else { ("0.5, 0.4, ", "axis = [0, 1, 0.5]\n") };
             format!(
                 "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.sphere]\n\
-                 centre = [{centre}\"{high}*t-0.5\"]\nradius = 0.5\n"
+                 centre = [{centre}\"{high}*t-0.5\"]\nradius = 0.5\nrotation = 4\n\
+                 {axis}"
             )
         }
         "one way" => "[contact.normal.unilateral]\nbound = \"velocity\"\n".into(),

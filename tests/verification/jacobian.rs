@@ -5,6 +5,7 @@ use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     contact::{Compliance, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, Symmetry},
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
+    job::{Expression, Scalar},
     material::{ByMaterial, Isotropic},
     mesh::GlobalMesh,
     petsc::{Matrix, NonlinearProblem, ProjectedKsp},
@@ -40,6 +41,20 @@ const FRICTION: [Option<FrictionLaw>; 4] = [
     Some(FrictionLaw::SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 }),
 ];
 
+fn wall() -> Gap {
+    Gap::Distance(Scalar::Number(0.01))
+}
+
+/// Below the body, a plane that slides along it; in space it turns in itself, too.
+fn belt<const D: usize>() -> Gap {
+    let expression = |text: &str| Scalar::Expression(Expression::parse(text).expect("an expression"));
+    let mut point = vec![Scalar::default(); D];
+    point[0] = expression("3*t");
+    let mut normal = vec![Scalar::default(); D];
+    normal[D - 1] = Scalar::Number(1.0);
+    Gap::Plane { point, normal, rotation: Scalar::Number(if D == 3 { 2.0 } else { 0.0 }) }
+}
+
 fn differences<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {
     let effects: Vec<Box<dyn Effect<D, S>>> = vec![
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
@@ -54,12 +69,13 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     both.sort_unstable();
     let mut coupled = 0;
     for (law, normal) in laws().into_iter().enumerate() {
-        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction, true));
+        let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction, true, false));
         // Of a fixed point, which holds the pressures that friction follows.
-        let held = FRICTION[2..].iter().map(|friction| (Quadrature::Nodal, *friction, false));
-        for (quadrature, friction, follows) in
-            nodal.into_iter().chain(held).chain([(Quadrature::Gauss, None, true)])
-        {
+        let held = FRICTION[2..].iter().map(|friction| (Quadrature::Nodal, *friction, false, false));
+        let dragged = FRICTION[1..].iter().map(|friction| (Quadrature::Nodal, *friction, true, true));
+        let dragged = dragged.filter(|_| normal.depends_on_displacement());
+        let all = nodal.into_iter().chain(held).chain(dragged);
+        for (quadrature, friction, follows, moves) in all.chain([(Quadrature::Gauss, None, true, false)]) {
             let (needs_nodes, smooth) = (
                 normal.depends_on_displacement() || normal.has_vertical_parts(),
                 !normal.has_vertical_parts(),
@@ -67,15 +83,15 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             if quadrature == Quadrature::Gauss && needs_nodes {
                 continue;
             }
-            let contact = |facets: &[u32]| {
-                let (law, gap) = (normal.clone(), Gap::Distance(clarke::job::Scalar::Number(0.01)));
+            let contact = |facets: &[u32], gap: Gap| {
+                let law = normal.clone();
                 Contact::new(session, &body.mesh, facets, quadrature, law, gap, &body.fixed).expect("contact")
             };
             // Friction of both would act along the edge between them.
             let mut contacts = if friction.is_none() {
-                vec![contact(&both)]
+                vec![contact(&both, wall())]
             } else {
-                vec![contact(&bottom), contact(&right)]
+                vec![contact(&bottom, if moves { belt::<D>() } else { wall() }), contact(&right, wall())]
             };
             assert!(session.total(contacts[0].point_count()) > 0);
             contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant() + 30.0);

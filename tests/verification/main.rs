@@ -7,6 +7,7 @@ mod adaptive;
 mod adhesion;
 mod allocations;
 mod assembly;
+mod belts;
 mod callbacks;
 mod closed_forms;
 mod creep;
@@ -78,6 +79,7 @@ fn scenario() {
         "nearly_free" => held_by_contact::nearly_free(&session),
         "judged" => inclusion::judged(&session),
         "indefinite" => indefinite::solve(&session),
+        "belts" => belts::all(&session),
         "moving_obstacles" => obstacles::moving(&session),
         "impacts" => obstacles::impacts(&session),
         "bounds" => obstacles::bounds(&session),

@@ -73,14 +73,14 @@ fn balanced<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
                 let (imbalance, inclusion) = (run.totals.energy_imbalance, outcome.inclusion_residual);
                 assert!(imbalance <= 1e-10, "{name}: energy imbalance {imbalance:e}\n{text}");
                 assert!(inclusion <= 1e-9, "{name}: inclusion residual {inclusion:e}\n{text}");
-                touched += usize::from(outcome.energy.contact != 0.0);
+                touched += usize::from(outcome.energy.work != 0.0);
                 open = open.max(outcome.points.open);
             }
             assert!(
                 touched > 10 && open > 0 && open < points,
                 "{name}: {touched} steps, {open} open\n{text}"
             );
-            let given = run.totals.contact_dissipation;
+            let given = run.totals.external_work;
             assert!(given != 0.0 && run.totals.elastic_energy > 0.0, "{name} does no work\n{text}");
         }
     }

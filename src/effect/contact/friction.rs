@@ -1,7 +1,7 @@
 //! Friction at the nodal points of a contact boundary.
 //!
 //! Along the tangents of a point the unknown of a step is the parameter `s = c v + q` of the friction law's radial graph, over
-//! `c`; `v` is the sliding velocity and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
+//! `c`; `v` is the sliding velocity, relative to an obstacle that moves, and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
 //!
 //! ```text
 //! v = V(|s|, p) e                      dv = (V' e e^T + V / |s| (I - e e^T)) ds + V_p e dp
@@ -22,7 +22,7 @@ use crate::{
     contact::FrictionLaw,
     error::{Error, Result},
     mesh::Mesh,
-    tensor::{Vector, dot, larger, norm},
+    tensor::{Vector, add_scaled, dot, larger, norm},
 };
 
 /// A friction law with its points.
@@ -34,6 +34,10 @@ pub(super) struct Friction<const D: usize> {
     /// Whether the bound follows the pressure while a step is solved.
     pub follows: bool,
     pub points: Vec<TangentialPoint<D>>,
+    /// Velocity in m/s of the obstacle along the tangents of each point; empty where it does not move.
+    pub drift: Vec<Vector<D>>,
+    /// Tangents that supports hold beside free ones, with the points of the contact; empty where the obstacle does not move.
+    pub held: Vec<(usize, Vector<D>)>,
 }
 
 /// What happens at a point with friction.
@@ -47,8 +51,14 @@ pub(super) enum Motion {
 
 impl<const D: usize> Friction<D> {
     /// Puts the law on the points of a contact; refuses supports that leave no clear tangent, or no pressure.
-    pub fn new(law: FrictionLaw, points: &[Point<D>], mesh: &Mesh<D>, fixed: &[bool]) -> Result<Self> {
-        let mut out = Vec::new();
+    pub fn new(
+        law: FrictionLaw,
+        points: &[Point<D>],
+        obstacle_moves: bool,
+        mesh: &Mesh<D>,
+        fixed: &[bool],
+    ) -> Result<Self> {
+        let (mut out, mut held_tangents) = (Vec::new(), Vec::new());
         for (at, point) in points.iter().enumerate() {
             let node = point.node();
             let axes = (0..D).filter(|i| !fixed[node * D + i]);
@@ -71,6 +81,9 @@ impl<const D: usize> Friction<D> {
                 )));
             }
             let (tangents, count) = span_without(&free, &[point.direction]);
+            if obstacle_moves && count > 0 {
+                held_tangents.extend(tangents_held(point, fixed).map(|tangent| (at, tangent)));
+            }
             out.push(TangentialPoint {
                 at,
                 node,
@@ -83,7 +96,8 @@ impl<const D: usize> Friction<D> {
                 change: [0.0; D],
             });
         }
-        Ok(Self { law, scale: 1.0, follows: law.follows_pressure(), points: out })
+        let follows = law.follows_pressure();
+        Ok(Self { law, scale: 1.0, follows, points: out, drift: Vec::new(), held: held_tangents })
     }
 
     /// Forgets points that have no tangent.
@@ -107,6 +121,7 @@ impl<const D: usize> Friction<D> {
     /// Turns velocities into unknowns.
     pub fn unmap(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(1.0 / self.scale, &point.traction, values));
+        self.add_drift(-1.0, values);
     }
 
     /// Turns unknowns into velocities, after `points` took their pressures.
@@ -126,6 +141,21 @@ impl<const D: usize> Friction<D> {
             let back = unknown.map(|x| shares[0] * x);
             point.set(&back, values);
         }
+        self.add_drift(1.0, values);
+    }
+
+    /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
+    fn add_drift(&self, factor: f64, values: &mut [f64]) {
+        self.points.iter().zip(&self.drift).for_each(|(point, drift)| point.add(factor, drift, values));
+    }
+
+    /// The points with their sliding velocities.
+    fn sliding(&self, velocity: &[f64]) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
+        self.points.iter().enumerate().map(|(at, point)| {
+            let along = point.along(velocity);
+            let drift = self.drift.get(at);
+            (point, drift.map_or(along, |drift| std::array::from_fn(|i| along[i] - drift[i])))
+        })
     }
 
     /// Takes the derivative of the law at these unknowns, after `points` took their pressures.
@@ -251,11 +281,10 @@ impl<const D: usize> Friction<D> {
 
     /// What happens at each point.
     pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
-        self.points.iter().map(|point| {
+        self.sliding(velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
                 return Motion::Separated;
             }
-            let sliding = point.along(velocity);
             let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
             let found = self.law.resolve(norm(&parameter), self.scale, point.pressure);
             if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }
@@ -269,16 +298,24 @@ impl<const D: usize> Friction<D> {
         found.map_or([0.0; D], |at| self.points[at].along(nodal))
     }
 
-    /// Work in W of friction against these velocities.
+    /// Power in W that friction dissipates at these velocities.
     pub fn power(&self, velocity: &[f64]) -> f64 {
-        self.points.iter().map(|p| p.weight * dot(&p.traction, &p.along(velocity))).sum()
+        self.sliding(velocity).map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
+    }
+
+    /// Power in W that the obstacle gives the body by friction.
+    pub fn driving_power(&self) -> f64 {
+        let given = self.points.iter().zip(&self.drift).map(|(p, drift)| p.weight * dot(&p.traction, drift));
+        -given.sum::<f64>()
     }
 
     /// Largest sliding velocity and largest traction or bound at points here.
     pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
-        self.points.iter().fold([0.0; 2], |[v, q], point| {
+        // Beside the velocity of the obstacle a slower sliding is rounding.
+        let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
+        self.sliding(velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
-            [larger(v, norm(&point.along(velocity))), larger(larger(q, norm(&point.traction)), bound)]
+            [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })
     }
 
@@ -293,8 +330,8 @@ impl<const D: usize> Friction<D> {
     ) -> f64 {
         let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
         let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
-        let distance = |point: &TangentialPoint<D>| {
-            let (sliding, open) = (point.along(velocity), point.along(residual));
+        let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
+            let open = point.along(residual);
             let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
@@ -307,7 +344,7 @@ impl<const D: usize> Friction<D> {
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
-        super::inclusion::worst(self.points.iter().map(distance))
+        super::inclusion::worst(self.sliding(velocity).map(distance))
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.
@@ -319,4 +356,15 @@ impl<const D: usize> Friction<D> {
     pub fn square(&self, nodal: &[f64]) -> f64 {
         self.points.iter().map(|p| p.weight * p.along(nodal).iter().map(|x| x * x).sum::<f64>()).sum()
     }
+}
+
+/// The directions along the boundary at a point that supports hold.
+fn tangents_held<const D: usize>(point: &Point<D>, fixed: &[bool]) -> impl Iterator<Item = Vector<D>> {
+    let normal = point.normal;
+    (0..D).filter(|i| fixed[point.node() * D + i]).filter_map(move |axis| {
+        let unit: Vector<D> = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        let tangent = add_scaled(&unit, -normal[axis], &normal);
+        let size = norm(&tangent);
+        (size > ROUNDING).then(|| tangent.map(|x| x / size))
+    })
 }

@@ -21,6 +21,8 @@ mod blend;
 mod bounds;
 mod count;
 mod directions;
+mod drift;
+mod energy;
 mod friction;
 mod inclusion;
 mod point;
@@ -30,7 +32,7 @@ mod tangential_point;
 mod unknowns;
 
 use crate::{
-    contact::{Gap, NodeContext, NormalLaw},
+    contact::{Gap, NodeContext, NormalLaw, Rate},
     error::Result,
     mesh::Mesh,
     session::Session,
@@ -154,8 +156,10 @@ impl<const D: usize> Contact<D> {
             point.context = NodeContext { penetration: along - gap, step_length: length };
             point.penetration_before = along - before;
             point.shift = 0.0;
+            // An obstacle that was nowhere appears where the point is.
+            point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        Ok(())
+        self.take_drift(Rate::euler(time, length))
     }
 
     /// Takes the pressures from the nodal tractions of the converged state.
@@ -358,45 +362,5 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &self.friction {
             friction.add_tractions(nodal);
         }
-    }
-
-    /// Energy in J that a step of this length gave away, and the scheme's own term, from velocities at its end.
-    ///
-    /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
-    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme.
-    pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        for point in &self.points {
-            let v = point.normal_component(velocity);
-            let pressure = point.pressure_at(&self.law, velocity);
-            let work = length * pressure * v;
-            let change = point.context.step_length * v;
-            let after = point.context.penetration + change;
-            let beside = length * v - change - point.shift;
-            // An obstacle that was nowhere appears where the point is.
-            let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let stored = self.law.energy(after) - self.law.energy(before);
-            let numerical = match self.law {
-                NormalLaw::Compliance(_) if pressure == 0.0 => stored,
-                NormalLaw::Compliance(_) => stored - pressure * (after - before) - pressure * beside,
-                _ => 0.0,
-            };
-            sums[0] += point.weight * (work - stored + numerical);
-            sums[1] += point.weight * numerical;
-        }
-        if let Some(friction) = &self.friction {
-            sums[0] += length * friction.power(velocity);
-        }
-        sums
-    }
-
-    /// Energy in J stored at `time`, from displacements with ghosts.
-    pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
-        let NormalLaw::Compliance(law) = &self.law else { return Ok(0.0) };
-        let energy = |point: &Point<D>| {
-            let gap = self.gap.at(time, &point.place, &point.normal)?;
-            Ok(point.weight * law.energy(point.normal_component(displacement) - gap))
-        };
-        self.points.iter().map(energy).sum()
     }
 }

@@ -42,6 +42,8 @@ pub(super) struct Point<const D: usize> {
     pub context: NodeContext,
     /// `u_nu - gap` in m at the start of the step, both as they were then.
     pub penetration_before: f64,
+    /// How far the gap grew in the step, in m.
+    pub growth: f64,
     /// What is in the penetration beside the displacement at the start of the step, in m.
     pub shift: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
@@ -69,6 +71,7 @@ impl<const D: usize> Point<D> {
             place: [0.0; D],
             context: NodeContext::default(),
             penetration_before: 0.0,
+            growth: 0.0,
             shift: 0.0,
             pressure: 0.0,
             theta: 1.0,

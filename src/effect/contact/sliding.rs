@@ -17,7 +17,7 @@ impl<const D: usize> Contact<D> {
                 "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.points, mesh, fixed)?);
+        self.friction = Some(Friction::new(law, &self.points, self.gap.may_drag(), mesh, fixed)?);
         Ok(())
     }
 

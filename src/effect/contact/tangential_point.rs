@@ -63,9 +63,14 @@ impl<const D: usize> TangentialPoint<D> {
     /// The part of a nodal value along the tangents.
     pub fn along(&self, nodal: &[f64]) -> Vector<D> {
         let value = &nodal[self.node * D..][..D];
+        self.part(&std::array::from_fn(|i| value[i]))
+    }
+
+    /// The part of a vector along the tangents.
+    pub fn part(&self, vector: &Vector<D>) -> Vector<D> {
         let mut out = [0.0; D];
         for tangent in &self.tangents[..self.count] {
-            let along: f64 = (0..D).map(|i| tangent[i] * value[i]).sum();
+            let along: f64 = (0..D).map(|i| tangent[i] * vector[i]).sum();
             (0..D).for_each(|i| out[i] += along * tangent[i]);
         }
         out

@@ -141,6 +141,8 @@ fn check_bound(findings: &mut Findings<'_>, path: &str) {
 
 /// Vectors of an obstacle.
 const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.centre"];
+/// How an obstacle turns.
+const OBSTACLE_ROTATIONS: [&str; 2] = ["plane.rotation", "sphere.rotation"];
 
 /// An obstacle is for laws that know a gap, stands in for it, and moves as one.
 fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
@@ -168,13 +170,24 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
             );
         }
     }
-    for vector in OBSTACLE_VECTORS {
-        for component in items(root, &format!("{obstacle}.{vector}")) {
-            if root.read::<Scalar>(&component).is_some_and(|scalar| scalar.depends_on_position()) {
-                let help = "use t only; `gap` in the law may depend on x, y and z";
-                findings.fault(&component, "a rigid obstacle moves as one", help);
-            }
+    let components = OBSTACLE_VECTORS.map(|vector| items(root, &format!("{obstacle}.{vector}")));
+    let rotations = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));
+    for scalar in components.into_iter().flatten().chain(rotations.clone()) {
+        if root.read::<Scalar>(&scalar).is_some_and(|scalar| scalar.depends_on_position()) {
+            let help = "use t only; `gap` in the law may depend on x, y and z";
+            findings.fault(&scalar, "a rigid obstacle moves as one", help);
         }
+    }
+    for rotation in rotations {
+        if root.find(&rotation).is_some() && root.find(&format!("{contact}.friction")).is_none() {
+            findings.warnings.push(format!(
+                "{rotation}: only friction feels how an obstacle turns in itself, and there is none on this contact"
+            ));
+        }
+    }
+    let axis = format!("{obstacle}.sphere.axis");
+    if root.read::<Vec<f64>>(&axis).is_some_and(|axis| !axis.is_empty() && axis.iter().all(|&x| x == 0.0)) {
+        findings.fault(&axis, "this axis has no direction", "let it point along what the sphere turns about");
     }
     let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
     if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
@@ -241,5 +254,36 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
         for vector in OBSTACLE_VECTORS {
             check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);
         }
+        check_rotation(findings, &format!("{contact}.obstacle"), mesh.dimension);
     }
+}
+
+/// In the plane a disc turns about its centre and a line about nothing; in space a sphere needs an axis.
+fn check_rotation(findings: &mut Findings<'_>, obstacle: &str, dimension: usize) {
+    let root = findings.root;
+    let [plane, sphere] = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));
+    let axis = format!("{obstacle}.sphere.axis");
+    let has = |key: &str| root.find(key).is_some();
+    if dimension == 2 {
+        if has(&plane) {
+            let help = "delete it; let `point` move along the line for a belt, or let `normal` depend on t for a line that tilts";
+            findings.fault(&plane, "in 2D a plane can't turn in itself", help);
+        }
+        if has(&axis) {
+            findings.fault(&axis, "in 2D a sphere turns about its centre", "delete the axis");
+        }
+        return;
+    }
+    if has(&sphere) && !has(&axis) {
+        let help = "add `axis = [x, y, z]`, what the sphere turns about";
+        findings.fault(&sphere, "in 3D a rotation needs an axis", help);
+    }
+    if has(&axis) && !has(&sphere) {
+        findings.fault(
+            &axis,
+            "an axis without `rotation` turns nothing",
+            "add `rotation`, or delete the axis",
+        );
+    }
+    check_vector(findings, &axis, dimension);
 }

@@ -1,0 +1,35 @@
+//! Contact with an obstacle that moves along the boundary.
+
+use super::{Contact, point::Point, tangential_point::ROUNDING};
+use crate::{
+    contact::Rate,
+    error::{Error, Result},
+    tensor::{dot, norm},
+};
+
+impl<const D: usize> Contact<D> {
+    /// Takes in how fast the obstacle moves along the boundary in a step, for friction. Refuses supports that hold one tangent
+    /// of a point along this motion and leave another free: what slides there has a direction that the free one does not see.
+    /// Where they hold all, they carry the friction, whatever it is.
+    pub(super) fn take_drift(&mut self, rate: Rate) -> Result<()> {
+        let Some(friction) = self.friction.as_mut().filter(|_| self.gap.may_drag()) else { return Ok(()) };
+        let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
+        let velocity = |point: &Point<D>| gap.velocity_along(&motion, rate.time, &point.place, &point.normal);
+        friction.drift.clear();
+        for point in &friction.points {
+            friction.drift.push(point.part(&velocity(&points[point.at])?));
+        }
+        for (at, tangent) in &friction.held {
+            let (point, velocity) = (&points[*at], velocity(&points[*at])?);
+            let along = dot(tangent, &velocity);
+            if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
+                return Err(Error::Refused(format!(
+                    "friction at {:?} m: a support holds a direction there in which the obstacle moves, at {along} m/s at t = {} s, \
+                     and leaves another free, so that the friction along that is not known; hold all components there, or none",
+                    point.place, rate.time
+                )));
+            }
+        }
+        Ok(())
+    }
+}
