@@ -16,7 +16,7 @@
 use crate::{
     error::{Error, Result},
     job::Scalar,
-    tensor::{Vector, dot, norm},
+    tensor::{Vector, add_scaled, dot, norm},
 };
 
 /// Cosine between boundary and plane below which the ray counts as parallel to the plane.
@@ -83,12 +83,27 @@ impl Gap {
     pub fn expressions(&self) -> Vec<&[Scalar]> {
         match self {
             Self::Distance(gap) => vec![std::slice::from_ref(gap)],
-            Self::Plane { point, normal, .. } => vec![point, normal],
-            Self::Sphere { centre, .. } => vec![centre],
+            Self::Plane { point, normal, rotation } => vec![point, normal, std::slice::from_ref(rotation)],
+            Self::Sphere { centre, rotation, .. } => vec![centre, std::slice::from_ref(rotation)],
         }
     }
 
-    /// The same, not a number where the obstacle is nowhere.
+    /// How deep in m a place lies in the obstacle at `time`, negative outside; `None` where only the gap is known.
+    pub fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> Option<f64> {
+        match self {
+            Self::Distance(_) => None,
+            Self::Plane { point, normal, .. } => {
+                let (point, facing) = (vector::<D>(point, time), vector::<D>(normal, time));
+                Some(dot(&add_scaled(&point, -1.0, place), &facing) / norm(&facing))
+            }
+            Self::Sphere { centre, radius, hollow, .. } => {
+                let away = norm(&add_scaled(place, -1.0, &vector::<D>(centre, time)));
+                Some(if *hollow { away - radius } else { radius - away })
+            }
+        }
+    }
+
+    /// The gap, not a number where the obstacle is nowhere.
     fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         match self {
             Self::Distance(gap) => gap.evaluate(time, place),
@@ -204,6 +219,16 @@ mod tests {
         assert_eq!(around.at(0.0, &[0.0, -2.5], &DOWN).unwrap(), -0.5, "the point is in the shell");
         assert_eq!(around.at(0.0, &[0.0, 2.5], &DOWN).unwrap(), f64::INFINITY, "the shell is on this side");
         assert_eq!(around.at(0.0, &[3.0, 0.0], &DOWN).unwrap(), f64::INFINITY);
+    }
+
+    #[test]
+    fn depths_are_distances_to_the_surface_from_inside() {
+        let depths = |place| {
+            [floor(-0.5), disc([1.0, 0.0], false), disc([1.0, 0.0], true)].map(|gap| gap.depth(0.0, &place))
+        };
+        assert_eq!(depths([1.0, -1.5]), [Some(1.0), Some(0.5), Some(-0.5)]);
+        assert_eq!(depths([4.0, 0.0]), [Some(-0.5), Some(-1.0), Some(1.0)]);
+        assert_eq!(Gap::default().depth(0.0, &[0.0, 0.0]), None);
     }
 
     #[test]

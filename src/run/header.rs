@@ -56,7 +56,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
 
 /// What the user should know before the first step.
 pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
-    loaded.warnings.iter().chain(&ready.verdict.warnings).cloned().collect()
+    loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned().collect()
 }
 
 /// Status, sums, times.

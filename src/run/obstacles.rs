@@ -1,9 +1,17 @@
-//! Obstacles of a job: what gaps are measured to.
+//! Obstacles of a job: what gaps are measured to, and what is odd about where a body starts beside them.
 
 use crate::{
+    body::Body,
     contact::Gap,
-    job::{Obstacle, Scalar},
+    error::Result,
+    job::{Job, Obstacle, Scalar},
+    session::Session,
+    state::State,
+    tensor::{Vector, larger},
 };
+
+/// Share of the body's size beyond which it starts too deep in an obstacle.
+const TOO_DEEP: f64 = 0.01;
 
 /// What the gap of a contact is measured to.
 pub(super) fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
@@ -22,4 +30,65 @@ pub(super) fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
             axis: s.axis.clone().unwrap_or_default(),
         },
     }
+}
+
+/// Warnings of contacts that can touch nothing because the body lies behind the obstacle, and of bodies that start inside of
+/// one. Collective, with the same words on all ranks.
+pub(super) fn warnings<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<Vec<String>> {
+    let displacement = session.agree(state.displacement.local())?;
+    let size = size(session, &body.mesh.nodes);
+    let mut out = Vec::new();
+    for (number, (contact, table)) in body.contacts.iter().zip(&job.contact).enumerate() {
+        if !contact.law.depends_on_displacement() {
+            continue;
+        }
+        let [deepest] = session.largest([contact.deepest(0.0, &displacement)]);
+        let on = table.on.join(", ");
+        if deepest > TOO_DEEP * size {
+            out.push(format!(
+                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside of its obstacle, {:.1} % of the body's \
+                 size: the first steps throw it out; correct the gap, the obstacle or [initial] displacement",
+                100.0 * deepest / size
+            ));
+        }
+        if deepest == f64::NEG_INFINITY && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
+            let remedy = match contact.gap {
+                Gap::Sphere { .. } => {
+                    "see whether the body or the obstacle is inside of the sphere: `hollow`"
+                }
+                _ => "turn the plane's `normal` round: it points out of the obstacle toward the body",
+            };
+            out.push(format!(
+                "contact.{number}: the body lies behind its obstacle, so that the boundary {on} touches nothing; {remedy}"
+            ));
+        }
+    }
+    Ok(out)
+}
+
+/// The longest side of the box around the body. Collective.
+fn size<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
+    let mut ends = [[f64::NEG_INFINITY; 3]; 2];
+    for node in nodes {
+        for (axis, x) in node.iter().enumerate() {
+            ends[0][axis] = larger(ends[0][axis], *x);
+            ends[1][axis] = larger(ends[1][axis], -x);
+        }
+    }
+    let ends = ends.map(|end| session.largest(end));
+    (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
+}
+
+/// Whether all of a body lies where the obstacle is. Collective.
+fn is_behind<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>], size: f64) -> bool {
+    let depths = nodes.iter().filter_map(|node| gap.depth(0.0, node));
+    let [least, most] =
+        depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
+    let [least, most] = session.largest([least, most]);
+    -least >= -1e-9 * size && most > TOO_DEEP * size
 }

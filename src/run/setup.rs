@@ -1,6 +1,6 @@
 //! What a run starts from and a check describes: nothing of it touches the output folder.
 
-use super::{build, hold::refuse_free_bodies, steps};
+use super::{build, hold::refuse_free_bodies, obstacles, steps};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},
@@ -23,6 +23,8 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub probes: Probes<D>,
     pub certificates: Certificates,
     pub verdict: Verdict,
+    /// What is odd about the start.
+    pub warnings: Vec<String>,
 }
 
 /// Sets the problem of a job up on its mesh, which was held against it. Collective.
@@ -38,6 +40,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let probes = session.agree(probes(session, &mesh, job))?;
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body, loaded)?;
+    let warnings = obstacles::warnings(session, job, &body, &state)?;
     let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
@@ -68,7 +71,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     }
     let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
-    Ok(Setup { body, state, scheme, probes, certificates, verdict })
+    Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings })
 }
 
 fn accepted(job: &Job) -> Accepted {

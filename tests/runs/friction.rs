@@ -2,6 +2,7 @@
 
 use crate::{
     case::Case,
+    launch,
     results::{Results, Table, assert_same_answer, relative_difference},
 };
 
@@ -181,4 +182,26 @@ fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_goes_on_to_the_last_b
     for name in ["probes.csv", "history.csv", "profiles.csv"] {
         assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
     }
+}
+
+#[test]
+fn a_body_that_starts_inside_or_behind_its_obstacle_is_warned_of_on_any_number_of_ranks() {
+    let check = |case: &Case, ranks: usize| {
+        let job = case.written();
+        launch::run(ranks, &["check", job.to_str().expect("a path")]).expect(0)
+    };
+    for ranks in [1, 2] {
+        let wrong = Case::of("conveyor_belt").set("contact.0.obstacle.plane.normal", "[0, -1]");
+        check(&wrong, ranks)
+            .says("warning: contact.0: the body lies behind its obstacle")
+            .says("turn the plane's `normal` round");
+        let deep = Case::of("conveyor_belt").set("contact.0.obstacle.plane.point", "['t', 0.02]");
+        check(&deep, ranks)
+            .says("warning: contact.0: the boundary bottom starts up to 2.000e-2 m inside of its obstacle, 5.0 % of the body's size");
+        let right = check(&Case::of("conveyor_belt"), ranks).stdout;
+        assert!(!right.contains("warning: contact"), "{right}");
+    }
+    let wrong =
+        Case::of("conveyor_belt").set("contact.0.obstacle.plane.normal", "[0, -1]").set("time.end", "0.001");
+    assert!(wrong.run(2).text("run.log").contains("warning: contact.0: the body lies behind its obstacle"));
 }

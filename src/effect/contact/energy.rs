@@ -1,7 +1,7 @@
-//! What a contact stores, dissipates and takes from its obstacle.
+//! What a contact stores, dissipates and takes from its obstacle, and how deep it lies in that.
 
 use super::{Contact, point::Point};
-use crate::{contact::NormalLaw, error::Result};
+use crate::{contact::NormalLaw, error::Result, tensor::larger};
 
 impl<const D: usize> Contact<D> {
     /// Energy in J that a step of this length dissipated, the scheme's own term, and the work of the obstacle on the body, from
@@ -36,6 +36,16 @@ impl<const D: usize> Contact<D> {
             sums[2] += length * friction.driving_power();
         }
         sums
+    }
+
+    /// How deep in m points here lie in the obstacle at `time`, at the most; minus infinity where none can touch it. A gap that
+    /// is no number does not count: the first step says so.
+    pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
+        let depth = |point: &Point<D>| {
+            let gap = self.gap.at(time, &point.place, &point.normal);
+            gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(displacement) - gap)
+        };
+        self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
     }
 
     /// Energy in J stored at `time`, from displacements with ghosts.

@@ -62,7 +62,7 @@ pub struct Contact<const D: usize> {
     /// The law.
     pub law: NormalLaw,
     /// Distance to the obstacle along the normal.
-    gap: Gap,
+    pub gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
     /// The sizes that velocities and tractions are judged by where the laws have no range of their own.
