@@ -29,6 +29,7 @@ mod one_cell;
 mod orders;
 mod patch;
 mod petsc_boundary;
+mod profiles;
 mod pulses;
 mod random_laws;
 mod scenes;
@@ -67,6 +68,7 @@ fn scenario() {
         "indicator" => indicator::sums(&session),
         "effectivity" => indicator::effectivity_tends_to_one(&session),
         "effects" => effects::count(&session),
+        "profiles" => profiles::all(&session, &folder),
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),
         "closed_forms" => closed_forms::all(&session),
