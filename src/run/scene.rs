@@ -15,7 +15,7 @@ use crate::{
     session::Session,
 };
 use mpi::{topology::Communicator, traits::Root};
-use std::{fs::File, path::Path};
+use std::path::Path;
 
 /// Generated meshes of more cells than this are made in parts, each by its rank.
 const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
@@ -75,9 +75,9 @@ fn generated<const D: usize, G: Grid<D>>(
     split(session, session.agree(whole)?)
 }
 
-/// Refuses a mesh file that can't be opened, at its place in the job.
+/// Refuses a mesh file that is not there, at its place in the job.
 fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
-    File::open(path).map(drop).map_err(|error| {
+    std::fs::metadata(path).map(drop).map_err(|error| {
         let help = "a relative path starts from the folder of the job file";
         loaded.fault("mesh.file", format!("cannot read {}: {error}", path.display()), help)
     })

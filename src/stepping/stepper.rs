@@ -308,7 +308,7 @@ impl Stepper {
     ) -> Result<()> {
         self.extrapolate(state, step)?;
         let prepared = prepare_contacts(body, state, step);
-        session.agree(prepared.and_then(|()| self.method.prepare_contacts(body, state, step)))
+        Ok(session.agree(prepared.and_then(|()| self.method.prepare_contacts(body, state, step)))?)
     }
 
     /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.

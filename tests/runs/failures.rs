@@ -129,7 +129,8 @@ fn a_faulty_job_is_refused_once_and_not_by_every_rank() {
 #[test]
 fn a_missing_mesh_file_is_refused_by_name() {
     let case = Case::square(4).without("mesh.rectangle").set("mesh.file", "'nowhere.msh'");
-    case.run_with(2, &[]).expect(2).says("nowhere.msh");
+    let outcome = case.run_with(2, &[]).expect(2);
+    outcome.says("nowhere.msh").says("a relative path starts from the folder of the job file");
 }
 
 #[test]
