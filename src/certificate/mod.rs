@@ -3,10 +3,14 @@
 //! | name | definition | meaning |
 //! |---|---|---|
 //! | `theta` | sup of `sum (m_j int w_nu^2 + m_t int w_tau^2)` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
-//! | `theta_step` | the same over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
+//! | `theta_step` | sup of `sum (m_j S_nu(w) + m_t S_tau(w))` over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
 //! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
 //! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; there if something flows | below it errors don't grow, however much flows: elastic and viscoplastic stress of the step before add up (exact without inertia, where all flows) |
+//!
+//! `S_nu(w)` and `S_tau(w)` are the integrals of `w_nu^2` and `w_tau^2` as the step sums them: over its quadrature points, with the
+//! weights and the directions with which contact and friction act there. At Gauss points `S_nu` is the integral. At nodes it is
+//! more, up to three times in the plane and four times in space where the velocity changes its sign from node to node.
 //!
 //! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
 //! which nothing flows.
@@ -18,8 +22,9 @@
 //! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
 //! times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. Where the normal law has no
 //! largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1 with that fall,
-//! `1 / sup of sum fall int w_tau^2` over `(K w, w) - sum (m_j int w_nu^2 + m_t int w_tau^2)`; a run is held against it. Suprema
-//! run over velocities that the supports allow. Numerically they are approached from below. On meshes of more than 10,000 velocity
+//! `1 / sup of sum fall S_tau(w)` over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))`; a run is held against it. Suprema
+//! run over velocities that the supports allow. Numerically they are approached from below, to about 1e-6 of their size: what is
+//! said of one solution keeps a margin of 1e-3 ([`Certificates::MARGIN`]). On meshes of more than 10,000 velocity
 //! components `explicit_step_bound` is the least of the bounds of single cells, which is never too large, unless a step of the
 //! run is longer than that. Where a region of the body has no
 //! viscosity, `m_A` is 0 and `theta` has no meaning.
@@ -44,12 +49,16 @@ use crate::{
 use ascent::{Quotient, climb};
 use serde::{Deserialize, Serialize};
 
-/// Relative change at which a supremum counts as found.
+/// Relative changes at which a supremum counts as found: of the explicit step, and of contact.
 const TOLERANCE: f64 = 1e-5;
+const TIGHT: f64 = 1e-8;
 /// Velocity components up to which the sharp bound of explicit steps costs next to nothing.
 const SMALL: usize = 10_000;
-/// Iterations after which it is taken as it is.
+/// Iterations after which they are taken as they are.
 const ITERATIONS: usize = 60;
+const MANY: usize = 200;
+/// `theta_step` of the largest step that is suggested: its digits are rounded.
+const FAR_BELOW: f64 = 1.0 - 2.0 * Certificates::MARGIN;
 /// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
 const RIGID: f64 = 1e12;
 
@@ -59,7 +68,7 @@ const RIGID: f64 = 1e12;
 pub struct Certificates {
     /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
     pub theta: Option<f64>,
-    /// The same with the matrix of a step.
+    /// The same with the matrix of a step, and with the sums over its quadrature points.
     pub theta_step: Option<f64>,
     /// `m_A` in Pa s.
     pub viscosity_modulus: Option<f64>,
@@ -73,7 +82,7 @@ pub struct Certificates {
     /// `|gamma|^2` of the normal trace in m; null where it is infinite: the supports leave a rigid motion against the contact.
     pub trace_norm_squared: Option<f64>,
     /// Contact pressure in Pa up to which a step has one solution, if pressures are given, where friction weakens under a
-    /// pressure that no law bounds; 0: at none.
+    /// pressure that no law bounds, with the margin; 0: at none.
     pub slip_pressure_bound: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
@@ -90,6 +99,9 @@ pub struct Certificates {
 }
 
 impl Certificates {
+    /// How far below 1 `theta_step` has to be for steps to count as having one solution: suprema are approached from below.
+    pub const MARGIN: f64 = 1e-3;
+
     /// Computes what the body and the scheme, prepared for its step, call for, where no step is longer than `longest` in s.
     /// Collective.
     pub fn of<const D: usize, const S: usize>(
@@ -122,8 +134,8 @@ impl Certificates {
                 Some(find(Kind::TraceNorm)?).filter(|norm| *norm < RIGID * length(session, &body.mesh.nodes));
         }
         if body.contacts.iter().any(|contact| contact.unknown_fall().is_some()) {
-            let solvable = known.theta_step.is_some_and(|theta| theta < 1.0);
-            let bound = if solvable { 1.0 / find(Kind::SlipPressure)? } else { 0.0 };
+            let bound =
+                if known.steps_are_unique() { (1.0 - Self::MARGIN) / find(Kind::SlipPressure)? } else { 0.0 };
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
         known.not_covered = not_covered(&body.contacts, known.theta_step, known.slip_pressure_bound);
@@ -144,7 +156,13 @@ impl Certificates {
         Ok(known)
     }
 
-    /// The largest step below which each step has one solution; `None` where no step is small enough. Collective.
+    /// Whether `theta_step`, if there is one, says that each step has one solution.
+    pub fn steps_are_unique(&self) -> bool {
+        self.theta_step.is_none_or(|theta| theta < 1.0 - Self::MARGIN)
+    }
+
+    /// The step at which `theta_step` is below 1 by twice the margin, so that each step up to it has one solution; `None` where
+    /// no step is small enough. Collective.
     pub fn unique_step<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
@@ -197,7 +215,10 @@ fn not_covered<const D: usize>(
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
             // Where nothing else falls, theta is proportional to the pressure.
             let each = match theta_step {
-                Some(0.0) => format!("theta of a step is {:.4e} for each Pa, so that ", 1.0 / bound),
+                Some(0.0) => {
+                    let each = (1.0 - Certificates::MARGIN) / bound;
+                    format!("theta of a step is {each:.4e} for each Pa, so that ")
+                }
                 _ => String::new(),
             };
             format!(
@@ -239,7 +260,7 @@ fn find<const D: usize, const S: usize>(
         Some(peak) => (peak, Some(pulled)),
         None => (pulled, None),
     };
-    let peak = climb(session, &mut pencil, start, beside, TOLERANCE, ITERATIONS)?;
+    let peak = climb(session, &mut pencil, start, beside, TIGHT, MANY)?;
     starts.peak = Some(peak.vector);
     Ok(peak.value)
 }
@@ -266,7 +287,7 @@ enum Kind {
     ThetaStep,
     TraceNorm,
     ExplicitStep,
-    /// `1/k` for the step `k` at which `theta_step` reaches 1: the largest of `(W - A) / M`.
+    /// `1/k` for the step `k` at which `theta_step` reaches `t`, 1 less twice the margin: the largest of `(W / t - A) / M`.
     UniqueStep,
     /// The inverse of the pressure at which `theta_step` reaches 1 where friction weakens with the pressure.
     SlipPressure,
@@ -294,12 +315,15 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (kind, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let factors = match (kind, form) {
-                            (Kind::TraceNorm, _) => [1.0, 0.0],
-                            (Kind::SlipPressure, 0) => [0.0, contact.unknown_fall().unwrap_or(0.0)],
-                            _ => contact.known_falls(),
-                        };
-                        forms::add_trace(&body.mesh, contact, factors, x, y);
+                        let falls = contact.known_falls();
+                        match (kind, form) {
+                            (Kind::TraceNorm, _) => forms::add_trace(&body.mesh, contact, [1.0, 0.0], x, y),
+                            (Kind::Theta, _) => forms::add_trace(&body.mesh, contact, falls, x, y),
+                            (Kind::SlipPressure, 0) => {
+                                contact.add_squares([0.0, contact.unknown_fall().unwrap_or(0.0)], x, y);
+                            }
+                            _ => contact.add_squares(falls, x, y),
+                        }
                     }
                 });
             }
@@ -318,7 +342,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
                 let k = bound_of(values);
                 (vec![k * k, 0.0, 0.0], vec![0.0, 4.0, 2.0 * k])
             }
-            Kind::UniqueStep => (vec![1.0, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
+            Kind::UniqueStep => (vec![1.0 / FAR_BELOW, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
             Kind::SlipPressure => (vec![1.0, 0.0, 0.0], vec![0.0, 1.0, -1.0]),
             Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => (vec![1.0, 0.0], vec![0.0, 1.0]),
         }
@@ -327,7 +351,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
     fn value(&self, values: &[f64]) -> f64 {
         match self.kind {
             Kind::ExplicitStep => 1.0 / bound_of(values),
-            Kind::UniqueStep => (values[0] - values[1]) / values[2],
+            Kind::UniqueStep => (values[0] / FAR_BELOW - values[1]) / values[2],
             Kind::SlipPressure => values[0] / (values[1] - values[2]),
             Kind::Theta | Kind::ThetaStep | Kind::TraceNorm => values[0] / values[1],
         }

@@ -23,8 +23,8 @@ pub struct Verdict {
 }
 
 impl Certificates {
-    /// Holds the certificates against a fixed step of this length. `unique_step` is the largest step below which
-    /// `theta_step` is below 1, where it is known.
+    /// Holds the certificates against a fixed step of this length. `unique_step` is the largest step with which
+    /// `theta_step` is below 1 by the margin, where it is known.
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: Accepted) -> Verdict {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
@@ -62,7 +62,7 @@ impl Certificates {
             ));
         }
         if let Some(theta) = self.theta_step {
-            if theta < 1.0 {
+            if self.steps_are_unique() {
                 let meaning = "below 1: each step has one solution";
                 verdict.words.push(format!("theta of a step = {theta:.4}, {meaning}{covered}"));
             } else {
@@ -95,11 +95,12 @@ impl Certificates {
 }
 
 impl Verdict {
-    /// For a `theta` of a step that is not below 1.
+    /// For a `theta` of a step that is not below 1 by the margin.
     fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
         let found = format!(
-            "theta of a step = {} is not below 1: a step of {step} s may have several solutions",
-            short(theta)
+            "theta of a step = {} is not below {}: a step of {step} s may have several solutions",
+            short(theta),
+            if theta < 1.0 { 1.0 - Certificates::MARGIN } else { 1.0 }
         );
         self.words.push(found.clone());
         let largest = unique_step.map_or_else(
@@ -213,6 +214,18 @@ mod tests {
         let known = Certificates { explicit_bound_is_least: true, ..paper() };
         let words = known.verdict(0.01, None, Accepted::default()).words;
         assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 1.2000e-1 s")));
+    }
+
+    #[test]
+    fn suprema_found_from_below_keep_a_margin_to_one() {
+        let verdict = |theta| {
+            Certificates { theta_step: Some(theta), ..paper() }.verdict(0.01, Some(0.05), Accepted::default())
+        };
+        assert!(verdict(0.998).refusals.is_empty());
+        for theta in [0.9995, f64::NAN] {
+            assert_eq!(verdict(theta).refusals.len(), 1, "{theta}");
+        }
+        assert!(verdict(0.9995).refusals[0].0.contains("theta of a step = 0.9995 is not below 0.999: "));
     }
 
     #[test]

@@ -61,14 +61,12 @@ pub(super) fn setup<const D: usize, const S: usize>(
         _ => error.into(),
     })?;
     let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme, longest))?;
-    let unique_step = if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
-        session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
-    } else {
+    let unique_step = if certificates.steps_are_unique() {
         None
+    } else {
+        session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
     };
-    if certificates.theta_step.is_some_and(|theta| theta >= 1.0) {
-        scheme.guesses = job.solver.guesses as usize;
-    }
+    scheme.guesses = job.solver.guesses as usize;
     let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings })

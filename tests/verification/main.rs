@@ -38,6 +38,7 @@ mod subspace;
 mod taken_back;
 mod tolerance;
 mod unloading;
+mod uniqueness;
 mod wave;
 
 use clarke::session::Mpi;
@@ -100,6 +101,8 @@ fn scenario() {
         "scheme_orders" => schemes::orders(&session),
         "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
+        "unique_plane" => uniqueness::plane(&session),
+        "unique_space" => uniqueness::space(&session),
         other => panic!("no scenario {other}"),
     }
 }

@@ -352,6 +352,11 @@ impl<const D: usize> Friction<D> {
         self.points.iter().for_each(|point| point.add(1.0, &point.tangents[0], nodal));
     }
 
+    /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
+    pub fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(factor * point.weight, &point.along(x), forces));
+    }
+
     /// `integral of w_tau^2` over the points here.
     pub fn square(&self, nodal: &[f64]) -> f64 {
         self.points.iter().map(|p| p.weight * p.along(nodal).iter().map(|x| x * x).sum::<f64>()).sum()

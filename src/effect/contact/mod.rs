@@ -27,6 +27,7 @@ mod friction;
 mod inclusion;
 mod point;
 mod sliding;
+mod squares;
 mod starts;
 mod tangential_point;
 mod unknowns;

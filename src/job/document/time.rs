@@ -87,9 +87,9 @@ pub struct Solver {
     pub friction: FrictionIteration,
     /// Warnings that should not stop the run.
     pub accept: Vec<Accept>,
-    /// Where a step may have several solutions (theta_step not below 1, accepted as "uniqueness"): from how many other
-    /// velocities of the contact boundary each step is solved again. Log and summary say how many different solutions were
-    /// found; the run goes on with the usual one. 0: none.
+    /// From how many other velocities of the contact boundary each step is solved again, to look for other solutions:
+    /// where theta_step is not below 1 (accepted as "uniqueness") there may be some. Log and summary say how many different
+    /// solutions were found; the run goes on with the usual one. 0: none.
     #[schemars(range(max = 1000))]
     pub guesses: u32,
     /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
@@ -170,7 +170,7 @@ pub enum FrictionIteration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Accept {
-    /// Run although theta_step >= 1: a step may have several solutions.
+    /// Run although theta_step is not below 1 by a margin of 0.001: a step may have several solutions.
     Uniqueness,
     /// Run although the step is beyond the scheme's bound k_max.
     ExplicitStability,

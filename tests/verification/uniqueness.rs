@@ -1,0 +1,322 @@
+//! Certificates of a step against dense generalised eigenvalue problems. The matrices of contact are the derivatives that the
+//! solver itself works with, at nodes and at Gauss points.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
+use clarke::{
+    certificate::Certificates,
+    contact::Gap,
+    effect::{Contact, Form, Quadrature, choose_unknowns},
+    job::Job,
+    mesh::{GlobalMesh, generate::box_mesh},
+    petsc::DistributedVector,
+    run::Simulation,
+    session::Session,
+};
+use std::path::Path;
+
+/// A symmetric matrix over all velocity components that no support holds.
+type Dense = Vec<Vec<f64>>;
+
+/// Relative distance up to which an ascent and a dense solution count as equal.
+const EQUAL: f64 = 1e-6;
+const STEP: f64 = 0.1;
+/// Steepest fall of the normal law in Pa s/m, and its largest pressure in Pa.
+const FALL: f64 = 25.0;
+const LARGEST: f64 = 500.0;
+/// The law at rest is in the middle of its fall.
+const FALLING: &str = "[contact.normal.graph]\npoints = [[-10.0, 500.0], [10.0, 0.0]]\n";
+const SLIP: &str = "[contact.friction.slip_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.4\n";
+/// Steepest fall of the coefficient in s/m.
+const SLIP_FALL: f64 = 0.2 / 0.4;
+
+/// Largest `b(y, y) / c(y, y)` for positive definite `c`: the largest eigenvalue of `L^-1 b L^-T` with `c = L L^T`, by Jacobi's
+/// method.
+fn largest(b: &Dense, c: &Dense) -> f64 {
+    let n = c.len();
+    let mut lower = vec![vec![0.0; n]; n];
+    for j in 0..n {
+        for i in j..n {
+            let sum: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            lower[i][j] = if i == j { (c[j][j] - sum).sqrt() } else { (c[i][j] - sum) / lower[j][j] };
+        }
+        assert!(lower[j][j] > 0.0, "the denominator is positive definite");
+    }
+    let forward = |column: &mut Vec<f64>| {
+        for i in 0..n {
+            let sum: f64 = (0..i).map(|k| lower[i][k] * column[k]).sum();
+            column[i] = (column[i] - sum) / lower[i][i];
+        }
+    };
+    let mut m = b.clone();
+    m.iter_mut().for_each(forward);
+    let mut m: Dense = (0..n).map(|i| (0..n).map(|j| m[j][i]).collect()).collect();
+    m.iter_mut().for_each(forward);
+    for _ in 0..20 {
+        for p in 0..n {
+            for q in p + 1..n {
+                if m[p][q] == 0.0 {
+                    continue;
+                }
+                let ratio = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+                let t = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
+                let (cos, sin) = (1.0 / t.hypot(1.0), t / t.hypot(1.0));
+                for row in &mut m {
+                    (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
+                }
+                for i in 0..n {
+                    (m[p][i], m[q][i]) = (cos * m[p][i] - sin * m[q][i], sin * m[p][i] + cos * m[q][i]);
+                }
+            }
+        }
+    }
+    (0..n).map(|i| m[i][i]).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// `factor a + other`.
+fn combine(factor: f64, a: &Dense, other: &Dense) -> Dense {
+    let row = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| factor * a + b).collect();
+    a.iter().zip(other).map(row).collect()
+}
+
+/// The matrix of a map between nodal vectors. Collective.
+fn dense<const D: usize, const S: usize>(
+    session: &Session,
+    run: &Simulation<D, S>,
+    mut map: impl FnMut(&DistributedVector, &mut DistributedVector),
+) -> Dense {
+    let (body, vector) = (&run.body, || run.state.velocity.like().expect("vector"));
+    let size = session.total(body.mesh.owned) * D;
+    let gather = |values: &[f64]| {
+        let mut mine = vec![0.0; size];
+        for (at, value) in values.iter().enumerate() {
+            mine[body.mesh.node_ids[at / D] as usize * D + at % D] = *value;
+        }
+        crate::scenes::sum(session, &mine)
+    };
+    let free: Vec<f64> =
+        body.fixed[..body.mesh.owned * D].iter().map(|fixed| f64::from(u8::from(!fixed))).collect();
+    let free: Vec<usize> =
+        gather(&free).iter().enumerate().filter(|(_, free)| **free > 0.0).map(|(at, _)| at).collect();
+    let (mut x, mut y) = (vector(), vector());
+    let mut column = |at: usize| -> Vec<f64> {
+        set_nodal(&body.mesh, &mut x, |id, _| std::array::from_fn(|i| f64::from(u8::from(id * D + i == at))));
+        map(&x, &mut y);
+        let all = gather(&y.owned().expect("values"));
+        free.iter().map(|&row| all[row]).collect()
+    };
+    free.iter().map(|&at| column(at)).collect()
+}
+
+/// The matrix of what adds to nodal forces. Collective.
+fn dense_form<const D: usize, const S: usize>(
+    session: &Session,
+    run: &Simulation<D, S>,
+    mut add: impl FnMut(&[f64], &mut [f64]),
+) -> Dense {
+    dense(session, run, |x, y| {
+        {
+            let (x, mut y) = (x.local().expect("values"), y.local_mut().expect("values"));
+            y.fill(0.0);
+            add(&x, &mut y);
+        }
+        y.add_ghosts_to_owners().expect("forces");
+    })
+}
+
+/// Minus the derivative of the forces of these contacts at rest. Collective.
+fn falling<const D: usize, const S: usize>(
+    session: &Session,
+    run: &Simulation<D, S>,
+    contacts: &mut [Contact<D>],
+) -> Dense {
+    let mut unknowns = run.state.velocity.like().expect("vector");
+    {
+        let mut unknowns = unknowns.owned_mut().expect("values");
+        contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&unknowns));
+    }
+    let rest = run.state.velocity.like().expect("vector");
+    let rest = rest.local().expect("values");
+    contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&rest));
+    let slopes = |x: &[f64], forces: &mut [f64]| contacts.iter().for_each(|c| c.add_slopes(x, forces));
+    dense_form(session, run, slopes).into_iter().map(|row| row.into_iter().map(|x| -x).collect()).collect()
+}
+
+/// The matrix of `sum of fall w w_tau^2` over the points with friction. Collective.
+fn sliding<const D: usize, const S: usize>(session: &Session, run: &Simulation<D, S>, fall: f64) -> Dense {
+    let square = |x: &[f64]| run.body.contacts.iter().map(|c| c.tangential_square(x)).sum::<f64>();
+    dense_form(session, run, |x, forces| {
+        // By polarisation against each component: all others are at rest.
+        let mut near = x.to_vec();
+        for at in 0..run.body.mesh.owned * D {
+            near[at] = x[at] + 1.0;
+            let above = square(&near);
+            near[at] = x[at] - 1.0;
+            forces[at] += 0.25 * fall * (above - square(&near));
+            near[at] = x[at];
+        }
+    })
+}
+
+fn close(found: f64, expected: f64, what: &str) {
+    println!("{what}: {found:.9} for {expected:.9}, relative {:.1e}", found / expected - 1.0);
+    assert!((found / expected - 1.0).abs() <= EQUAL, "{what}: {found} instead of {expected}");
+}
+
+/// Contact on the right and below, whose faces meet at an oblique angle where the mesh is sheared; a support on top then holds
+/// a part of the normals of the right.
+fn job<const D: usize>(contacts: &str, density: f64) -> String {
+    let hypothesis = if D == 2 { "hypothesis = 'plane_stress'\n" } else { "" };
+    format!(
+        "{}[material]\n{hypothesis}density = {density}\nviscosity = {{ volumetric = 0.5, shear = 1.5 }}\n\
+         [[support]]\non = ['left']\nfix = 'all'\n[[support]]\non = ['top']\nfix = ['x']\n{contacts}\
+         [time]\nend = 1.0\nstep = {STEP}\n[solver]\naccept = ['uniqueness']\n",
+        any_mesh::<D>()
+    )
+}
+
+/// All certificates of one job.
+fn compare<const D: usize, const S: usize>(
+    session: &Session,
+    mesh: &GlobalMesh<D>,
+    contacts: &str,
+    [density, slip, slip_of_pressure]: [f64; 3],
+    what: &str,
+) {
+    let what = format!("{what}, {D}D, {density} kg, {} ranks", session.ranks());
+    let mut run = simulation::<D, S>(session, &job::<D>(contacts, density), mesh);
+    let found =
+        Certificates::of(session, &run.body, &run.state, &mut run.scheme, STEP).expect("certificates");
+    let largest_step =
+        Certificates::unique_step(session, &run.body, &run.state, &mut run.scheme).expect("certificate");
+    let matrix = dense(session, &run, |x, y| run.scheme.multiply(x, y).expect("product"));
+    let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
+    let (mass, viscosity, strain) = (form(Form::Mass), form(Form::Viscosity), form(Form::Strain));
+    let mut own = std::mem::take(&mut run.body.contacts);
+    let normal = falling(session, &run, &mut own);
+    run.body.contacts = own;
+    let falls = combine(slip, &sliding(session, &run, 1.0), &normal);
+    close(found.theta_step.expect("theta"), largest(&falls, &matrix), &format!("{what}: theta of a step"));
+    let suggested = 1.0 / (1.0 - 2.0 * Certificates::MARGIN);
+    let scaled = combine(suggested - 1.0, &falls, &falls);
+    let unique = 1.0 / largest(&combine(-1.0, &viscosity, &scaled), &mass);
+    if unique > 0.0 {
+        close(largest_step.expect("a step"), unique, &format!("{what}: largest step with one solution"));
+    }
+    if slip_of_pressure > 0.0 {
+        let left = combine(-1.0, &falls, &matrix);
+        let expected =
+            (1.0 - Certificates::MARGIN) / largest(&sliding(session, &run, slip_of_pressure), &left);
+        close(found.slip_pressure_bound.expect("a bound"), expected, &format!("{what}: slip pressure"));
+    }
+    if slip > 0.0 {
+        return;
+    }
+    // Gauss points integrate squares exactly, whatever the job's quadrature.
+    let exact = |contact: &Contact<D>| {
+        let law = contact.law.clone();
+        let facets = contact.facets();
+        Contact::new(session, &run.body.mesh, facets, Quadrature::Gauss, law, Gap::default(), &run.body.fixed)
+            .expect("contact")
+    };
+    let falling_contacts = run.body.contacts.iter().filter(|c| c.law.monotonicity_constant() > 0.0);
+    let mut exact: Vec<Contact<D>> = falling_contacts.map(exact).collect();
+    choose_unknowns(&mut exact, &run.body.mesh).expect("Gauss points");
+    let exact = falling(session, &run, &mut exact);
+    close(found.theta.expect("theta"), largest(&exact, &viscosity), &format!("{what}: theta"));
+    if slip_of_pressure == 0.0 {
+        let trace = FALL * found.trace_norm_squared.expect("a norm");
+        close(trace, largest(&exact, &strain), &format!("{what}: trace norm"));
+    }
+}
+
+fn all<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
+    let mut sheared = mesh.clone();
+    sheared.nodes.iter_mut().for_each(|node| node[0] += 0.3 * node[D - 1]);
+    for density in [2.0, 2000.0] {
+        for quadrature in ["nodal", "gauss"] {
+            let on =
+                |side: &str| format!("[[contact]]\non = ['{side}']\nquadrature = '{quadrature}'\n{FALLING}");
+            let (right, bottom) = (on("right"), on("bottom"));
+            compare::<D, S>(session, mesh, &right, [density, 0.0, 0.0], &format!("square, {quadrature}"));
+            let both = right + &bottom;
+            compare::<D, S>(session, &sheared, &both, [density, 0.0, 0.0], &format!("sheared, {quadrature}"));
+        }
+        let bottom = "[[contact]]\non = ['bottom']\n";
+        let bounded = format!("{bottom}{FALLING}{SLIP}");
+        compare::<D, S>(
+            session,
+            mesh,
+            &bounded,
+            [density, SLIP_FALL * LARGEST, 0.0],
+            "bounded slip weakening",
+        );
+    }
+    let springs = "[contact.normal.compliance]\nstiffness = 30.0\n";
+    let unbounded =
+        format!("[[contact]]\non = ['bottom']\n{springs}{SLIP}[[contact]]\non = ['right']\n{FALLING}");
+    compare::<D, S>(session, mesh, &unbounded, [2000.0, 0.0, SLIP_FALL], "slip weakening");
+}
+
+/// A cube that falls with the velocity in the middle of the falling branch, where pressure and traction balance. The integral of
+/// `w_nu^2` would have `theta` below 1, but velocities that alternate from node to node feel more at nodal points.
+fn cube(quadrature: &str, solver: &str) -> String {
+    format!(
+        "{}[material]\ndensity = 1.0\n[[traction]]\non = ['bottom']\nvalue = [0, 0, -9]\n\
+         [[contact]]\non = ['bottom']\nquadrature = '{quadrature}'\n[contact.normal.graph]\n\
+         points = [[0.0, 0.0], [1.0, 10.0], [2.0, 8.0]]\nslope_before = 10.0\nslope_after = 5.0\n\
+         [initial]\nvelocity = [0, 0, -1.5]\n[time]\nend = 0.04\nstep = 0.04\n[solver]\n{solver}\n",
+        any_mesh::<3>()
+    )
+}
+
+fn theta_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str) -> f64 {
+    let mut run = simulation::<3, 6>(session, &cube(quadrature, "accept = ['uniqueness']"), mesh);
+    let found =
+        Certificates::of(session, &run.body, &run.state, &mut run.scheme, 0.04).expect("certificates");
+    found.theta_step.expect("theta")
+}
+
+/// How many solutions guesses find in the step of the cube.
+fn solutions_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str, accept: &str) -> usize {
+    let job = cube(quadrature, &format!("accept = {accept}\nguesses = 30"));
+    let mut run = simulation::<3, 6>(session, &job, mesh);
+    run.advance(session).expect("step").expect("a step").solutions
+}
+
+fn several(session: &Session) {
+    let mesh = box_mesh([1.0; 3], [2; 3], [1.0; 3]).expect("mesh");
+    let [nodal, exact] = ["nodal", "gauss"].map(|quadrature| theta_of_cube(session, &mesh, quadrature));
+    let found = solutions_of_cube(session, &mesh, "nodal", "['uniqueness']");
+    println!("theta of a step {nodal} at nodes, {exact} at Gauss points; {found} solutions");
+    assert!(exact < 0.9 && nodal > 1.5 && found > 1);
+    // Guesses are taken also where the certificate says that there is one solution.
+    assert_eq!(solutions_of_cube(session, &mesh, "gauss", "[]"), 1);
+    let refused =
+        Job::from_text(&cube("nodal", ""), "job.toml", Path::new("."), &[]).and_then(|mut loaded| {
+            Simulation::<3, 6>::new(session, &mut loaded, session.is_first().then(|| mesh.clone()))
+                .map(|_| ())
+        });
+    let words = refused.expect_err("several solutions").to_string();
+    assert!(words.contains("is not below 1: a step of 0.04 s may have several solutions"), "{words}");
+}
+
+pub fn plane(session: &Session) {
+    all::<2, 3>(session, &crossed([4, 3]));
+}
+
+pub fn space(session: &Session) {
+    all::<3, 6>(session, &brick([2, 2, 2]));
+    several(session);
+}
+
+#[test]
+fn certificates_in_the_plane_are_eigenvalues_of_what_the_solver_sums() {
+    run_on(&[1, 2], "unique_plane");
+}
+
+#[test]
+fn certificates_in_space_are_eigenvalues_of_what_the_solver_sums() {
+    run_on(&[1, 2], "unique_space");
+}
