@@ -153,9 +153,22 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().filter_map(|e| e.viscosity_modulus()).reduce(f64::min)
     }
 
-    /// The step in s beyond which explicit viscoplastic flow alone is unstable, if there is any.
+    /// The step in s beyond which explicit viscoplastic flow alone is unstable, if there is any; of power laws where the overstress
+    /// is the yield stress.
     pub fn flow_step_bound(&self) -> Option<f64> {
         self.effects.iter().filter_map(|e| e.flow_step_bound()).reduce(f64::min)
+    }
+
+    /// Whether it flows by a power law explicitly.
+    pub fn has_power_law(&self) -> bool {
+        self.effects.iter().any(|e| e.has_power_law())
+    }
+
+    /// The step in s beyond which explicit flow by power laws is unstable at the stresses on this rank for which explicit forces were added since the last call; `None` if there
+    /// are no such laws, on all ranks alike.
+    pub fn take_flow_step_bound(&mut self) -> Option<f64> {
+        let fastest = self.effects.iter_mut().filter_map(|e| e.take_fastest_flow()).reduce(f64::max)?;
+        Some(2.0 / fastest)
     }
 
     /// The largest contact pressure in Pa on this rank in the step just solved, where friction weakens under a pressure that no

@@ -5,7 +5,7 @@
 //! | `theta` | sup of `sum (m_j int w_nu^2 + m_t int w_tau^2)` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
 //! | `theta_step` | sup of `sum (m_j S_nu(w) + m_t S_tau(w))` over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
 //! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
-//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less | steps beyond it grow without bound |
+//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less; of power laws at an overstress of the yield stress, and in each step at the largest one | steps beyond it grow without bound |
 //! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; there if something flows | below it errors don't grow, however much flows: elastic and viscoplastic stress of the step before add up (exact without inertia, where all flows) |
 //!
 //! `S_nu(w)` and `S_tau(w)` are the integrals of `w_nu^2` and `w_tau^2` as the step sums them: over its quadrature points, with the
@@ -90,6 +90,9 @@ pub struct Certificates {
     /// is longer.
     #[serde(skip)]
     pub explicit_bound_is_least: bool,
+    /// Whether it holds for overstresses up to the yield stress only: there are power laws.
+    #[serde(skip)]
+    pub explicit_bound_follows_stress: bool,
     /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
     #[serde(skip)]
     pub flowing_step_bound: Option<f64>,
@@ -151,6 +154,7 @@ impl Certificates {
             let bound = flow.map_or(waves, |flow| waves.min(flow));
             known.explicit_step_bound = Some(bound);
             known.explicit_bound_is_least = least == Some(bound);
+            known.explicit_bound_follows_stress = body.has_power_law();
             known.flowing_step_bound = flow.map(|flow| 1.0 / (1.0 / waves + 1.0 / flow));
         }
         Ok(known)

@@ -70,7 +70,7 @@ impl Certificates {
             }
         }
         if let Some(bound) = self.explicit_step_bound {
-            verdict.stability(bound, self.explicit_bound_is_least, step, accepted.explicit_stability);
+            verdict.stability(self, bound, step, accepted.explicit_stability);
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
@@ -114,12 +114,18 @@ impl Verdict {
         );
     }
 
-    fn stability(&mut self, bound: f64, is_least: bool, step: f64, accepted: bool) {
+    fn stability(&mut self, known: &Certificates, bound: f64, step: f64, accepted: bool) {
+        let (is_least, follows_stress) = (known.explicit_bound_is_least, known.explicit_bound_follows_stress);
         if step < bound {
             let least = if is_least { "at least " } else { "" };
+            let power = if follows_stress {
+                "; of power laws where the overstress is at most the yield stress, and each step is held against the one that occurs"
+            } else {
+                ""
+            };
             self.words.push(format!(
                 "steps are stable up to {least}{bound:.4e} s: explicit elastic and viscoplastic stress, adhesion, \
-                 contact memory"
+                 contact memory{power}"
             ));
             return;
         }
@@ -127,7 +133,8 @@ impl Verdict {
             format!("the step of {step} s is beyond {bound:.4e} s, where explicit stress makes errors grow");
         self.words.push(found.clone());
         let remedy = format!(
-            "take a step below {bound:.4e} s, or accept it with [solver] accept = [\"explicit_stability\"]"
+            "take a step below {bound:.4e} s, [time] scheme = \"implicit_euler\", or accept it with \
+             [solver] accept = [\"explicit_stability\"]"
         );
         self.judge(found, remedy, accepted);
     }
@@ -162,6 +169,7 @@ mod tests {
             slip_pressure_bound: None,
             explicit_step_bound: Some(0.12),
             explicit_bound_is_least: false,
+            explicit_bound_follows_stress: false,
             flowing_step_bound: Some(0.08),
             not_covered: Vec::new(),
         }
@@ -229,6 +237,13 @@ mod tests {
     }
 
     #[test]
+    fn the_bound_of_power_laws_says_where_it_holds() {
+        let known = Certificates { explicit_bound_follows_stress: true, ..paper() };
+        let words = known.verdict(0.01, None, Accepted::default()).words;
+        assert!(words.iter().any(|words| words.contains("each step is held against the one that occurs")));
+    }
+
+    #[test]
     fn a_step_that_is_stable_while_little_flows_is_warned_of() {
         let verdict = paper().verdict(0.1, None, Accepted::default());
         assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("beyond 8.0000e-2 s"));
@@ -243,6 +258,7 @@ mod tests {
         assert!(
             refused.refusals[0].1.contains("5.0000e-2 s") && refused.refusals[1].1.contains("1.2000e-1 s")
         );
+        assert!(refused.refusals[1].1.contains("scheme = \"implicit_euler\""), "{:?}", refused.refusals[1]);
         let all = Accepted { uniqueness: true, explicit_stability: true };
         let accepted = known.verdict(0.125, Some(0.05), all);
         assert!(accepted.refusals.is_empty() && accepted.warnings.len() == 2);

@@ -206,8 +206,20 @@ pub trait Effect<const D: usize, const S: usize> {
         None
     }
 
-    /// The step in s beyond which its explicit flow alone is unstable, if it has one.
+    /// The step in s beyond which its explicit flow alone is unstable, if it has one; of power laws where the overstress is the
+    /// yield stress.
     fn flow_step_bound(&self) -> Option<f64> {
+        None
+    }
+
+    /// Whether it flows by a power law explicitly.
+    fn has_power_law(&self) -> bool {
+        false
+    }
+
+    /// With power laws, whose rate has no bound: the fastest relaxation in 1/s at the stresses of explicit phases since the last
+    /// call. Nothing without such laws, on all ranks alike.
+    fn take_fastest_flow(&mut self) -> Option<f64> {
         None
     }
 

@@ -18,6 +18,8 @@ pub struct ViscoplasticHistory<const S: usize> {
     laws: ByMaterial<Viscoplasticity>,
     stress: CellHistory<S>,
     accumulated: Option<CellHistory<1>>,
+    /// With power laws: the fastest relaxation in 1/s at the stresses met since it was asked for.
+    fastest: Option<f64>,
 }
 
 impl<const S: usize> ViscoplasticHistory<S> {
@@ -30,7 +32,8 @@ impl<const S: usize> ViscoplasticHistory<S> {
             .laws()
             .any(Viscoplasticity::hardens)
             .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
-        Self { laws, stress, accumulated }
+        let fastest = laws.laws().any(Viscoplasticity::is_power_law).then_some(0.0);
+        Self { laws, stress, accumulated, fastest }
     }
 }
 
@@ -127,10 +130,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
             integrity: &batch.integrity,
         };
         let stress = &mut batch.stress;
+        let mut overstress = 0.0f64;
         let [dissipated, numerical] = match law {
-            Viscoplasticity::Perzyna(law) => {
+            Viscoplasticity::Perzyna(law) if law.exponent == 1.0 => {
                 advance(given, histories, stress, |all: &_| law.strain_rates(all))
             }
+            Viscoplasticity::Perzyna(law) => advance(given, histories, stress, |all: &Pack<S>| {
+                for lane in 0..LANES {
+                    overstress = overstress.max(law.overstress(&all.lane(lane)));
+                }
+                law.strain_rates(all)
+            }),
             Viscoplasticity::Maxwell(law) => {
                 advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
             }
@@ -142,6 +152,9 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
                 let Some((Pack([before]), Pack([after]))) = accumulated else { return };
                 advance(given, histories, stress, |all: &_| {
                     one_by_one(all, |lane, s| {
+                        if law.perzyna.exponent != 1.0 {
+                            overstress = overstress.max(law.overstress(s, before[lane]));
+                        }
                         let (rate, growth) = law.strain_rate(s, before[lane]);
                         after[lane] = before[lane] + step.length * growth;
                         rate
@@ -151,6 +164,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         };
         energy.viscoplastic += dissipated;
         energy.numerical += numerical;
+        if let Some(fastest) = &mut self.fastest
+            && overstress > 0.0
+        {
+            *fastest = fastest.max(law.fastest_rate::<S>(overstress));
+        }
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
@@ -178,7 +196,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     }
 
     fn flow_step_bound(&self) -> Option<f64> {
-        self.laws.laws().map(|law| 2.0 / law.fastest_rate::<S>()).reduce(f64::min)
+        self.laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).reduce(f64::min)
+    }
+
+    fn has_power_law(&self) -> bool {
+        self.fastest.is_some()
+    }
+
+    fn take_fastest_flow(&mut self) -> Option<f64> {
+        self.fastest.as_mut().map(std::mem::take)
     }
 
     fn commit(&mut self) {

@@ -13,6 +13,17 @@ pub enum Hypothesis {
     Space,
 }
 
+impl Hypothesis {
+    /// What stresses of so many components stand for.
+    pub fn of(components: usize) -> Self {
+        match components {
+            3 => Self::PlaneStress,
+            4 => Self::PlaneStrain,
+            _ => Self::Space,
+        }
+    }
+}
+
 /// `T(e) = volumetric tr(e) I + shear e`, where `tr` and `I` run over the stored normal components.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Isotropic {

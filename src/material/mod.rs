@@ -3,6 +3,8 @@
 mod by_material;
 mod damage;
 mod drucker_prager;
+#[cfg(test)]
+mod fastest_rates;
 mod hardening;
 mod isotropic;
 mod maxwell;

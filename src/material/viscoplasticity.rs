@@ -31,11 +31,21 @@ impl Viscoplasticity {
         matches!(self, Self::Hardening(_))
     }
 
-    /// The fastest relaxation in 1/s. Explicit steps of more than twice its inverse make stress grow.
-    pub fn fastest_rate<const S: usize>(&self) -> f64 {
+    /// Whether stress relaxes the faster the larger it is, without bound.
+    pub fn is_power_law(&self) -> bool {
         match self {
-            Self::Perzyna(law) => law.fastest_rate::<S>(),
-            Self::Hardening(law) => law.fastest_rate::<S>(),
+            Self::Perzyna(law) => law.exponent != 1.0,
+            Self::Hardening(law) => law.perzyna.exponent != 1.0,
+            Self::Maxwell(_) | Self::DruckerPrager(_) => false,
+        }
+    }
+
+    /// The fastest relaxation in 1/s, of power laws at overstresses up to so many times the yield stress. Explicit steps of more
+    /// than twice its inverse make stress grow.
+    pub fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
+        match self {
+            Self::Perzyna(law) => law.fastest_rate::<S>(overstress),
+            Self::Hardening(law) => law.fastest_rate::<S>(overstress),
             Self::Maxwell(law) => law.fastest_rate::<S>(),
             Self::DruckerPrager(law) => law.fastest_rate::<S>(),
         }

@@ -68,15 +68,6 @@ pub(super) fn body<const D: usize, const S: usize>(
     Ok((body, state))
 }
 
-/// What the stresses of this many components stand for.
-fn hypothesis(components: usize) -> Hypothesis {
-    match components {
-        3 => Hypothesis::PlaneStress,
-        4 => Hypothesis::PlaneStrain,
-        _ => Hypothesis::Space,
-    }
-}
-
 /// The materials that cells of the body are of, and for each region of the mesh the position of its own. Collective.
 fn materials<'a, const D: usize>(
     session: &Session,
@@ -168,7 +159,7 @@ fn damage_law<const S: usize>(material: &Material) -> Option<material::Damage> {
         viscosity: damage.viscosity,
         exponent: damage.exponent,
         largest: damage.largest,
-        elasticity: elasticity(elastic).tensor(hypothesis(S)),
+        elasticity: elasticity(elastic).tensor(Hypothesis::of(S)),
     })
 }
 
@@ -181,7 +172,7 @@ fn elasticity(e: &job::Elasticity) -> Elasticity {
 }
 
 fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
-    let tensor = elasticity(material.elasticity.as_ref()?).tensor(hypothesis(S));
+    let tensor = elasticity(material.elasticity.as_ref()?).tensor(Hypothesis::of(S));
     Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
 }
 
@@ -190,12 +181,12 @@ fn flow_law<const S: usize>(material: &Material) -> Result<Option<Viscoplasticit
     let Some(elasticity) = material.elasticity.as_ref().map(elasticity) else {
         return Err(Error::Refused("viscoplasticity needs elasticity in the same material".into()));
     };
-    let tensor = elasticity.tensor(hypothesis(S));
+    let tensor = elasticity.tensor(Hypothesis::of(S));
     Ok(Some(match viscoplasticity {
         job::Viscoplasticity::Perzyna(p) => perzyna(p, tensor),
         job::Viscoplasticity::Maxwell(m) => {
             let volumetric = m.volumetric_relaxation_time;
-            let law = Maxwell::new(elasticity, hypothesis(S), m.relaxation_time, volumetric);
+            let law = Maxwell::new(elasticity, Hypothesis::of(S), m.relaxation_time, volumetric);
             Viscoplasticity::Maxwell(law)
         }
         job::Viscoplasticity::DruckerPrager(d) => Viscoplasticity::DruckerPrager(DruckerPrager {

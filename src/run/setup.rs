@@ -67,6 +67,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
     };
     scheme.guesses = job.solver.guesses as usize;
+    scheme.accepts_fast_flow = accepted(job).explicit_stability;
     let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings })

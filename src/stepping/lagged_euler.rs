@@ -11,7 +11,7 @@ use super::{contacts::released_by_contact, scheme::over_ranks};
 use crate::{
     body::Body,
     effect::{Energy, Peaks, Step},
-    error::Result,
+    error::{Error, Result},
     session::Session,
     state::State,
 };
@@ -20,6 +20,26 @@ use crate::{
 #[derive(Debug, Default)]
 pub(super) struct LaggedEuler {
     explicit: Energy,
+}
+
+/// Refuses a step that is longer than explicit flow allows at the stresses for which forces were just added, if that depends on
+/// them. Collective.
+pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
+    session: &Session,
+    body: &mut Body<D, S>,
+    step: Step,
+) -> Result<()> {
+    let Some(mine) = body.take_flow_step_bound() else { return Ok(()) };
+    let [least] = session.largest([-mine]).map(|bound| -bound);
+    if step.length <= least {
+        return Ok(());
+    }
+    Err(Error::Failed(format!(
+        "the step of {} s to t = {} s is beyond {least:.4e} s, where explicit viscoplastic flow makes errors grow: the rate of a power law \
+         rises with the overstress, and this is the bound at the largest that occurs; take a shorter [time] step, \
+         scheme = \"implicit_euler\", or accept it with [solver] accept = [\"explicit_stability\"]",
+        step.length, step.time
+    )))
 }
 
 impl LaggedEuler {

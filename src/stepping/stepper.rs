@@ -4,6 +4,7 @@ use super::{
     StepOutcome,
     contacts::{commit_tractions, prepare_contacts},
     guesses::{is_new, other_solutions},
+    lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
     rungs::nearest,
     scheme::{Method, Scheme},
@@ -39,6 +40,8 @@ pub struct Stepper {
     ladder: f64,
     /// Other starts from which steps with contact are solved, to look for other solutions.
     pub guesses: usize,
+    /// Whether steps may be longer than explicit flow allows at the stresses that occur.
+    pub accepts_fast_flow: bool,
     /// Preconditioners that were made.
     pub set_ups: u64,
     /// Seconds by phase.
@@ -70,6 +73,7 @@ impl Stepper {
             room: ErrorRoom::default(),
             ladder: 1.0,
             guesses: 0,
+            accepts_fast_flow: false,
             set_ups: 0,
             clock: StepClock::default(),
             traffic: StepTraffic::default(),
@@ -173,6 +177,9 @@ impl Stepper {
         let start = Instant::now();
         let stage = self.stages.history.enter()?;
         self.write_right_hand_side(session, body, state, step)?;
+        if !self.accepts_fast_flow {
+            refuse_fast_flow(session, body, step)?;
+        }
         self.start(session, body, state, step)?;
         drop(stage);
         self.count_history(body, state, step);

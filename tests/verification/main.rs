@@ -14,6 +14,7 @@ mod creep;
 mod damage;
 mod effects;
 mod energy;
+mod fast_flow;
 mod held_by_contact;
 mod inclusion;
 mod indefinite;
@@ -101,6 +102,8 @@ fn scenario() {
         "scheme_orders" => schemes::orders(&session),
         "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
+        "power_laws" => fast_flow::power_laws(&session),
+        "flow_together" => fast_flow::together(&session),
         "unique_plane" => uniqueness::plane(&session),
         "unique_space" => uniqueness::space(&session),
         other => panic!("no scenario {other}"),

@@ -67,7 +67,7 @@ fn by_force<const S: usize>(
     length: f64,
     accumulated: f64,
 ) -> Mandel<S> {
-    let stiff = 1.0 + length * law.fastest_rate::<S>() * 4.0;
+    let stiff = 1.0 + length * law.fastest_rate::<S>(2.0) * 4.0;
     let (mut s, mut p) = (*trial, accumulated);
     for _ in 0..200_000 {
         let (rate, growth) = rates(law, &s, p);
@@ -92,7 +92,7 @@ fn check<const S: usize>(hypothesis: Hypothesis, trial: &Mandel<S>, length: f64,
         let size = 1.0 + largest(trial);
         let (rate, growth) = rates(&law, &found.stress, found.accumulated);
         let flow = rate.map(|r| length * r);
-        let stiff = 1.0 + length * law.fastest_rate::<S>();
+        let stiff = 1.0 + 4.0 * length * law.fastest_rate::<S>(1.0);
         let error = difference(&flow, &found.flow) * law.elasticity().shear;
         assert!(error < 1e-12 * size * stiff, "flow of {law:?}: {error:e}, {flow:?}, {:?}", found.flow);
         if law.hardens() {

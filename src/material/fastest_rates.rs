@@ -1,0 +1,202 @@
+//! The fastest rates that laws state, which bound explicit steps, from both sides: against eigenvalues of the derivatives of the rates,
+//! by differences.
+
+use super::{DruckerPrager, Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna, Viscoplasticity};
+use crate::tensor::{Mandel, von_mises};
+use std::array;
+
+const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
+const YIELD_STRESS: f64 = 19.0;
+/// Strain that has hardened the material.
+const ACCUMULATED: f64 = 0.01;
+
+fn elastic(poisson_ratio: f64) -> Elasticity {
+    Elasticity { youngs_modulus: 1000.0, poisson_ratio }
+}
+
+/// For stresses of so many components.
+fn perzyna(components: usize, metric: Metric, exponent: f64, poisson_ratio: f64) -> Perzyna {
+    let elasticity = elastic(poisson_ratio).tensor(Hypothesis::of(components));
+    Perzyna { relaxation: 100.0, yield_stress: YIELD_STRESS, exponent, elasticity, metric }
+}
+
+/// How stress falls where strain is held, and with it the negative of the strain that hardens.
+fn decay<const S: usize>(law: &Viscoplasticity, state: &[f64]) -> Vec<f64> {
+    let s: Mandel<S> = array::from_fn(|c| state[c]);
+    let (rate, growth) = match law {
+        Viscoplasticity::Perzyna(law) => (law.strain_rate(&s), None),
+        Viscoplasticity::Hardening(law) => {
+            let (rate, growth) = law.strain_rate(&s, state[S]);
+            (rate, Some(-growth))
+        }
+        Viscoplasticity::Maxwell(law) => (law.strain_rate(&s), None),
+        Viscoplasticity::DruckerPrager(law) => (law.strain_rate(&s), None),
+    };
+    law.elasticity().apply(&rate).into_iter().chain(growth).collect()
+}
+
+/// The fastest of the rates at overstresses of up to `most` times the yield stress along these directions, over the bound.
+fn share_of_bound<const S: usize>(law: Viscoplasticity, most: f64, directions: &[Mandel<S>]) -> f64 {
+    let hardened: Option<(f64, f64)> = match law {
+        Viscoplasticity::Hardening(law) => Some((ACCUMULATED, law.modulus * ACCUMULATED)),
+        _ => None,
+    };
+    let yield_stress = YIELD_STRESS + hardened.map_or(0.0, |(_, more)| more);
+    let mut fastest = 0.0f64;
+    for direction in directions {
+        for share in [0.01, 0.3, 0.9, 1.0] {
+            let size = yield_stress * (1.0 + share * most) / von_mises(direction);
+            let state: Vec<f64> = direction
+                .iter()
+                .map(|x| size * x)
+                .chain(hardened.map(|(accumulated, _)| accumulated))
+                .collect();
+            fastest = fastest.max(spectral_radius(&|state: &[f64]| decay::<S>(&law, state), &state));
+        }
+    }
+    fastest / law.fastest_rate::<S>(most)
+}
+
+/// The shares in plane stress, plane strain and space of a law that `law` gives for each.
+fn shares(law: &dyn Fn(usize) -> Viscoplasticity, most: f64) -> [f64; 3] {
+    let all = directions::<6>(40);
+    let thin: Vec<Mandel<3>> = all.iter().map(|d| [d[0], d[1], d[5]]).collect();
+    let thick: Vec<Mandel<4>> = all.iter().map(|d| [d[0], d[1], d[2], d[5]]).collect();
+    [
+        share_of_bound(law(3), most, &thin),
+        share_of_bound(law(4), most, &thick),
+        share_of_bound(law(6), most, &all),
+    ]
+}
+
+/// In plane stress the bound may be somewhat above all rates.
+fn assert_shares(shares: [f64; 3], least: f64, what: &str) {
+    assert!(shares.iter().all(|share| *share <= 1.0 + 1e-5), "beyond the bound, {what}: {shares:?}");
+    assert!(shares[0] > least && shares[1] > 0.999 && shares[2] > 0.999, "far below, {what}: {shares:?}");
+}
+
+#[test]
+fn powers_of_the_overstress_relax_up_to_the_fastest_rate() {
+    for metric in METRICS {
+        for (exponent, most) in [(1.0, 30.0), (1.5, 0.2), (3.0, 1.0), (5.0, 2.0), (20.0, 1.0)] {
+            for ratio in [-0.95, -0.5, 0.0, 0.3, 0.49] {
+                let law = |n| Viscoplasticity::Perzyna(perzyna(n, metric, exponent, ratio));
+                assert_shares(shares(&law, most), 0.6, &format!("{metric:?}, n = {exponent}, {ratio}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn hardening_stress_relaxes_up_to_the_fastest_rate() {
+    for metric in METRICS {
+        for (exponent, most) in [(1.0, 1.0), (1.0, 10.0), (3.0, 1.0), (5.0, 2.0)] {
+            for ratio in [-0.95, -0.5, 0.0, 0.3, 0.49] {
+                for modulus in [100.0, 3000.0] {
+                    let law = |n| {
+                        let perzyna = perzyna(n, metric, exponent, ratio);
+                        Viscoplasticity::Hardening(Hardening { perzyna, modulus })
+                    };
+                    let what = format!("{metric:?}, n = {exponent}, {ratio}, h = {modulus}, {most}");
+                    assert_shares(shares(&law, most), 0.3, &what);
+                }
+            }
+        }
+    }
+}
+
+fn check_maxwell<const S: usize>(ratio: f64, volumetric: Option<f64>) {
+    let law = Viscoplasticity::Maxwell(Maxwell::new(elastic(ratio), Hypothesis::of(S), 0.5, volumetric));
+    let fastest = spectral_radius(&|s: &[f64]| decay::<S>(&law, s), &[1.0; S]);
+    let share = fastest / law.fastest_rate::<S>(0.0);
+    assert!((share - 1.0).abs() < 1e-7, "{S} components, {ratio}, {volumetric:?}: {share}");
+}
+
+#[test]
+fn maxwells_law_relaxes_at_the_fastest_rate() {
+    for ratio in [-0.9, 0.0, 0.4] {
+        for volumetric in [None, Some(0.1), Some(5.0)] {
+            check_maxwell::<3>(ratio, volumetric);
+            check_maxwell::<4>(ratio, volumetric);
+            check_maxwell::<6>(ratio, volumetric);
+        }
+    }
+}
+
+fn check_cone<const S: usize>(ratio: f64) {
+    let elasticity = elastic(ratio).tensor(Hypothesis::of(S));
+    let cone = DruckerPrager { relaxation: 100.0, friction_coefficient: 0.6, cohesion: 10.0, elasticity };
+    let law = Viscoplasticity::DruckerPrager(cone);
+    let mut fastest = 0.0f64;
+    for direction in directions::<S>(60) {
+        for mean in [0.0, 1.0] {
+            let s: Mandel<S> = array::from_fn(|c| 60.0 * (direction[c] + if c < 3 { mean } else { 0.0 }));
+            fastest = fastest.max(spectral_radius(&|s: &[f64]| decay::<S>(&law, s), &s));
+        }
+    }
+    let share = fastest / law.fastest_rate::<S>(0.0);
+    assert!(share < 1.0 + 1e-6 && share > 0.999, "{S} components, {ratio}: {share}");
+}
+
+#[test]
+fn stress_beyond_the_apex_of_the_cone_relaxes_at_the_fastest_rate() {
+    for ratio in [-0.9, -0.3, 0.0, 0.3, 0.45] {
+        check_cone::<4>(ratio);
+        check_cone::<6>(ratio);
+    }
+}
+
+/// Tensors that look random, and some that are simple: along each axis, in shear, equibiaxial, and equibiaxial with little shear.
+fn directions<const S: usize>(random: usize) -> Vec<Mandel<S>> {
+    let mut seed = 1u64;
+    let mut number = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let mut all: Vec<Mandel<S>> = (0..S).map(|i| array::from_fn(|c| f64::from(u8::from(c == i)))).collect();
+    all.extend([0.0, 0.1, 0.3, 0.6, 1.0].map(|shear| {
+        array::from_fn(|c| [1.0, shear][usize::from(c + 1 == S)] * f64::from(u8::from(c < 2 || c + 1 == S)))
+    }));
+    all.extend((0..random).map(|_| array::from_fn(|_| number())));
+    all
+}
+
+/// The largest size of an eigenvalue of the derivative of a map at a point, by differences and powers of the matrix.
+fn spectral_radius(map: &dyn Fn(&[f64]) -> Vec<f64>, at: &[f64]) -> f64 {
+    let n = at.len();
+    let size = at.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let mut columns = Vec::new();
+    for i in 0..n {
+        let h = 1e-6 * if at[i] == 0.0 { size } else { at[i].abs().max(1e-3 * size.min(1.0)) };
+        let moved = |by: f64| {
+            let mut point = at.to_vec();
+            point[i] += by;
+            map(&point)
+        };
+        let (above, below) = (moved(h), moved(-h));
+        columns.push(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<f64>>());
+    }
+    let (mut logarithm, mut power) = (0.0, 1.0);
+    for _ in 0..30 {
+        let largest = columns.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        if largest == 0.0 {
+            return 0.0;
+        }
+        columns.iter_mut().flatten().for_each(|x| *x /= largest);
+        logarithm += largest.ln() / power;
+        power *= 2.0;
+        let product = |column: &Vec<f64>| -> Vec<f64> {
+            (0..n).map(|i| (0..n).map(|k| columns[k][i] * column[k]).sum()).collect()
+        };
+        columns = columns.iter().map(product).collect();
+    }
+    f64::exp(logarithm)
+}
+
+#[test]
+fn the_radius_of_a_matrix_by_hand() {
+    // Eigenvalues 2, -7 and 3, with coupled components.
+    let map = |x: &[f64]| vec![2.0 * x[0] + 5.0 * x[1], -7.0 * x[1], 4.0 * x[0] + 3.0 * x[2]];
+    let found = spectral_radius(&map, &[1.0, -2.0, 0.0]);
+    assert!((found - 7.0).abs() < 1e-7, "{found}");
+}
