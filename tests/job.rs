@@ -75,14 +75,38 @@ fn load(text: &str, overrides: &[&str]) -> Loaded {
 }
 
 #[test]
-fn jobs_of_the_papers_load_without_warnings() {
+fn jobs_of_the_papers_load_and_flow_in_the_cube_is_warned_of() {
     for (file, dimension) in [("wang_cheng_2022.toml", 2), ("wang_cheng_cube.toml", 3)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(file);
         let loaded = Job::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(loaded.warnings, Vec::<String>::new());
+        // Flow in the cube may lock.
+        assert_eq!(loaded.warnings.len(), dimension - 2, "{:?}", loaded.warnings);
         assert_eq!(loaded.job.dimension(), Some(dimension));
         let stem = path.file_stem().expect("stem");
         assert_eq!(loaded.job.output_folder(), path.parent().expect("folder").join("out").join(stem));
+    }
+}
+
+#[test]
+fn flow_that_keeps_the_volume_is_warned_of_where_cells_lock() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let warned = |overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        let loaded = Job::load(&path, &overrides).unwrap_or_else(|error| panic!("{error}"));
+        loaded.warnings.iter().any(|words| words.starts_with("material.viscoplasticity keeps the volume"))
+    };
+    let strain = "material.hypothesis=plane_strain";
+    assert!(warned(&[strain]) && !warned(&[]), "von Mises flow locks in plane strain, not in plane stress");
+    assert!(!warned(&[strain, "mesh.rectangle.diagonal=crossed"]));
+    let law = |text: &str| format!("material.viscoplasticity={text}");
+    for (text, locks) in [
+        ("{ perzyna = { relaxation = 100, yield_stress = 19, hardening_modulus = 5 } }", true),
+        ("{ maxwell = { relaxation_time = 1 } }", true),
+        ("{ maxwell = { relaxation_time = 1, volumetric_relaxation_time = 5 } }", false),
+        ("{ drucker_prager = { relaxation = 100, friction_coefficient = 0.3, cohesion = 10 } }", false),
+        ("{ drucker_prager = { relaxation = 100, friction_coefficient = 0, cohesion = 10 } }", true),
+    ] {
+        assert_eq!(warned(&[strain, &law(text)]), locks, "{text}");
     }
 }
 
