@@ -22,6 +22,7 @@ mod indicator;
 mod jacobian;
 mod ladder;
 mod manufactured;
+mod manufactured_flow;
 mod memory;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
@@ -104,6 +105,8 @@ fn scenario() {
         "manufactured_time" => manufactured::time(&session),
         "power_laws" => fast_flow::power_laws(&session),
         "flow_together" => fast_flow::together(&session),
+        "flowing_plane" => manufactured_flow::plane(&session),
+        "flowing_space" => manufactured_flow::space(&session),
         "unique_plane" => uniqueness::plane(&session),
         "unique_space" => uniqueness::space(&session),
         other => panic!("no scenario {other}"),
