@@ -4,7 +4,6 @@ use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
     effect::Step,
-    error::Error,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
@@ -112,8 +111,8 @@ fn no_number(session: &Session) {
     run.advance(session).expect("a step");
     run.state.previous_velocity.owned_mut().expect("values").fill(f64::NAN);
     run.state.previous_velocity.update_ghosts().expect("ghosts");
-    let outcome = run.advance(session);
-    assert!(matches!(&outcome, Err(Error::Failed(words)) if words.contains("not a number")), "{outcome:?}");
+    let failure = session.agree(run.advance(session)).expect_err("a failure");
+    assert!(failure.is_failure() && failure.to_string().contains("not a number"), "{failure}");
     assert_eq!(run.state.step, 1);
 }
 
