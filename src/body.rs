@@ -9,8 +9,8 @@ pub use traffic::PassBytes;
 use crate::{
     agreement::Agreed,
     effect::{
-        Contact, Curvature, Effect, Energy, Form, Load, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect,
-        SurfaceState,
+        Contact, Curvature, Effect, Energy, Form, Load, PeakSquares, Peaks, Phases, Step, StressError,
+        SurfaceEffect, SurfaceState,
     },
     error::Result,
     lanes::Pack,

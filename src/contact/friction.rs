@@ -122,7 +122,8 @@ impl FrictionLaw {
         let slope = self.slope(speed, pressure);
         Slip {
             speed,
-            traction: s - c * speed,
+            // Without a bound exactly nothing.
+            traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
             derivative: 1.0 / (c + slope),
             slope,
             coefficient: if pressure > 0.0 { self.coefficient(speed) } else { 0.0 },

@@ -184,10 +184,12 @@ impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
     /// Adds what the certificates say to the words of a step that failed.
     fn explain<T>(&self, error: Agreed) -> Result<T> {
         match self.certificates.theta_step {
-            Some(theta) if !self.certificates.steps_are_unique() && error.is_failure() => Err(Error::Failed(format!(
-                "{error}; theta of a step = {theta:.3e} is not below 1 by a margin, which the job accepts: a step may have several \
+            Some(theta) if !self.certificates.steps_are_unique() && error.is_failure() => {
+                Err(Error::Failed(format!(
+                    "{error}; theta of a step = {theta:.3e} is not below 1 by a margin, which the job accepts: a step may have several \
                  solutions, and none that goes on from the step before"
-            ))),
+                )))
+            }
             _ => Err(error.into()),
         }
     }

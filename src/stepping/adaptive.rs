@@ -14,7 +14,14 @@ use super::{
     drives::Drives,
     step_length::{Landing, SNAP, next_step},
 };
-use crate::{agreement::Agreed, body::Body, effect::Step, error::{Error, Result}, session::Session, state::State};
+use crate::{
+    agreement::Agreed,
+    body::Body,
+    effect::Step,
+    error::{Error, Result},
+    session::Session,
+    state::State,
+};
 use serde::{Deserialize, Serialize};
 
 /// Steps of one length between two growths of it.
@@ -113,7 +120,9 @@ impl<const D: usize> Adaptive<D> {
                     return Ok(outcome);
                 }
                 Ok((_, error, _)) => self.reject(step, self.fitting(step, error)),
-                Err(error) if error.is_failure() && !is_shortest => self.reject(step, self.level_of(step) - 1),
+                Err(error) if error.is_failure() && !is_shortest => {
+                    self.reject(step, self.level_of(step) - 1)
+                }
                 Err(error) => return Err(error),
             }
         }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     body::Body,
-    effect::Contact,
+    effect::{Contact, contact_nodes},
     error::{Error, Result},
     petsc::{DistributedVector, Precision, has_option},
     session::Session,
@@ -38,12 +38,17 @@ pub(super) fn newton<const D: usize, const S: usize>(
         && !chosen
         && !body.flows()
         && !body.contacts.iter().any(Contact::needs_ghosts)
-        && Condensed::motions_of(session, body) <= MOST_MOTIONS
+        && motions(session, body) <= MOST_MOTIONS
     {
         let condensed = Condensed::new(session, body, state.contact_traction.is_some(), precision)?;
         return Ok(Solver::Condensed(Box::new(condensed)));
     }
     whole_newton(session, body, &state.velocity, settings, preconditioner)
+}
+
+/// The motions that the contacts of a body see, over all ranks. Collective.
+fn motions<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
+    session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
 }
 
 /// Newton's method on the whole body, for velocities laid out like `like`. Collective.

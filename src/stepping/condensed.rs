@@ -169,11 +169,6 @@ impl Condensed {
         })
     }
 
-    /// The motions that the contacts of a body see, over all ranks. Collective.
-    pub fn motions_of<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
-        session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
-    }
-
     /// Factors the matrix that has these rows on this rank, in the order of the one in use; says whether it could. Springs along
     /// the motions of this rank that the rows have too much of are taken off products with the condensed matrix; where there are any, this
     /// resists rigid motions too little to choose the parameters of graphs by, and the matrix of the whole body does it, whose

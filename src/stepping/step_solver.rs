@@ -12,7 +12,7 @@ use super::{
 use crate::{
     agreement::Agreed,
     body::Body,
-    effect::Step,
+    effect::{Contact, Step},
     error::{Error, Result},
     petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
     session::Session,
@@ -302,8 +302,14 @@ impl StepSolver {
         // As many newtons as if all unknowns bore alike.
         let total = norm * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
-        // No residual below the rounding of `K v` is asked for, however small the forces that are left.
-        let product = f64::EPSILON * self.matrix_norm * trial.norm()?;
+        // No residual below the rounding of `K v` is asked for, however small the forces that are left; friction on a moving
+        // obstacle rounds `v` as a difference from its velocity.
+        let mut motion = trial.norm()?;
+        if body.contacts.iter().any(Contact::may_drift) {
+            let mine = body.contacts.iter().map(Contact::drift_square).sum();
+            motion += session.sum([mine])[0].sqrt();
+        }
+        let product = f64::EPSILON * self.matrix_norm * motion;
         let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
         let solved = self.solve_to(session, body, state, (step, start), (forces, tolerance), trial);
         let solved = session.agree(solved);

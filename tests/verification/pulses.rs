@@ -43,10 +43,9 @@ fn speed(session: &Session, run: &Simulation<2, 4>) -> f64 {
 
 /// The whole impulse of a pulse reaches the block, however long steps may be.
 fn pushed(session: &Session) {
-    let root = std::f64::consts::PI.sqrt();
     let pulses = [
         ("8*max(0, 1 - abs(t - 0.6)/0.01)", 0.08, &[0.59, 0.6, 0.61][..]),
-        ("8*exp(-((t - 0.6)/0.01)^2)", 0.08 * root, &[]),
+        ("8/(1 + ((t - 0.6)/0.005)^2)^2", 0.02 * std::f64::consts::PI, &[]),
         ("4*(sign(t - 0.305) - sign(t - 0.325))", 0.16, &[0.305, 0.325]),
         ("8*max(0, 1 - abs(t - 0.02)/0.01)", 0.08, &[0.01, 0.02, 0.03]),
     ];

@@ -8,6 +8,17 @@ use crate::{
 };
 
 impl<const D: usize> Contact<D> {
+    /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
+    pub fn may_drift(&self) -> bool {
+        self.friction.is_some() && self.gap.may_drag()
+    }
+
+    /// The sum over points here of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
+    pub fn drift_square(&self) -> f64 {
+        let drift = self.friction.iter().flat_map(|friction| &friction.drift);
+        drift.map(|drift| dot(drift, drift)).sum()
+    }
+
     /// Takes in how fast the obstacle moves along the boundary in a step, for friction. Refuses supports that hold one tangent
     /// of a point along this motion and leave another free: what slides there has a direction that the free one does not see.
     /// Where they hold all, they carry the friction, whatever it is.

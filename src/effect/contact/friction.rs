@@ -134,8 +134,12 @@ impl<const D: usize> Friction<D> {
             let unknown = point.along(values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
-            let shares =
-                if length > 0.0 { [found.speed / length, found.traction / length] } else { [0.0; 2] };
+            let shares = if found.traction == 0.0 {
+                // Nothing resists: the velocity stays what it is, to the last digit.
+                [1.0, 0.0]
+            } else {
+                [found.speed / length, found.traction / length]
+            };
             point.traction = unknown.map(|x| shares[1] * x);
             // In two terms, so that a point that sticks has no velocity whatever the rounding.
             let back = unknown.map(|x| shares[0] * x);
