@@ -64,9 +64,10 @@ run: deps
 	cargo build --release --locked
 	mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)
 
+# The summary of the tests comes last.
 test: deps
-	cargo test --release --locked
 	fuzz/run.sh 20
+	cargo test --release --locked
 
 # Everything compiled for these indices stays in a folder of its own.
 test64: test64-lib
