@@ -22,8 +22,8 @@ pub const SCENARIO: &str = "agreements ";
 
 const RANKS: usize = 3;
 
-/// Launches that share all points of a kind of run: each takes every 40th, on each rank in turn.
-const PARTS: usize = 40;
+/// Launches that share all points of a kind of run: each takes every 120th, on each rank in turn.
+const PARTS: usize = 120;
 
 /// Kinds of runs by the names of their job files.
 const KINDS: [&str; 3] = ["fixed", "adaptive", "restart"];

@@ -25,6 +25,8 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
         .env(SCENARIO, scenario)
         .env(FOLDER, folder)
         .env("OMP_NUM_THREADS", "1")
+        // Tests share the cores: a rank that waits gives its core away.
+        .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .output()

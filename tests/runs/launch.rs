@@ -129,6 +129,8 @@ impl Running {
         let own = tempfile::tempdir().expect("folder");
         command.env("OMPI_MCA_orte_tmpdir_base", own.path());
         command.env(MARK, &mark).env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+        // Tests share the cores: a rank that waits gives its core away.
+        command.env("OMPI_MCA_mpi_yield_when_idle", "1");
         if is_root() {
             command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
         }
