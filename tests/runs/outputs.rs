@@ -204,7 +204,8 @@ fn warnings_of_a_run_are_in_its_summary_and_strains_beyond_small_ones_are_among_
     let case = case
         .set("traction.0.value", "[0, -100]")
         .set("material.hypothesis", "'plane_strain'")
-        .set("material.elasticity.poisson_ratio", "0.46");
+        .set("material.elasticity.poisson_ratio", "0.46")
+        .set("time.scheme", "'implicit_euler'");
     std::fs::remove_dir_all(case.folder().join("out")).expect("removed");
     let found = warnings(&case);
     assert!(found.iter().any(|warning| warning.contains("poisson_ratio")), "{found:?}");
