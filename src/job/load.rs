@@ -112,8 +112,12 @@ impl Loaded {
         if !findings.faults.is_empty() {
             return Err(self.texts.refuse(findings.faults));
         }
-        let warnings = findings.warnings;
-        self.warnings.extend(warnings);
+        // The names of a generated mesh were known before.
+        for warning in findings.warnings {
+            if !self.warnings.contains(&warning) {
+                self.warnings.push(warning);
+            }
+        }
         Ok(())
     }
 }

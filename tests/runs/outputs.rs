@@ -196,6 +196,10 @@ fn warnings_of_a_run_are_in_its_summary_and_strains_beyond_small_ones_are_among_
         let said: Vec<&str> =
             outcome.stdout.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
         assert_eq!(warnings, said, "in the log and in the summary alike");
+        let mut different = said.clone();
+        different.sort_unstable();
+        different.dedup();
+        assert_eq!(different.len(), said.len(), "each is said once: {said:?}");
         warnings
     };
     let case = Case::square(4);
