@@ -60,7 +60,7 @@ const MANY: usize = 200;
 /// `theta_step` of the largest step that is suggested: its digits are rounded.
 const FAR_BELOW: f64 = 1.0 - 2.0 * Certificates::MARGIN;
 /// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
-const RIGID: f64 = 1e12;
+const RIGID: f64 = 1e10;
 
 /// Constants of the problem; null where they have no meaning.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
