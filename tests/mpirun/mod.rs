@@ -19,7 +19,7 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
     let own = tempfile::tempdir().expect("folder");
     Command::new("mpirun")
         .env("OMPI_MCA_orte_tmpdir_base", own.path())
-        .args(["--oversubscribe", "--bind-to", "none", "--timeout", "120", "-n", &ranks.to_string()])
+        .args(["--oversubscribe", "--bind-to", "none", "--timeout", "300", "-n", &ranks.to_string()])
         .arg(std::env::current_exe().expect("this program"))
         .args(["--ignored", "--exact", "scenario", "--nocapture", "--test-threads", "1"])
         .env(SCENARIO, scenario)
