@@ -70,6 +70,11 @@ impl Error {
         Self { exit, words, rank: Some(rank) }
     }
 
+    /// Whether a library failed, and other ranks may not know of it.
+    pub(crate) fn is_local_fault(&self) -> bool {
+        self.exit == Exit::Internal && self.rank.is_none()
+    }
+
     /// Rank, if all know of it, exit code and words.
     pub(crate) fn into_parts(self) -> (Option<usize>, Exit, String) {
         (self.rank, self.exit, self.words)

@@ -61,6 +61,7 @@ fn scenario() {
         "vectors" => petsc_boundary::exchange_vectors(&session),
         "matrices" => petsc_boundary::multiply_matrices(&session),
         "linear" => petsc_boundary::solve_linear(&session),
+        "petsc_fails_alone" => petsc_boundary::fail_alone(&session),
         "options" => petsc_boundary::set_options(&session),
         "newton" => callbacks::solve_nonlinear(&session),
         "callback_error" => callbacks::fail_on_the_last_rank(&session),

@@ -211,6 +211,31 @@ fn linear_solves_reach_the_solution_and_say_when_they_do_not() {
     run_on(&[1, 3], "linear");
 }
 
+/// PETSc refuses a product of vectors of two lengths on the last rank, while the others wait inside another one.
+pub fn fail_alone(session: &Session) {
+    let long = vector(session);
+    let outcome = if session.rank() + 1 == session.ranks() {
+        let short = DistributedVector::ghosted(1, share(session).1, &[]);
+        // Made by all ranks, so that only the product is refused by one.
+        long.dot(&short.expect("vector"))
+    } else {
+        drop(DistributedVector::ghosted(1, share(session).1, &[]).expect("vector"));
+        long.norm()
+    };
+    let _ = session.agree(outcome);
+    unreachable!("some ranks are inside of PETSc");
+}
+
+#[test]
+fn a_fault_of_petsc_on_one_rank_ends_those_that_wait_inside_it() {
+    let folder = tempfile::tempdir().expect("folder");
+    let output = crate::mpirun::start(3, "petsc_fails_alone", folder.path());
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(Exit::Internal as i32), "{words}");
+    assert_eq!(words.matches("error: rank 2: PETSc error").count(), 1, "{words}");
+    assert!(words.contains("VecDot") && words.contains("the run ends here"), "{words}");
+}
+
 #[test]
 fn options_are_heard_in_order_of_rank_and_errors_carry_message_and_trace() {
     run_on(&[1, 2], "options");
