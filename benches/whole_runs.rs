@@ -6,8 +6,8 @@
 //! and after each run tells what the memory gives. Their ratio is how near to the memory bound a run is. Steps are solved to a
 //! residual of 1e-8 of the forces.
 //!
-//! A peer is another program for the same problem: its command is given the dimension, the cells along an edge and the number of
-//! steps, and prints the seconds that a step took as its last word. Its whole run is timed and its largest resident memory read
+//! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps
+//! and the preconditioner (cholesky or gamg), and prints the seconds that a step took as its last word. Its whole run is timed and its largest resident memory read
 //! from outside.
 //!
 //! `--write` puts the tables into docs/speed.md.
@@ -124,8 +124,8 @@ struct Cost {
 }
 
 /// What another program costs.
-fn peer(command: &str, case: &Case) -> Cost {
-    let words = format!("exec {command} {} {} {}", case.dimension, case.cells, case.steps);
+fn peer(command: &str, case: &Case, preconditioner: &str) -> Cost {
+    let words = format!("exec {command} {} {} {} {preconditioner}", case.dimension, case.cells, case.steps);
     let start = Instant::now();
     let mut child = Command::new("sh").args(["-c", &words]).stdout(Stdio::piped()).spawn().expect("sh");
     let status = format!("/proc/{}/status", child.id());
@@ -210,7 +210,7 @@ fn main() {
                 run: number(&summary["wall_seconds"]["total"]),
                 memory: number(&summary["peak_memory_bytes"]),
             };
-            let line = against(&head, peer(command, case), this);
+            let line = against(&head, peer(command, case, preconditioner), this);
             println!("{line}");
             writeln!(peers, "{line}").expect("text");
         }

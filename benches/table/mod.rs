@@ -21,12 +21,21 @@ pub fn write(document: &str, name: &str, command: &str, bandwidth: f64, body: &s
     println!("written: table {name} of {document}");
 }
 
-/// The processor and how many of its cores there are.
+/// The processor, how many of its cores there are, and how wide its vectors are: kernels are compiled for each width.
 fn machine() -> String {
     let facts = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = facts.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{cores} cores of {}", model.map_or("an unknown processor", |(_, name)| name))
+    let values = |key: &'static str| {
+        facts.lines().filter_map(move |line| line.strip_prefix(key)?.split_once(": ")).map(|(_, value)| value)
+    };
+    let has =
+        |feature: &str| values("flags").next().is_some_and(|all| all.split(' ').any(|one| one == feature));
+    let bits = match ["avx512vl", "avx2"].map(has) {
+        [true, _] => 512,
+        [_, true] => 256,
+        _ => 128,
+    };
+    let model = values("model name").next().unwrap_or("an unknown processor");
+    format!("{} cores of {model} with {bits}-bit vectors", values("model name").count())
 }
 
 fn output(program: &str, arguments: &[&str]) -> Option<String> {
