@@ -20,7 +20,7 @@ const FUNCTIONS: &[&str] = &[
     "VecCreateMPIWithArray",
     "Mat(Create|SetSizes|SetBlockSize|SetType|SetOption|Destroy|Mult|GetInfo|GetDiagonal|SetNearNullSpace|SetNullSpace)",
     "Mat(Norm|Duplicate|Copy|GetRow|RestoreRow|SetValues|AssemblyBegin|AssemblyEnd|GetOwnershipRange)",
-    "(VecEqual|PetscObject(Reference|GetComm|TypeCompare))",
+    "(VecEqual|PetscObject(Reference|Destroy|GetComm|TypeCompare))",
     "Mat(GetBlockSize|GetBlockSizes|SetBlockSizes|GetLocalSize|GetRowIJ|RestoreRowIJ|MPIAIJGetSeqAIJ|SeqAIJGetArrayRead|SeqAIJRestoreArrayRead)",
     "PCMG(GetLevels|(Get|Set)Interpolation|SetRestriction|GetSmoother|SetResidual|ResidualDefault)",
     "Mat(MPIAIJ|SeqAIJ)SetPreallocationCSR",

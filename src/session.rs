@@ -12,14 +12,17 @@ use mpi::{
     topology::{Communicator, SimpleCommunicator},
     traits::CommunicatorCollectives,
 };
-use std::sync::{
-    Arc,
-    atomic::{AtomicUsize, Ordering},
+use std::{
+    rc::Rc,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
 };
 
-/// MPI, initialised; everything parallel borrows it.
+/// MPI, initialised; finalised once this and everything of PETSc are dropped.
 pub struct Mpi {
-    universe: Universe,
+    universe: Rc<Universe>,
 }
 
 impl Mpi {
@@ -35,25 +38,24 @@ impl Mpi {
                 SimpleCommunicator::world().abort(Exit::Internal as i32);
             }
         }));
-        Ok(Self { universe })
+        Ok(Self { universe: Rc::new(universe) })
     }
 
     /// Starts PETSc and the signal flags on all ranks.
-    pub fn session(&self) -> Result<Session<'_>> {
-        let world = self.universe.world();
-        let petsc = Petsc::start(&self.universe, &world)?;
-        Ok(Session { world, petsc, signal: watch_signals()? })
+    pub fn session(&self) -> Result<Session> {
+        let petsc = Petsc::start(&self.universe)?;
+        Ok(Session { world: self.universe.world(), petsc, signal: watch_signals()? })
     }
 }
 
 /// What every parallel part of the solver is given.
-pub struct Session<'u> {
+pub struct Session {
     world: SimpleCommunicator,
-    petsc: Petsc<'u>,
+    petsc: Petsc,
     signal: Arc<AtomicUsize>,
 }
 
-impl Session<'_> {
+impl Session {
     /// The communicator of all ranks.
     pub fn world(&self) -> &SimpleCommunicator {
         &self.world
@@ -75,7 +77,7 @@ impl Session<'_> {
     }
 
     /// PETSc, for its version.
-    pub fn petsc(&self) -> &Petsc<'_> {
+    pub fn petsc(&self) -> &Petsc {
         &self.petsc
     }
 

@@ -16,9 +16,9 @@ impl Ksp {
         let (mut pc, mut kind, mut method) = (ptr::null_mut(), ptr::null(), ptr::null());
         // SAFETY: live solver; names and preconditioner are its own.
         unsafe {
-            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             check(sys::PCGetType(pc, &mut kind))?;
-            check(sys::KSPGetType(self.raw, &mut method))?;
+            check(sys::KSPGetType(self.raw.get(), &mut method))?;
         }
         if !is_one_of(method, &[c"cg", c"gmres"]) {
             Ok(None)

@@ -31,7 +31,7 @@ impl BlockProduct {
         let action = Self { own, others: parts.others(matrix)? };
         let shell = Shell::new(matrix, Box::new(action))?;
         // SAFETY: live matrix.
-        unsafe { check(sys::MatSetOption(shell.raw, sys::MAT_SYMMETRIC, 1))? };
+        unsafe { check(sys::MatSetOption(shell.raw.get(), sys::MAT_SYMMETRIC, 1))? };
         Ok(Some(shell))
     }
 }

@@ -30,19 +30,13 @@ impl<'a, T: ?Sized> Callback<'a, T> {
         ptr::from_ref(self).cast_mut().cast()
     }
 
-    /// Runs a callback; an error is kept and from then on `spoil` marks every output, so that all ranks see the same
-    /// failure.
-    pub fn run(&self, body: impl FnOnce(&mut T) -> Result<()>, spoil: impl FnOnce()) -> sys::PetscErrorCode {
+    /// Runs a callback; the first error and a panic are kept.
+    pub fn run(&self, body: impl FnOnce(&mut T) -> Result<()>) -> sys::PetscErrorCode {
         match catch_unwind(AssertUnwindSafe(|| body(&mut self.target.borrow_mut()))) {
-            Ok(Ok(())) => {
-                if self.error.borrow().is_some() {
-                    spoil();
+            Ok(result) => {
+                if let Err(error) = result {
+                    self.error.borrow_mut().get_or_insert(error);
                 }
-                0
-            }
-            Ok(Err(error)) => {
-                self.error.borrow_mut().get_or_insert(error);
-                spoil();
                 0
             }
             Err(panic) => {
@@ -61,9 +55,52 @@ impl<'a, T: ?Sized> Callback<'a, T> {
     }
 }
 
-/// Fills the values of this rank with NaN, which norms carry to all ranks.
-pub(super) fn spoil(vector: &mut DistributedVector) {
-    if let Ok(mut values) = vector.owned_mut() {
+/// Runs a callback that changes `y`. From the first error of its solve on, every `y` is filled with NaN on this rank, which norms
+/// carry to all ranks.
+///
+/// # Safety
+/// `context` is null or the pointer of a [`Callback`] that works on a `T` and stays for the call; `y` is alive.
+pub(super) unsafe fn change<T: ?Sized>(
+    context: *mut c_void,
+    y: sys::Vec,
+    body: impl FnOnce(&mut T, &mut DistributedVector) -> Result<()>,
+) -> sys::PetscErrorCode {
+    // SAFETY: the caller's promises.
+    let (callback, y) = unsafe { (context.cast::<Callback<'_, T>>().as_ref(), DistributedVector::view(y)) };
+    let (Some(callback), Ok(mut y)) = (callback, y) else { return USER_ERROR };
+    let code = callback.run(|target| body(target, &mut y));
+    if callback.error.borrow().is_some()
+        && let Ok(mut values) = y.owned_mut()
+    {
         values.fill(f64::NAN);
     }
+    code
+}
+
+/// The same for a callback that writes `y` from `x`.
+///
+/// # Safety
+/// As of [`change`]; `x` is alive and not `y`.
+pub(super) unsafe fn write<T: ?Sized>(
+    context: *mut c_void,
+    x: sys::Vec,
+    y: sys::Vec,
+    body: impl FnOnce(&mut T, &DistributedVector, &mut DistributedVector) -> Result<()>,
+) -> sys::PetscErrorCode {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let Ok(x) = DistributedVector::view(x) else { return USER_ERROR };
+        change(context, y, |target: &mut T, y| body(target, &x, y))
+    }
+}
+
+/// The context of a shell preconditioner; null where it has none.
+///
+/// # Safety
+/// `pc` is a live shell preconditioner.
+pub(super) unsafe fn context_of_preconditioner(pc: sys::PC) -> *mut c_void {
+    let mut context: *mut c_void = ptr::null_mut();
+    // SAFETY: the caller's promise; PETSc writes its context pointer.
+    unsafe { sys::PCShellGetContext(pc, ptr::from_mut(&mut context).cast()) };
+    context
 }

@@ -1,8 +1,8 @@
 //! What PETSc's matrices in compressed rows are made of.
 
-use super::{DistributedVector, check, symmetric_blocks::ScalarRows, sys};
+use super::{DistributedVector, check, reference::Reference, symmetric_blocks::ScalarRows, sys};
 use crate::error::{Error, Result};
-use std::{ffi::CStr, mem::ManuallyDrop, ptr, slice};
+use std::{ffi::CStr, ptr, slice};
 
 /// The parts of a matrix: the columns that belong to this rank, and the others.
 pub(super) struct Parts {
@@ -69,9 +69,9 @@ pub(super) fn own_rows<T>(
 /// The columns of other ranks, with the exchange of their values.
 pub(super) struct Others {
     entries: Entries,
-    exchange: sys::VecScatter,
+    exchange: Reference<sys::_p_PetscSF>,
     /// A value for each of these columns.
-    values: ManuallyDrop<DistributedVector>,
+    values: DistributedVector,
 }
 
 /// `y = A x` from the product with this rank's own columns, which is made while the values of the others are on their way. Collective.
@@ -149,20 +149,19 @@ impl Others {
         let entries = own_rows(columns, |rows| Some(Entries::new(rows)))?
             .ok_or_else(|| Error::Internal("a matrix in compressed rows that doesn't show them".into()))?;
         let (mut rows, mut count) = (0, 0);
-        let (mut exchange, mut values) = (ptr::null_mut(), ptr::null_mut());
-        let (mut from, mut template) = (ptr::null_mut(), ptr::null_mut());
-        // SAFETY: live matrices; `numbers` has an entry for each column here. What is made for the exchange alone is given
-        // back; the handle owns the rest.
+        // SAFETY: live matrices; `numbers` has an entry for each column here.
         unsafe {
-            let alone = sys::RSMPI_COMM_SELF;
+            let (alone, none) = (sys::RSMPI_COMM_SELF, ptr::null_mut());
             check(sys::MatGetLocalSize(columns, &mut rows, &mut count))?;
-            check(sys::ISCreateGeneral(alone, count, numbers, sys::PETSC_COPY_VALUES, &mut from))?;
-            check(sys::VecCreateSeq(alone, count, &mut values))?;
-            check(sys::MatCreateVecs(matrix, &mut template, ptr::null_mut()))?;
-            check(sys::VecScatterCreate(template, from, values, ptr::null_mut(), &mut exchange))?;
-            check(sys::VecDestroy(&mut template))?;
-            check(sys::ISDestroy(&mut from))?;
-            Ok(Self { entries, exchange, values: DistributedVector::view(values) })
+            let from = Reference::new(|raw| {
+                sys::ISCreateGeneral(alone, count, numbers, sys::PETSC_COPY_VALUES, raw)
+            })?;
+            let values = Reference::new(|raw| sys::VecCreateSeq(alone, count, raw))?;
+            let template = Reference::new(|raw| sys::MatCreateVecs(matrix, raw, ptr::null_mut()))?;
+            let exchange = Reference::new(|raw| {
+                sys::VecScatterCreate(template.get(), from.get(), values.get(), none, raw)
+            })?;
+            Ok(Self { entries, exchange, values: DistributedVector { raw: values } })
         }
     }
 
@@ -170,14 +169,18 @@ impl Others {
     fn begin(&self, x: &DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: live objects, as below.
-        check(unsafe { sys::VecScatterBegin(self.exchange, x.raw, self.values.raw, insert, forward) })
+        check(unsafe {
+            sys::VecScatterBegin(self.exchange.get(), x.raw.get(), self.values.raw.get(), insert, forward)
+        })
     }
 
     /// Ends that and adds the product with the columns of other ranks to `y`.
     fn end_adding(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: as above.
-        check(unsafe { sys::VecScatterEnd(self.exchange, x.raw, self.values.raw, insert, forward) })?;
+        check(unsafe {
+            sys::VecScatterEnd(self.exchange.get(), x.raw.get(), self.values.raw.get(), insert, forward)
+        })?;
         self.entries.add(&self.values.owned()?, &mut y.owned_mut()?);
         Ok(())
     }
@@ -185,30 +188,26 @@ impl Others {
     /// Adds the product of the transposed columns with `x`, laid out like the rows, to the `y` of the ranks that they belong
     /// to. Collective.
     pub fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        // SAFETY: a second view of the vector, which nothing else uses until this returns.
-        let mut values = unsafe { DistributedVector::view(self.values.raw) };
+        // SAFETY: live vector.
+        let mut values = unsafe { DistributedVector::view(self.values.raw.get())? };
         self.entries.transposed(&x.owned()?, &mut values.owned_mut()?);
         let (add, reverse) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
         // SAFETY: as above.
         unsafe {
-            check(sys::VecScatterBegin(self.exchange, self.values.raw, y.raw, add, reverse))?;
-            check(sys::VecScatterEnd(self.exchange, self.values.raw, y.raw, add, reverse))
+            check(sys::VecScatterBegin(
+                self.exchange.get(),
+                self.values.raw.get(),
+                y.raw.get(),
+                add,
+                reverse,
+            ))?;
+            check(sys::VecScatterEnd(self.exchange.get(), self.values.raw.get(), y.raw.get(), add, reverse))
         }
     }
 
     /// Bytes of the columns.
     pub fn bytes(&self) -> u64 {
         self.entries.bytes()
-    }
-}
-
-impl Drop for Others {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference to each; the vector is dropped once.
-        unsafe {
-            sys::VecScatterDestroy(&mut self.exchange);
-            ManuallyDrop::drop(&mut self.values);
-        }
     }
 }
 

@@ -2,10 +2,11 @@ use super::{
     DistributedVector, Matrix, c_string, check, index,
     levels::{self, Level},
     library::communicator,
+    reference::Reference,
     sys,
 };
 use crate::error::Result;
-use std::{marker::PhantomData, ptr};
+use std::ptr;
 
 /// Growth of the residual that counts as divergence: that of CG may grow by the root of the matrix' condition number before it falls,
 /// and bodies that contact alone holds have large ones.
@@ -16,11 +17,10 @@ const DIVERGENCE: f64 = 1e12;
 /// The preconditioner is set up at the first solve (or [`Ksp::set_up`]) and kept for as long as the matrix stands.
 #[derive(Debug)]
 pub struct Ksp {
-    pub(super) raw: sys::KSP,
+    pub(super) raw: Reference<sys::_p_KSP>,
     /// What the smoothers of multigrid multiply with.
     pub(super) levels: Vec<Level>,
     applications: u64,
-    not_send: PhantomData<*mut ()>,
 }
 
 /// How a linear solve ended.
@@ -70,14 +70,12 @@ pub(super) fn linear_reason(reason: i32) -> &'static str {
 impl Ksp {
     /// A solver whose options carry this prefix.
     pub fn new(prefix: &str) -> Result<Self> {
-        let mut raw = ptr::null_mut();
         let prefix = c_string(prefix)?;
-        // SAFETY: `raw` receives one reference that the handle owns; PETSc copies the prefix.
+        // SAFETY: PETSc copies the prefix.
         unsafe {
-            check(sys::KSPCreate(communicator(), &mut raw))?;
-            let ksp = Self { raw, levels: Vec::new(), applications: 0, not_send: PhantomData };
-            check(sys::KSPSetOptionsPrefix(raw, prefix.as_ptr()))?;
-            Ok(ksp)
+            let raw = Reference::new(|raw| sys::KSPCreate(communicator(), raw))?;
+            check(sys::KSPSetOptionsPrefix(raw.get(), prefix.as_ptr()))?;
+            Ok(Self { raw, levels: Vec::new(), applications: 0 })
         }
     }
 
@@ -88,9 +86,9 @@ impl Ksp {
         let (mut pc, method) = (ptr::null_mut(), c_string(method)?);
         // SAFETY: live objects; PETSc counts its own reference to the shared preconditioner, copies the name.
         unsafe {
-            check(sys::KSPGetPC(self.raw, &mut pc))?;
-            check(sys::KSPSetPC(other.raw, pc))?;
-            check(sys::KSPSetType(other.raw, method.as_ptr()))?;
+            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
+            check(sys::KSPSetPC(other.raw.get(), pc))?;
+            check(sys::KSPSetType(other.raw.get(), method.as_ptr()))?;
         }
         Ok(other)
     }
@@ -103,7 +101,7 @@ impl Ksp {
     /// Solves with the first matrix; the second makes the preconditioner, anew if it is another one than before.
     pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.
-        check(unsafe { sys::KSPSetOperators(self.raw, matrix.operator(), preconditioned.raw) })
+        check(unsafe { sys::KSPSetOperators(self.raw.get(), matrix.operator(), preconditioned.raw.get()) })
     }
 
     /// Krylov method by PETSc's name, such as `cg`; its norm is that of the residual itself.
@@ -111,8 +109,8 @@ impl Ksp {
         let name = c_string(name)?;
         // SAFETY: live object; PETSc copies the name.
         unsafe {
-            check(sys::KSPSetType(self.raw, name.as_ptr()))?;
-            check(sys::KSPSetNormType(self.raw, sys::KSP_NORM_UNPRECONDITIONED))
+            check(sys::KSPSetType(self.raw.get(), name.as_ptr()))?;
+            check(sys::KSPSetNormType(self.raw.get(), sys::KSP_NORM_UNPRECONDITIONED))
         }
     }
 
@@ -122,7 +120,7 @@ impl Ksp {
         let mut pc = ptr::null_mut();
         // SAFETY: the preconditioner belongs to the live solver; PETSc copies the names.
         unsafe {
-            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             check(sys::PCSetType(pc, name.as_ptr()))?;
             if let Some(package) = package {
                 check(sys::PCFactorSetMatSolverType(pc, c_string(package)?.as_ptr()))?;
@@ -135,26 +133,28 @@ impl Ksp {
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         let iterations = index(iterations, "linear iterations")?;
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetTolerances(self.raw, relative, absolute, DIVERGENCE, iterations) })
+        check(unsafe { sys::KSPSetTolerances(self.raw.get(), relative, absolute, DIVERGENCE, iterations) })
     }
 
     /// Starts from the values already in the solution; what counts as divergence is then measured against the residual there.
     pub fn start_from_solution(&mut self) -> Result<()> {
         // SAFETY: live object with PETSc's own test of convergence.
-        check(unsafe { sys::KSPConvergedDefaultSetUIRNorm(self.raw) })?;
+        check(unsafe { sys::KSPConvergedDefaultSetUIRNorm(self.raw.get()) })?;
         self.start(true)
     }
 
     /// Starts from the values already in the solution, or from zero.
     pub(super) fn start(&mut self, from_solution: bool) -> Result<()> {
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetInitialGuessNonzero(self.raw, i32::from(from_solution) as sys::PetscBool) })
+        check(unsafe {
+            sys::KSPSetInitialGuessNonzero(self.raw.get(), i32::from(from_solution) as sys::PetscBool)
+        })
     }
 
     /// Lets PETSc options override what was set.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
-        check(unsafe { sys::KSPSetFromOptions(self.raw) })
+        check(unsafe { sys::KSPSetFromOptions(self.raw.get()) })
     }
 
     /// Sets up the preconditioner now; to be called after each change of its matrix. Collective.
@@ -162,9 +162,9 @@ impl Ksp {
         let mut pc = ptr::null_mut();
         // SAFETY: live object, which owns its preconditioner.
         unsafe {
-            check(sys::KSPGetPC(self.raw, &mut pc))?;
+            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             levels::give_back(pc, &self.levels)?;
-            check(sys::KSPSetUp(self.raw))?;
+            check(sys::KSPSetUp(self.raw.get()))?;
         }
         self.levels = levels::in_single_precision(pc)?;
         Ok(())
@@ -177,7 +177,7 @@ impl Ksp {
         solution: &mut DistributedVector,
     ) -> Result<LinearOutcome> {
         // SAFETY: live objects of matching layout; the two vectors differ.
-        check(unsafe { sys::KSPSolve(self.raw, right_hand_side.raw, solution.raw) })?;
+        check(unsafe { sys::KSPSolve(self.raw.get(), right_hand_side.raw.get(), solution.raw.get()) })?;
         let outcome = self.outcome()?;
         self.applications += outcome.iterations as u64 + 1;
         Ok(outcome)
@@ -198,8 +198,8 @@ impl Ksp {
         let mut pc = ptr::null_mut();
         // SAFETY: the preconditioner belongs to the live solver; the two vectors differ.
         unsafe {
-            check(sys::KSPGetPC(self.raw, &mut pc))?;
-            check(sys::PCApply(pc, r.raw, z.raw))
+            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
+            check(sys::PCApply(pc, r.raw.get(), z.raw.get()))
         }
     }
 
@@ -208,17 +208,10 @@ impl Ksp {
         let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
         // SAFETY: live object, live numbers.
         unsafe {
-            check(sys::KSPGetConvergedReason(self.raw, &mut reason))?;
-            check(sys::KSPGetIterationNumber(self.raw, &mut iterations))?;
-            check(sys::KSPGetResidualNorm(self.raw, &mut residual))?;
+            check(sys::KSPGetConvergedReason(self.raw.get(), &mut reason))?;
+            check(sys::KSPGetIterationNumber(self.raw.get(), &mut iterations))?;
+            check(sys::KSPGetResidualNorm(self.raw.get(), &mut residual))?;
         }
         Ok(LinearOutcome { reason, iterations: usize::try_from(iterations).unwrap_or(0), residual })
-    }
-}
-
-impl Drop for Ksp {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::KSPDestroy(&mut self.raw) };
     }
 }

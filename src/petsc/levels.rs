@@ -1,7 +1,10 @@
 //! The levels of PETSc's multigrid multiply with copies of their matrices in single precision: smoothers and interpolations need
 //! no more, and are bound by the memory that they read.
 
-use super::{block_product::BlockProduct, block_transfer::BlockTransfer, check, shell::Shell, sys};
+use super::{
+    block_product::BlockProduct, block_transfer::BlockTransfer, check, reference::Reference, shell::Shell,
+    sys,
+};
 use crate::error::Result;
 use std::{ffi::CStr, ptr};
 
@@ -9,24 +12,13 @@ use std::{ffi::CStr, ptr};
 #[derive(Debug, Default)]
 pub(super) struct Level {
     smoother: Option<Shell>,
-    transfer: Option<(Shell, Reference)>,
+    transfer: Option<(Shell, Reference<sys::_p_Mat>)>,
 }
 
 impl Level {
     /// Bytes of this rank that a product of the smoother and one way between levels move, as far as they are not PETSc's own.
     pub fn bytes(&self) -> [Option<u64>; 2] {
         [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
-    }
-}
-
-/// One reference to a matrix of PETSc's.
-#[derive(Debug)]
-struct Reference(sys::Mat);
-
-impl Drop for Reference {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::MatDestroy(&mut self.0) };
     }
 }
 
@@ -57,16 +49,15 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
             check(sys::PCMGGetSmoother(pc, number, &mut smoother))?;
             check(sys::KSPGetOperators(smoother, ptr::null_mut(), &mut matrix))?;
             if let Some(shell) = BlockProduct::shell::<f32>(matrix)? {
-                check(sys::KSPSetOperators(smoother, shell.raw, matrix))?;
-                check(sys::PCMGSetResidual(pc, number, Some(sys::PCMGResidualDefault), shell.raw))?;
+                check(sys::KSPSetOperators(smoother, shell.raw.get(), matrix))?;
+                check(sys::PCMGSetResidual(pc, number, Some(sys::PCMGResidualDefault), shell.raw.get()))?;
                 level.smoother = Some(shell);
             }
             let mut interpolation = ptr::null_mut();
             check(sys::PCMGGetInterpolation(pc, number, &mut interpolation))?;
             if let Some(shell) = BlockTransfer::shell(interpolation)? {
-                check(sys::PetscObjectReference(interpolation.cast()))?;
-                let original = Reference(interpolation);
-                put_transfer(pc, number, shell.raw)?;
+                let original = Reference::to(interpolation)?;
+                put_transfer(pc, number, shell.raw.get())?;
                 level.transfer = Some((shell, original));
             }
             levels.push(level);
@@ -80,7 +71,7 @@ pub(super) fn give_back(pc: sys::PC, levels: &[Level]) -> Result<()> {
     for (level, number) in levels.iter().zip(1..) {
         if let Some((_, original)) = &level.transfer {
             // SAFETY: live objects of this preconditioner.
-            unsafe { put_transfer(pc, number, original.0)? };
+            unsafe { put_transfer(pc, number, original.get())? };
         }
     }
     Ok(())

@@ -1,39 +1,70 @@
 use super::{c_string, check, keep_fault, sys, threads};
-use crate::error::Result;
-use mpi::{environment::Universe, topology::Communicator, traits::AsRaw};
+use crate::error::{Error, Result};
+use mpi::{environment::Universe, traits::AsRaw};
 use std::{
+    cell::RefCell,
     ffi::{CStr, c_char},
-    marker::PhantomData,
-    ptr,
+    fmt, ptr,
+    rc::{Rc, Weak},
 };
 
-/// PETSc, started; finalised when dropped, before the MPI universe it borrows.
-pub struct Petsc<'u> {
-    universe: PhantomData<&'u Universe>,
-    not_send: PhantomData<*mut ()>,
+thread_local! {
+    static STARTED: RefCell<Weak<Started>> = const { RefCell::new(Weak::new()) };
 }
 
-impl<'u> Petsc<'u> {
-    /// Starts PETSc on this communicator. PETSc reads `PETSC_OPTIONS` here; it installs no signal handlers and reads
-    /// no `.petscrc`.
-    pub fn start<C>(_universe: &'u Universe, communicator: &C) -> Result<Self>
-    where
-        C: Communicator + AsRaw<Raw = sys::MPI_Comm>,
-    {
+/// PETSc, started on this thread; the last one who holds it finalises it, before the MPI universe, which it keeps up.
+pub(super) struct Started {
+    _universe: Rc<Universe>,
+}
+
+impl fmt::Debug for Started {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Started")
+    }
+}
+
+impl Drop for Started {
+    fn drop(&mut self) {
+        // SAFETY: the token and all handles hold this and are gone; MPI is still up.
+        unsafe { sys::PetscFinalize() };
+    }
+}
+
+/// Keeps PETSc started; fails where it is not.
+pub(super) fn started() -> Result<Rc<Started>> {
+    let started = STARTED.with_borrow(Weak::upgrade);
+    started.ok_or_else(|| Error::Internal("PETSc is not started on this thread".into()))
+}
+
+/// PETSc, started. It is finalised when this token and all handles are dropped, and MPI after it.
+pub struct Petsc {
+    _started: Rc<Started>,
+}
+
+impl Petsc {
+    /// Starts PETSc on all ranks. PETSc reads `PETSC_OPTIONS` here; it installs no signal handlers and reads no `.petscrc`.
+    pub fn start(universe: &Rc<Universe>) -> Result<Self> {
+        if started().is_ok() {
+            return Err(Error::Internal("PETSc is already started".into()));
+        }
         let arguments = [c"solver", c"-skip_petscrc", c"-no_signal_handler"];
         let mut pointers: Vec<*mut c_char> = arguments.iter().map(|a| a.as_ptr().cast_mut()).collect();
         pointers.push(ptr::null_mut());
         threads::one_unless_chosen();
         // PETSc keeps the argument vector for its whole life.
         let pointers = Box::leak(pointers.into_boxed_slice());
-        // SAFETY: MPI is initialised (the universe is alive), the communicator is set before PETSc starts, and the
-        // arguments are static NUL-terminated strings in a leaked, NULL-terminated vector.
+        // SAFETY: MPI is initialised, and its only universe is on this thread, so that no other starts PETSc; the
+        // communicator is set before PETSc starts, and the arguments are static NUL-terminated strings in a leaked,
+        // NULL-terminated vector.
         unsafe {
-            sys::PETSC_COMM_WORLD = communicator.as_raw();
+            sys::PETSC_COMM_WORLD = universe.world().as_raw();
             check(sys::PetscInitializeNoPointers(3, pointers.as_mut_ptr(), ptr::null(), ptr::null()))?;
-            check(sys::PetscPushErrorHandler(Some(keep_fault), ptr::null_mut()))?;
         }
-        Ok(Self { universe: PhantomData, not_send: PhantomData })
+        let started = Rc::new(Started { _universe: Rc::clone(universe) });
+        STARTED.set(Rc::downgrade(&started));
+        // SAFETY: PETSc is started; the handler needs no context.
+        check(unsafe { sys::PetscPushErrorHandler(Some(keep_fault), ptr::null_mut()) })?;
+        Ok(Self { _started: started })
     }
 
     /// Version of the PETSc that is linked, such as `3.18.5`.
@@ -45,16 +76,9 @@ impl<'u> Petsc<'u> {
     }
 }
 
-impl Drop for Petsc<'_> {
-    fn drop(&mut self) {
-        // SAFETY: every handle borrows this token's lifetime or was dropped before; MPI is still up.
-        unsafe { sys::PetscFinalize() };
-    }
-}
-
 /// The communicator all handles are created on.
 pub(super) fn communicator() -> sys::MPI_Comm {
-    // SAFETY: written once, before PETSc starts, and only read afterwards.
+    // SAFETY: written by the thread that starts PETSc, which is the only one with handles.
     unsafe { sys::PETSC_COMM_WORLD }
 }
 
@@ -62,10 +86,11 @@ pub(super) fn communicator() -> sys::MPI_Comm {
 pub fn set_option(name: &str, value: &str) -> Result<()> {
     let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
     let value = c_string(value)?;
-    // SAFETY: NUL-terminated strings that PETSc copies; NULL is the global options database.
+    let _started = started()?;
+    // SAFETY: PETSc is started; NUL-terminated strings that it copies; NULL is the global options database.
     check(unsafe { sys::PetscOptionsSetValue(ptr::null_mut(), name.as_ptr(), value.as_ptr()) })?;
     if name.as_c_str() == c"-log_view" {
-        // SAFETY: PETSc is started; it looks for this option only then, so logging is begun here.
+        // SAFETY: PETSc looks for this option when it starts, so logging is begun here.
         check(unsafe { sys::PetscLogDefaultBegin() })?;
     }
     Ok(())
@@ -74,7 +99,8 @@ pub fn set_option(name: &str, value: &str) -> Result<()> {
 /// Takes a PETSc option back, if it is set; the name is without the leading dash.
 pub fn clear_option(name: &str) -> Result<()> {
     let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
-    // SAFETY: a NUL-terminated string; NULL is the global options database.
+    let _started = started()?;
+    // SAFETY: PETSc is started; a NUL-terminated string; NULL is the global options database.
     check(unsafe { sys::PetscOptionsClearValue(ptr::null_mut(), name.as_ptr()) })
 }
 
@@ -85,6 +111,7 @@ pub fn has_option(name: &str) -> Result<bool> {
 
 /// Whether a PETSc option is set; the key is with the leading dash.
 pub(super) fn is_set(key: &CStr) -> Result<bool> {
+    let _started = started()?;
     let mut set = 0;
     // SAFETY: as above; `set` is a live PetscBool.
     check(unsafe { sys::PetscOptionsHasName(ptr::null_mut(), ptr::null(), key.as_ptr(), &mut set) })?;
@@ -104,8 +131,9 @@ impl Stage {
     /// The stage of this name, registered at its first use.
     pub fn register(name: &str) -> Result<Self> {
         let name = c_string(name)?;
+        let _started = started()?;
         let mut stage = -1;
-        // SAFETY: PETSc copies the name and fills the integer, with -1 where it knows no such stage.
+        // SAFETY: PETSc is started; it copies the name and fills the integer, with -1 where it knows no such stage.
         unsafe {
             check(sys::PetscLogStageGetId(name.as_ptr(), &mut stage))?;
             if stage < 0 {
@@ -117,16 +145,19 @@ impl Stage {
 
     /// Enters the stage; it is left when the guard is dropped.
     pub fn enter(self) -> Result<Entered> {
-        // SAFETY: the stage was registered.
+        let started = started()?;
+        // SAFETY: PETSc is started and checks the number.
         check(unsafe { sys::PetscLogStagePush(self.0) })?;
-        Ok(Entered(PhantomData))
+        Ok(Entered { _started: started })
     }
 }
 
 /// A stage that was entered.
 #[must_use]
 #[derive(Debug)]
-pub struct Entered(PhantomData<*mut ()>);
+pub struct Entered {
+    _started: Rc<Started>,
+}
 
 impl Drop for Entered {
     fn drop(&mut self) {

@@ -1,8 +1,9 @@
 use super::{
-    DistributedVector, block_product::BlockProduct, check, index, library::communicator, shell::Shell, sys,
+    DistributedVector, block_product::BlockProduct, check, index, library::communicator,
+    reference::Reference, shell::Shell, sys,
 };
 use crate::error::{Error, Result};
-use std::{cell::Cell, marker::PhantomData, mem::MaybeUninit, ptr, rc::Rc};
+use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
 
 /// The rows this rank owns of a sparse matrix of dense blocks.
 #[derive(Debug, Clone, Default)]
@@ -38,13 +39,12 @@ impl BlockRows {
 /// A sparse matrix spread over the ranks by rows.
 #[derive(Debug)]
 pub struct Matrix {
-    pub(super) raw: sys::Mat,
+    pub(super) raw: Reference<sys::_p_Mat>,
     /// What multiplies faster.
     blocks: Option<Rc<Shell>>,
     /// Bytes of this rank that a product moves at the least.
     bytes: u64,
     products: Cell<u64>,
-    not_send: PhantomData<*mut ()>,
 }
 
 impl Matrix {
@@ -54,39 +54,28 @@ impl Matrix {
         let (starts, columns, values) = scalar_rows(block, rows)?;
         let bytes = bytes_of_a_product(values.len(), block, [owned * block; 2]);
         let local = index(owned * block, "unknowns of a rank")?;
-        let mut raw = ptr::null_mut();
-        // SAFETY: `raw` receives one reference that the handle owns from here on; PETSc copies the row arrays, which
-        // describe `local` rows with ascending global columns.
-        unsafe {
-            check(sys::MatCreate(communicator(), &mut raw))?;
-            let matrix = Self { raw, blocks: None, bytes, products: Cell::new(0), not_send: PhantomData };
+        let (starts, columns, values) = (starts.as_ptr(), columns.as_ptr(), values.as_ptr());
+        // SAFETY: PETSc copies the row arrays, which describe `local` rows with ascending global columns.
+        let raw = unsafe {
+            let matrix = Reference::new(|raw| sys::MatCreate(communicator(), raw))?;
+            let raw = matrix.get();
             check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
             check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
             check(sys::MatSetType(raw, c"aij".as_ptr()))?;
-            check(sys::MatSeqAIJSetPreallocationCSR(
-                raw,
-                starts.as_ptr(),
-                columns.as_ptr(),
-                values.as_ptr(),
-            ))?;
-            check(sys::MatMPIAIJSetPreallocationCSR(
-                raw,
-                starts.as_ptr(),
-                columns.as_ptr(),
-                values.as_ptr(),
-            ))?;
+            check(sys::MatSeqAIJSetPreallocationCSR(raw, starts, columns, values))?;
+            check(sys::MatMPIAIJSetPreallocationCSR(raw, starts, columns, values))?;
             check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
-            Ok(matrix)
-        }
+            matrix
+        };
+        Ok(Self { raw, blocks: None, bytes, products: Cell::new(0) })
     }
 
     /// Another handle of the same matrix.
     pub(super) fn share(&self) -> Result<Self> {
-        // SAFETY: live object; the new handle owns the reference that is added.
-        check(unsafe { sys::PetscObjectReference(self.raw.cast()) })?;
-        let (bytes, blocks) = (self.bytes, self.blocks.clone());
-        Ok(Self { raw: self.raw, blocks, bytes, products: Cell::new(0), not_send: PhantomData })
+        // SAFETY: live matrix.
+        let raw = unsafe { Reference::to(self.raw.get())? };
+        Ok(Self { raw, blocks: self.blocks.clone(), bytes: self.bytes, products: Cell::new(0) })
     }
 
     /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
@@ -94,49 +83,41 @@ impl Matrix {
         let (mut rows, mut columns, mut size) = (0, 0, 0);
         // SAFETY: live matrix and live numbers.
         unsafe {
-            check(sys::MatGetLocalSize(self.raw, &mut rows, &mut columns))?;
-            check(sys::MatGetBlockSize(self.raw, &mut size))?;
+            check(sys::MatGetLocalSize(self.raw.get(), &mut rows, &mut columns))?;
+            check(sys::MatGetBlockSize(self.raw.get(), &mut size))?;
         }
         if usize::try_from(rows) != Ok(coordinates.len()) || usize::try_from(size) != Ok(block) {
             return Err(Error::Internal(format!("{} coordinates for {rows} unknowns", coordinates.len())));
         }
-        let mut points = ptr::null_mut();
-        let mut motions = ptr::null_mut();
-        // SAFETY: the coordinate vector borrows `coordinates` and is destroyed before this returns; the matrix takes
-        // its own reference to the null space.
+        let (block, all) = (index(block, "block size")?, sys::PETSC_DETERMINE);
+        // SAFETY: the coordinate vector borrows `coordinates` and is dropped before this returns; the matrix takes its own
+        // reference to the null space.
         unsafe {
-            check(sys::VecCreateMPIWithArray(
-                communicator(),
-                index(block, "block size")?,
-                index(coordinates.len(), "unknowns of a rank")?,
-                sys::PETSC_DETERMINE,
-                coordinates.as_ptr(),
-                &mut points,
-            ))?;
-            check(sys::MatNullSpaceCreateRigidBody(points, &mut motions))?;
-            check(sys::MatSetNearNullSpace(self.raw, motions))?;
-            check(sys::MatNullSpaceDestroy(&mut motions))?;
-            check(sys::VecDestroy(&mut points))
+            let points = Reference::new(|raw| {
+                sys::VecCreateMPIWithArray(communicator(), block, rows, all, coordinates.as_ptr(), raw)
+            })?;
+            let motions = Reference::new(|raw| sys::MatNullSpaceCreateRigidBody(points.get(), raw))?;
+            check(sys::MatSetNearNullSpace(self.raw.get(), motions.get()))
         }
     }
 
     /// Makes products faster from now on, for as much memory again as half the matrix takes. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
-        self.blocks = BlockProduct::shell::<f64>(self.raw)?.map(Rc::new);
+        self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
         self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
         Ok(())
     }
 
     /// What multiplies with this matrix.
     pub(super) fn operator(&self) -> sys::Mat {
-        self.blocks.as_ref().map_or(self.raw, |shell| shell.raw)
+        self.blocks.as_ref().map_or(self.raw.get(), |shell| shell.raw.get())
     }
 
     /// `result = self * x`. Collective.
     pub fn multiply(&self, x: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
         self.products.set(self.products.get() + 1);
         // SAFETY: live objects of matching layout; `x` and `result` differ.
-        check(unsafe { sys::MatMult(self.operator(), x.raw, result.raw) })
+        check(unsafe { sys::MatMult(self.operator(), x.raw.get(), result.raw.get()) })
     }
 
     /// Counts products from here on.
@@ -158,7 +139,7 @@ impl Matrix {
     pub fn norm(&self) -> Result<f64> {
         let mut norm = 0.0;
         // SAFETY: live matrix and a live number.
-        check(unsafe { sys::MatNorm(self.raw, sys::NORM_INFINITY, &mut norm) })?;
+        check(unsafe { sys::MatNorm(self.raw.get(), sys::NORM_INFINITY, &mut norm) })?;
         Ok(norm)
     }
 
@@ -167,16 +148,9 @@ impl Matrix {
         let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
         // SAFETY: PETSc fills the struct of numbers.
         unsafe {
-            check(sys::MatGetInfo(self.raw, sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
+            check(sys::MatGetInfo(self.raw.get(), sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
             Ok(counts.assume_init().nz_used)
         }
-    }
-}
-
-impl Drop for Matrix {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::MatDestroy(&mut self.raw) };
     }
 }
 

@@ -1,7 +1,8 @@
 //! PETSc: raw bindings in [`sys`], and owned, safe handles for what the solver calls. One file a PETSc class.
 //!
 //! Every call that can fail returns `Result` with PETSc's own message and trace. All handles are collective over
-//! the communicator given to [`Petsc::start`]: every rank creates, uses and drops them in the same order.
+//! the ranks of the MPI universe given to [`Petsc::start`]: every rank creates, uses and drops them in the same order. PETSc stays
+//! started for as long as one is alive; making one where PETSc is not started is an error.
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
@@ -26,6 +27,7 @@ mod projected;
 mod projected_operator;
 mod rectangular_blocks;
 mod reduced;
+mod reference;
 mod shell;
 mod single_blas;
 mod single_factor;

@@ -1,10 +1,12 @@
 use super::{
     DistributedVector, Ksp, LinearOutcome, Matrix, ProjectedOperator, ProjectedOutcome,
     callback::Callback,
-    check, index,
+    check,
     library::communicator,
     projected_operator::{multiply, precondition, project},
     reduced::ReducedMatrix,
+    reference::Reference,
+    shell::symmetric_shell,
     sys,
 };
 use crate::error::Result;
@@ -21,8 +23,8 @@ use std::ptr;
 pub struct ProjectedKsp {
     ksp: Ksp,
     fallback: Option<Ksp>,
-    shell: sys::Mat,
-    complement: sys::MatNullSpace,
+    shell: Reference<sys::_p_Mat>,
+    complement: Reference<sys::_p_MatNullSpace>,
     /// The operator's own preconditioner, if that is in use; inside `ksp`.
     own: sys::PC,
     constant: Option<Matrix>,
@@ -54,13 +56,14 @@ const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, 
 impl ProjectedKsp {
     /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
     pub fn new(prefix: &str, like: &DistributedVector, block: usize) -> Result<Self> {
-        let ksp = Ksp::new(prefix)?;
-        let local = index(like.owned()?.len(), "unknowns of a rank")?;
-        let mut solver = Self {
-            ksp,
+        // SAFETY: a space of no vectors.
+        let complement =
+            unsafe { Reference::new(|raw| sys::MatNullSpaceCreate(communicator(), 0, 0, ptr::null(), raw))? };
+        Ok(Self {
+            ksp: Ksp::new(prefix)?,
             fallback: None,
-            shell: ptr::null_mut(),
-            complement: ptr::null_mut(),
+            shell: symmetric_shell(like, block, multiply)?,
+            complement,
             own: ptr::null_mut(),
             constant: None,
             reduced: None,
@@ -70,28 +73,7 @@ impl ProjectedKsp {
             patience: usize::MAX,
             first: true,
             reducing: false,
-        };
-        // SAFETY: the handle owns one reference each to the shell matrix and the null space from their creation on; the
-        // shell is only multiplied inside `solve`, which sets its context.
-        unsafe {
-            check(sys::MatCreateShell(
-                communicator(),
-                local,
-                local,
-                sys::PETSC_DETERMINE,
-                sys::PETSC_DETERMINE,
-                ptr::null_mut(),
-                &mut solver.shell,
-            ))?;
-            check(sys::MatSetBlockSize(solver.shell, index(block, "block size")?))?;
-            let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
-                multiply;
-            let multiply: unsafe extern "C" fn() = std::mem::transmute(multiply);
-            check(sys::MatShellSetOperation(solver.shell, sys::MATOP_MULT, Some(multiply)))?;
-            check(sys::MatSetOption(solver.shell, sys::MAT_SYMMETRIC, 1))?;
-            check(sys::MatNullSpaceCreate(communicator(), 0, 0, ptr::null(), &mut solver.complement))?;
-        }
-        Ok(solver)
+        })
     }
 
     /// The solver inside, to choose method, preconditioner and tolerances.
@@ -132,7 +114,7 @@ impl ProjectedKsp {
         self.reduced = None;
         self.reducing = false;
         self.constant = Some(constant.share()?);
-        self.precondition_with(constant.raw)
+        self.precondition_with(constant.raw.get())
     }
 
     /// Takes the operator's own preconditioner from now on.
@@ -140,8 +122,8 @@ impl ProjectedKsp {
         self.ksp.set_preconditioner("shell", None)?;
         // SAFETY: live objects; the preconditioner is only applied inside `solve`, which sets its context.
         unsafe {
-            check(sys::KSPSetOperators(self.ksp.raw, self.shell, self.shell))?;
-            check(sys::KSPGetPC(self.ksp.raw, &mut self.own))?;
+            check(sys::KSPSetOperators(self.ksp.raw.get(), self.shell.get(), self.shell.get()))?;
+            check(sys::KSPGetPC(self.ksp.raw.get(), &mut self.own))?;
             check(sys::PCShellSetApply(self.own, Some(precondition)))
         }
     }
@@ -152,8 +134,8 @@ impl ProjectedKsp {
         // SAFETY: live objects; PETSc keeps its own references. Multigrid smooths with its own matrix: the shell can only
         // be multiplied inside `solve`, and is another operator.
         unsafe {
-            check(sys::KSPSetOperators(self.ksp.raw, self.shell, matrix))?;
-            check(sys::KSPGetPC(self.ksp.raw, &mut pc))?;
+            check(sys::KSPSetOperators(self.ksp.raw.get(), self.shell.get(), matrix))?;
+            check(sys::KSPGetPC(self.ksp.raw.get(), &mut pc))?;
             check(sys::PCSetUseAmat(pc, 0))?;
         }
         self.ksp.set_up()
@@ -179,7 +161,7 @@ impl ProjectedKsp {
         if worth && stale {
             self.refresh()?;
         } else if !worth && self.reducing {
-            let raw = constant.raw;
+            let raw = constant.raw.get();
             reduced.forget()?;
             self.precondition_with(raw)?;
         }
@@ -247,12 +229,13 @@ impl ProjectedKsp {
         solve: impl FnOnce(&mut Self) -> Result<T>,
     ) -> Result<T> {
         let callback = Callback::new(operator);
+        let (shell, complement) = (self.shell.get(), self.complement.get());
         // SAFETY: the context lives on this frame until it is detached below; PETSc calls the trampolines only inside
         // KSPSolve. The null space is attached for the solve alone, so that its function is never called without.
         unsafe {
-            check(sys::MatNullSpaceSetFunction(self.complement, Some(project), callback.pointer()))?;
-            check(sys::MatSetNullSpace(self.shell, self.complement))?;
-            check(sys::MatShellSetContext(self.shell, callback.pointer()))?;
+            check(sys::MatNullSpaceSetFunction(complement, Some(project), callback.pointer()))?;
+            check(sys::MatSetNullSpace(shell, complement))?;
+            check(sys::MatShellSetContext(shell, callback.pointer()))?;
             if !self.own.is_null() {
                 check(sys::PCShellSetContext(self.own, callback.pointer()))?;
             }
@@ -263,9 +246,9 @@ impl ProjectedKsp {
             if !self.own.is_null() {
                 check(sys::PCShellSetContext(self.own, ptr::null_mut()))?;
             }
-            check(sys::MatShellSetContext(self.shell, ptr::null_mut()))?;
-            check(sys::MatSetNullSpace(self.shell, ptr::null_mut()))?;
-            check(sys::MatNullSpaceSetFunction(self.complement, None, ptr::null_mut()))?;
+            check(sys::MatShellSetContext(shell, ptr::null_mut()))?;
+            check(sys::MatSetNullSpace(shell, ptr::null_mut()))?;
+            check(sys::MatNullSpaceSetFunction(complement, None, ptr::null_mut()))?;
         }
         callback.finish()?;
         outcome
@@ -350,17 +333,7 @@ impl ProjectedKsp {
     fn refresh(&mut self) -> Result<()> {
         let (Some(constant), Some(reduced)) = (&self.constant, &mut self.reduced) else { return Ok(()) };
         reduced.make(constant)?;
-        let raw = reduced.raw;
+        let raw = reduced.raw.get();
         self.precondition_with(raw)
-    }
-}
-
-impl Drop for ProjectedKsp {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference to each.
-        unsafe {
-            sys::MatDestroy(&mut self.shell);
-            sys::MatNullSpaceDestroy(&mut self.complement);
-        }
     }
 }

@@ -1,10 +1,11 @@
 use super::{
     DistributedVector, LinearOutcome,
-    callback::{Callback, USER_ERROR, spoil},
+    callback::{self, context_of_preconditioner},
+    shell::context_of_matrix,
     sys,
 };
 use crate::error::{Error, Result};
-use std::{ffi::c_void, ptr};
+use std::ffi::c_void;
 
 /// An operator on a subspace, given by its action.
 pub trait ProjectedOperator {
@@ -36,37 +37,20 @@ pub struct ProjectedOutcome {
     pub refreshed: bool,
 }
 
-type Context<'a> = Callback<'a, dyn ProjectedOperator + 'a>;
-
 pub(super) unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: a live shell matrix; PETSc writes its context pointer.
-    let code = unsafe { sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) };
-    if code != 0 || context.is_null() {
-        return USER_ERROR;
+    // SAFETY: a live shell matrix, whose context `solve` set to its live frame; PETSc's vectors live for the call.
+    unsafe {
+        let context = context_of_matrix(matrix);
+        callback::write::<dyn ProjectedOperator>(context, x, y, |operator, x, y| operator.apply(x, y))
     }
-    // SAFETY: `solve` set the context to its live frame; PETSc's vectors live for the call. The second view of `y` is
-    // used only after the first is done.
-    let (context, x, mut y, mut spoilt) = unsafe {
-        let view = |raw| DistributedVector::view(raw);
-        (&*context.cast::<Context<'_>>(), view(x), view(y), view(y))
-    };
-    context.run(|operator| operator.apply(&x, &mut y), || spoil(&mut spoilt))
 }
 
 pub(super) unsafe extern "C" fn precondition(pc: sys::PC, r: sys::Vec, z: sys::Vec) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: a live shell preconditioner; PETSc writes its context pointer.
-    let code = unsafe { sys::PCShellGetContext(pc, ptr::from_mut(&mut context).cast()) };
-    if code != 0 || context.is_null() {
-        return USER_ERROR;
+    // SAFETY: a live shell preconditioner; the rest as in `multiply`.
+    unsafe {
+        let context = context_of_preconditioner(pc);
+        callback::write::<dyn ProjectedOperator>(context, r, z, |operator, r, z| operator.precondition(r, z))
     }
-    // SAFETY: as in `multiply`.
-    let (context, r, mut z, mut spoilt) = unsafe {
-        let view = |raw| DistributedVector::view(raw);
-        (&*context.cast::<Context<'_>>(), view(r), view(z), view(z))
-    };
-    context.run(|operator| operator.precondition(&r, &mut z), || spoil(&mut spoilt))
 }
 
 pub(super) unsafe extern "C" fn project(
@@ -74,11 +58,6 @@ pub(super) unsafe extern "C" fn project(
     x: sys::Vec,
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
-    if context.is_null() {
-        return USER_ERROR;
-    }
     // SAFETY: as in `multiply`.
-    let (context, mut x, mut spoilt) =
-        unsafe { (&*context.cast::<Context<'_>>(), DistributedVector::view(x), DistributedVector::view(x)) };
-    context.run(|operator| operator.project(&mut x), || spoil(&mut spoilt))
+    unsafe { callback::change::<dyn ProjectedOperator>(context, x, |operator, x| operator.project(x)) }
 }

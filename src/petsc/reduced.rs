@@ -1,4 +1,4 @@
-use super::{DistributedVector, Matrix, check, index, sys};
+use super::{DistributedVector, Matrix, check, index, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::{
     collections::{BTreeSet, HashMap},
@@ -11,7 +11,7 @@ use std::{
 /// ordering, an interpolation) serves the other.
 #[derive(Debug)]
 pub(super) struct ReducedMatrix {
-    pub raw: sys::Mat,
+    pub raw: Reference<sys::_p_Mat>,
     /// Components a node.
     block: usize,
     /// Where ghost nodes stand behind the owned ones, by their global numbers.
@@ -47,16 +47,16 @@ impl ReducedMatrix {
         for column in &made_for {
             directions += column.norm()?.powi(2);
         }
-        let mut raw = ptr::null_mut();
-        // SAFETY: live matrix; the handle owns one reference to the copy.
-        unsafe {
-            check(sys::MatDuplicate(constant.raw, sys::MAT_COPY_VALUES, &mut raw))?;
-            let ghosts = others.into_iter().enumerate().map(|(at, node)| (node, owned + at)).collect();
-            let matrix = Self { raw, block, ghosts, columns, directions: directions.round(), made_for };
-            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
-            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
-            Ok(matrix)
-        }
+        let ghosts = others.into_iter().enumerate().map(|(at, node)| (node, owned + at)).collect();
+        // SAFETY: live matrices.
+        let raw = unsafe {
+            let copy =
+                Reference::new(|raw| sys::MatDuplicate(constant.raw.get(), sys::MAT_COPY_VALUES, raw))?;
+            check(sys::MatSetOption(copy.get(), sys::MAT_SYMMETRIC, 1))?;
+            check(sys::MatSetOption(copy.get(), sys::MAT_SPD, 1))?;
+            copy
+        };
+        Ok(Self { raw, block, ghosts, columns, directions: directions.round(), made_for })
     }
 
     /// Takes in the projection in use; says whether the matrix was made for another. Collective.
@@ -93,7 +93,7 @@ impl ReducedMatrix {
             made.copy_from(column)?;
         }
         // SAFETY: live matrices of one pattern.
-        check(unsafe { sys::MatCopy(constant.raw, self.raw, sys::SAME_NONZERO_PATTERN) })?;
+        check(unsafe { sys::MatCopy(constant.raw.get(), self.raw.get(), sys::SAME_NONZERO_PATTERN) })?;
         for column in &mut self.columns {
             column.update_ghosts()?;
         }
@@ -140,8 +140,8 @@ impl ReducedMatrix {
         }
         // SAFETY: live matrix.
         unsafe {
-            check(sys::MatAssemblyBegin(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
-            check(sys::MatAssemblyEnd(self.raw, sys::MAT_FINAL_ASSEMBLY))
+            check(sys::MatAssemblyBegin(self.raw.get(), sys::MAT_FINAL_ASSEMBLY))?;
+            check(sys::MatAssemblyEnd(self.raw.get(), sys::MAT_FINAL_ASSEMBLY))
         }
     }
 
@@ -155,7 +155,7 @@ impl ReducedMatrix {
         // SAFETY: live matrix; as many indices and values as announced, which PETSc copies.
         check(unsafe {
             sys::MatSetValues(
-                self.raw,
+                self.raw.get(),
                 size,
                 rows.as_ptr(),
                 size,
@@ -167,18 +167,11 @@ impl ReducedMatrix {
     }
 }
 
-impl Drop for ReducedMatrix {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::MatDestroy(&mut self.raw) };
-    }
-}
-
 /// The first node whose row this rank owns.
 fn first_node(matrix: &Matrix, block: usize) -> Result<usize> {
     let (mut first, mut end) = (0, 0);
     // SAFETY: live matrix, live integers.
-    check(unsafe { sys::MatGetOwnershipRange(matrix.raw, &mut first, &mut end) })?;
+    check(unsafe { sys::MatGetOwnershipRange(matrix.raw.get(), &mut first, &mut end) })?;
     Ok(usize::try_from(first).unwrap_or(0) / block)
 }
 
@@ -207,7 +200,7 @@ fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, 
         // SAFETY: a live matrix, whose rows PETSc refuses to show on other ranks; its arrays hold `length` numbers and are
         // read before the row is given back.
         unsafe {
-            check(sys::MatGetRow(matrix.raw, row, &mut count, &mut columns, &mut values))?;
+            check(sys::MatGetRow(matrix.raw.get(), row, &mut count, &mut columns, &mut values))?;
             let length = usize::try_from(count).unwrap_or(0);
             // PETSc shows no arrays of a row without entries.
             let (of, found) = match length {
@@ -221,7 +214,7 @@ fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, 
                 blocks = firsts.map(|&column| usize::try_from(column).unwrap_or(0) / block).collect();
             }
             rows.push(found.to_vec());
-            check(sys::MatRestoreRow(matrix.raw, row, &mut count, &mut columns, &mut values))?;
+            check(sys::MatRestoreRow(matrix.raw.get(), row, &mut count, &mut columns, &mut values))?;
         }
     }
     Ok((blocks, rows))

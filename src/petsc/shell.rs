@@ -1,4 +1,6 @@
-use super::{DistributedVector, callback::USER_ERROR, check, library::communicator, sys};
+use super::{
+    DistributedVector, callback::USER_ERROR, check, index, library::communicator, reference::Reference, sys,
+};
 use crate::error::{Error, Result};
 use std::{ffi::c_void, fmt, ptr};
 
@@ -18,7 +20,7 @@ pub(super) trait Action {
 
 /// A matrix of PETSc's that is known by its products.
 pub(super) struct Shell {
-    pub raw: sys::Mat,
+    pub raw: Reference<sys::_p_Mat>,
     action: Box<Box<dyn Action>>,
 }
 
@@ -28,30 +30,26 @@ impl fmt::Debug for Shell {
     }
 }
 
-type Callback = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
+type Multiply = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
 
 impl Shell {
     /// A shell laid out like `matrix`. Once this handle is dropped, products with it are errors. Collective.
     pub fn new(matrix: sys::Mat, action: Box<dyn Action>) -> Result<Self> {
-        let mut shell = Self { raw: ptr::null_mut(), action: Box::new(action) };
+        let action = Box::new(action);
         let (mut rows, mut columns, mut blocks) = (0, 0, [0; 2]);
-        // SAFETY: live matrix. The handle owns one reference to the shell, whose context stays in its box for as long as the
-        // handle. The callbacks have the types that PETSc documents for these operations.
+        let [high, wide] = &mut blocks;
+        // SAFETY: live matrix and live numbers.
         unsafe {
             check(sys::MatGetLocalSize(matrix, &mut rows, &mut columns))?;
-            let [high, wide] = &mut blocks;
             check(sys::MatGetBlockSizes(matrix, high, wide))?;
-            let (context, all) = (ptr::from_ref(&*shell.action).cast_mut().cast(), sys::PETSC_DETERMINE);
-            check(sys::MatCreateShell(communicator(), rows, columns, all, all, context, &mut shell.raw))?;
-            check(sys::MatSetBlockSizes(shell.raw, blocks[0], blocks[1]))?;
-            for (operation, callback) in [
-                (sys::MATOP_MULT, multiply as Callback),
-                (sys::MATOP_MULT_TRANSPOSE, multiply_transposed as Callback),
-            ] {
-                let callback: unsafe extern "C" fn() = std::mem::transmute(callback);
-                check(sys::MatShellSetOperation(shell.raw, operation, Some(callback)))?;
-            }
         }
+        let operations: [(_, Multiply); 2] =
+            [(sys::MATOP_MULT, multiply), (sys::MATOP_MULT_TRANSPOSE, multiply_transposed)];
+        let shell = Self { raw: create([rows, columns], blocks, &operations)?, action };
+        // SAFETY: live shell; the context stays in its box for as long as the handle.
+        check(unsafe {
+            sys::MatShellSetContext(shell.raw.get(), ptr::from_ref(&*shell.action).cast_mut().cast())
+        })?;
         Ok(shell)
     }
 
@@ -63,15 +61,53 @@ impl Shell {
 
 impl Drop for Shell {
     fn drop(&mut self) {
-        if self.raw.is_null() {
-            return;
-        }
-        // SAFETY: this handle owns one reference; a matrix that PETSc keeps beyond it has no context to multiply with.
-        unsafe {
-            sys::MatShellSetContext(self.raw, ptr::null_mut());
-            sys::MatDestroy(&mut self.raw);
-        }
+        // SAFETY: live shell; if PETSc keeps it beyond this handle, it has no context to multiply with.
+        unsafe { sys::MatShellSetContext(self.raw.get(), ptr::null_mut()) };
     }
+}
+
+/// A symmetric shell laid out like a vector of this block size, to be multiplied with while its context is set. Collective.
+pub(super) fn symmetric_shell(
+    like: &DistributedVector,
+    block: usize,
+    multiply: Multiply,
+) -> Result<Reference<sys::_p_Mat>> {
+    let size = index(like.owned()?.len(), "unknowns of a rank")?;
+    let shell = create([size; 2], [index(block, "block size")?; 2], &[(sys::MATOP_MULT, multiply)])?;
+    // SAFETY: live shell.
+    check(unsafe { sys::MatSetOption(shell.get(), sys::MAT_SYMMETRIC, 1) })?;
+    Ok(shell)
+}
+
+/// A shell with so many rows and columns on this rank, in blocks, and without a context.
+fn create(
+    [rows, columns]: [sys::PetscInt; 2],
+    blocks: [sys::PetscInt; 2],
+    operations: &[(sys::MatOperation, Multiply)],
+) -> Result<Reference<sys::_p_Mat>> {
+    let (all, none) = (sys::PETSC_DETERMINE, ptr::null_mut());
+    // SAFETY: the callbacks have the type that PETSc documents for these operations.
+    unsafe {
+        let shell =
+            Reference::new(|raw| sys::MatCreateShell(communicator(), rows, columns, all, all, none, raw))?;
+        check(sys::MatSetBlockSizes(shell.get(), blocks[0], blocks[1]))?;
+        for (operation, callback) in operations {
+            let callback = std::mem::transmute::<Multiply, unsafe extern "C" fn()>(*callback);
+            check(sys::MatShellSetOperation(shell.get(), *operation, Some(callback)))?;
+        }
+        Ok(shell)
+    }
+}
+
+/// The context of a shell; null where it has none.
+///
+/// # Safety
+/// `matrix` is a live shell.
+pub(super) unsafe fn context_of_matrix(matrix: sys::Mat) -> *mut c_void {
+    let mut context: *mut c_void = ptr::null_mut();
+    // SAFETY: the caller's promise; PETSc writes its context pointer.
+    unsafe { sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) };
+    context
 }
 
 unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
@@ -92,13 +128,11 @@ unsafe fn act(
     y: sys::Vec,
     act: impl FnOnce(&dyn Action, &DistributedVector, &mut DistributedVector) -> Result<()>,
 ) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: PETSc writes its context pointer, which the handle keeps alive; its vectors live for the call.
-    let (action, x, mut y) = unsafe {
-        if sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) != 0 || context.is_null() {
-            return USER_ERROR;
-        }
-        (&**context.cast::<Box<dyn Action>>(), DistributedVector::view(x), DistributedVector::view(y))
+    // SAFETY: the context is an action that the handle keeps alive; PETSc's vectors live for the call.
+    let (action, x, y) = unsafe {
+        let context = context_of_matrix(matrix).cast::<Box<dyn Action>>().as_ref();
+        (context, DistributedVector::view(x), DistributedVector::view(y))
     };
-    act(action, &x, &mut y).map_or(USER_ERROR, |()| 0)
+    let (Some(action), Ok(x), Ok(mut y)) = (action, x, y) else { return USER_ERROR };
+    act(&**action, &x, &mut y).map_or(USER_ERROR, |()| 0)
 }

@@ -1,16 +1,14 @@
 use super::{
     DistributedVector, c_string,
-    callback::{Callback, USER_ERROR, spoil},
+    callback::{self, Callback, USER_ERROR, context_of_preconditioner},
     check, index,
     library::communicator,
+    reference::Reference,
+    shell::{context_of_matrix, symmetric_shell},
     sys,
 };
 use crate::error::Result;
-use std::{
-    ffi::{CString, c_void},
-    marker::PhantomData,
-    ptr,
-};
+use std::{ffi::c_void, ptr};
 
 /// A system of nonlinear equations `residual(x) = 0` with a generalised Jacobian given by its action and its solution.
 pub trait NonlinearProblem {
@@ -82,61 +80,38 @@ impl NonlinearOutcome {
 /// To PETSc the linear solve is a shell preconditioner, applied once; its own options carry the prefix `newton_`.
 #[derive(Debug)]
 pub struct Snes {
-    raw: sys::SNES,
-    jacobian: sys::Mat,
+    raw: Reference<sys::_p_SNES>,
+    jacobian: Reference<sys::_p_Mat>,
     /// Inside `raw`, which owns it.
     preconditioner: sys::PC,
     residual: DistributedVector,
-    not_send: PhantomData<*mut ()>,
 }
-
-type Context<'a> = Callback<'a, dyn NonlinearProblem + 'a>;
 
 impl Snes {
     /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
     pub fn new(prefix: &str, like: &DistributedVector, block: usize) -> Result<Self> {
-        let prefix: CString = c_string(prefix)?;
-        let residual = like.like()?;
-        let local = index(residual.owned()?.len(), "unknowns of a rank")?;
-        let (mut raw, mut jacobian, mut search) = (ptr::null_mut(), ptr::null_mut(), ptr::null_mut());
-        // SAFETY: the handle owns one reference each to `raw` and `jacobian` from their creation on; the shell matrix
-        // is only multiplied inside `solve`, which sets its context.
-        unsafe {
-            check(sys::SNESCreate(communicator(), &mut raw))?;
-            let mut snes =
-                Self { raw, jacobian, preconditioner: ptr::null_mut(), residual, not_send: PhantomData };
-            check(sys::MatCreateShell(
-                communicator(),
-                local,
-                local,
-                sys::PETSC_DETERMINE,
-                sys::PETSC_DETERMINE,
-                ptr::null_mut(),
-                &mut jacobian,
-            ))?;
-            snes.jacobian = jacobian;
-            check(sys::MatSetBlockSize(jacobian, index(block, "block size")?))?;
-            let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
-                multiply;
-            let multiply: unsafe extern "C" fn() = std::mem::transmute(multiply);
-            check(sys::MatShellSetOperation(jacobian, sys::MATOP_MULT, Some(multiply)))?;
-            check(sys::MatSetOption(jacobian, sys::MAT_SYMMETRIC, 1))?;
+        let prefix = c_string(prefix)?;
+        let (mut ksp, mut pc, mut search) = (ptr::null_mut(), ptr::null_mut(), ptr::null_mut());
+        let jacobian = symmetric_shell(like, block, multiply)?;
+        // SAFETY: PETSc copies the names; linear solver, preconditioner and line search belong to `raw`.
+        let raw = unsafe {
+            let solver = Reference::new(|raw| sys::SNESCreate(communicator(), raw))?;
+            let raw = solver.get();
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
             // A full step may take the residual up by orders of magnitude while the branches settle.
             check(sys::SNESSetDivergenceTolerance(raw, -1.0))?;
-            let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
             check(sys::SNESGetKSP(raw, &mut ksp))?;
             check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
             check(sys::KSPSetType(ksp, c"preonly".as_ptr()))?;
             check(sys::KSPGetPC(ksp, &mut pc))?;
             check(sys::PCSetType(pc, c"shell".as_ptr()))?;
             check(sys::PCShellSetApply(pc, Some(solve_jacobian)))?;
-            snes.preconditioner = pc;
             check(sys::SNESGetLineSearch(raw, &mut search))?;
             check(sys::SNESLineSearchSetType(search, c"bt".as_ptr()))?;
-            Ok(snes)
-        }
+            solver
+        };
+        Ok(Self { raw, jacobian, preconditioner: pc, residual: like.like()? })
     }
 
     /// Takes every step in full, or searches along it for a decrease of the residual.
@@ -144,7 +119,7 @@ impl Snes {
         let mut line_search = ptr::null_mut();
         // SAFETY: live object, which owns its line search; the names are static.
         unsafe {
-            check(sys::SNESGetLineSearch(self.raw, &mut line_search))?;
+            check(sys::SNESGetLineSearch(self.raw.get(), &mut line_search))?;
             check(sys::SNESLineSearchSetType(line_search, if search { c"bt" } else { c"basic" }.as_ptr()))
         }
     }
@@ -152,7 +127,7 @@ impl Snes {
     /// Lets PETSc options override what was set.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
-        check(unsafe { sys::SNESSetFromOptions(self.raw) })
+        check(unsafe { sys::SNESSetFromOptions(self.raw.get()) })
     }
 
     /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.
@@ -168,46 +143,29 @@ impl Snes {
         iterations: usize,
     ) -> Result<NonlinearOutcome> {
         let callback = Callback::new(problem);
-        let pointer = callback.pointer();
-        let unlimited = sys::PetscInt::MAX;
+        let (raw, jacobian, pointer) = (self.raw.get(), self.jacobian.get(), callback.pointer());
+        let (iterations, unlimited) = (index(iterations, "Newton iterations")?, sys::PetscInt::MAX);
         // SAFETY: the context lives on this frame until after SNESSolve; PETSc calls the trampolines only inside
         // SNESSolve, and the context is detached before the frame ends.
         let code = unsafe {
-            check(sys::SNESSetFunction(self.raw, self.residual.raw, Some(residual), pointer))?;
-            check(sys::SNESSetJacobian(self.raw, self.jacobian, self.jacobian, Some(linearise), pointer))?;
-            check(sys::MatShellSetContext(self.jacobian, pointer))?;
+            check(sys::SNESSetFunction(raw, self.residual.raw.get(), Some(residual), pointer))?;
+            check(sys::SNESSetJacobian(raw, jacobian, jacobian, Some(linearise), pointer))?;
+            check(sys::MatShellSetContext(jacobian, pointer))?;
             check(sys::PCShellSetContext(self.preconditioner, pointer))?;
-            check(sys::SNESSetTolerances(
-                self.raw,
-                absolute,
-                relative,
-                0.0,
-                index(iterations, "Newton iterations")?,
-                unlimited,
-            ))?;
-            let code = sys::SNESSolve(self.raw, ptr::null_mut(), x.raw);
-            check(sys::MatShellSetContext(self.jacobian, ptr::null_mut()))?;
+            check(sys::SNESSetTolerances(raw, absolute, relative, 0.0, iterations, unlimited))?;
+            let code = sys::SNESSolve(raw, ptr::null_mut(), x.raw.get());
+            check(sys::MatShellSetContext(jacobian, ptr::null_mut()))?;
             check(sys::PCShellSetContext(self.preconditioner, ptr::null_mut()))?;
             code
         };
         callback.finish()?;
         check(code)?;
-        NonlinearOutcome::of(self.raw)
+        NonlinearOutcome::of(raw)
     }
 
     /// The residual at the end of the last solve.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
-    }
-}
-
-impl Drop for Snes {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference to each.
-        unsafe {
-            sys::MatDestroy(&mut self.jacobian);
-            sys::SNESDestroy(&mut self.raw);
-        }
     }
 }
 
@@ -217,10 +175,8 @@ unsafe extern "C" fn residual(
     f: sys::Vec,
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
-    // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call. The second view of `f` is
-    // used only after the first is done.
-    let (context, x, mut f, mut spoilt) = unsafe { views(context, x, f) };
-    context.run(|problem| problem.residual(&x, &mut f), || spoil(&mut spoilt))
+    // SAFETY: `solve` passed a pointer to its live context; PETSc's vectors live for the call.
+    unsafe { callback::write::<dyn NonlinearProblem>(context, x, f, |problem, x, f| problem.residual(x, f)) }
 }
 
 unsafe extern "C" fn linearise(
@@ -231,45 +187,23 @@ unsafe extern "C" fn linearise(
     context: *mut c_void,
 ) -> sys::PetscErrorCode {
     // SAFETY: as in `residual`.
-    let (context, x) = unsafe { (&*context.cast::<Context<'_>>(), DistributedVector::view(x)) };
-    context.run(|problem| problem.linearise(&x), || ())
+    let (callback, x) =
+        unsafe { (&*context.cast::<Callback<'_, dyn NonlinearProblem + '_>>(), DistributedVector::view(x)) };
+    x.map_or(USER_ERROR, |x| callback.run(|problem| problem.linearise(&x)))
 }
 
 unsafe extern "C" fn multiply(matrix: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: a live shell matrix; PETSc writes its context pointer.
-    let code = unsafe { sys::MatShellGetContext(matrix, ptr::from_mut(&mut context).cast()) };
-    if code != 0 || context.is_null() {
-        return USER_ERROR;
+    // SAFETY: a live shell matrix; the rest as in `residual`.
+    unsafe {
+        let context = context_of_matrix(matrix);
+        callback::write::<dyn NonlinearProblem>(context, x, y, |problem, x, y| problem.apply_jacobian(x, y))
     }
-    // SAFETY: as in `residual`.
-    let (context, x, mut y, mut spoilt) = unsafe { views(context, x, y) };
-    context.run(|problem| problem.apply_jacobian(&x, &mut y), || spoil(&mut spoilt))
 }
 
 unsafe extern "C" fn solve_jacobian(pc: sys::PC, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: a live shell preconditioner; PETSc writes its context pointer.
-    let code = unsafe { sys::PCShellGetContext(pc, ptr::from_mut(&mut context).cast()) };
-    if code != 0 || context.is_null() {
-        return USER_ERROR;
-    }
-    // SAFETY: as in `residual`.
-    let (context, x, mut y, mut spoilt) = unsafe { views(context, x, y) };
-    context.run(|problem| problem.solve_jacobian(&x, &mut y), || spoil(&mut spoilt))
-}
-
-type View = std::mem::ManuallyDrop<DistributedVector>;
-
-/// The context, the input, and the output twice.
-///
-/// # Safety
-/// `context` must point to a live [`Context`], the vectors must live while the views are used, and the views of the
-/// output must not be used at once.
-unsafe fn views<'a>(context: *mut c_void, x: sys::Vec, y: sys::Vec) -> (&'a Context<'a>, View, View, View) {
-    // SAFETY: the caller's promise.
+    // SAFETY: a live shell preconditioner; the rest as in `residual`.
     unsafe {
-        let view = |raw| DistributedVector::view(raw);
-        (&*context.cast::<Context<'a>>(), view(x), view(y), view(y))
+        let context = context_of_preconditioner(pc);
+        callback::write::<dyn NonlinearProblem>(context, x, y, |problem, x, y| problem.solve_jacobian(x, y))
     }
 }

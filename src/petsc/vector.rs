@@ -1,8 +1,7 @@
-use super::{check, index, library::communicator, sys};
+use super::{check, index, library::communicator, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::{
     marker::PhantomData,
-    mem::ManuallyDrop,
     ops::{Deref, DerefMut},
     ptr,
 };
@@ -12,8 +11,7 @@ use std::{
 /// Values are grouped by node: component `c` of local node `i` is at `i * block + c`.
 #[derive(Debug)]
 pub struct DistributedVector {
-    pub(super) raw: sys::Vec,
-    not_send: PhantomData<*mut ()>,
+    pub(super) raw: Reference<sys::_p_Vec>,
 }
 
 impl DistributedVector {
@@ -21,20 +19,16 @@ impl DistributedVector {
     pub fn ghosted(block: usize, owned: usize, ghosts: &[u32]) -> Result<Self> {
         let ghost_blocks: Vec<sys::PetscInt> =
             ghosts.iter().map(|&g| index(g as usize, "ghost node number")).collect::<Result<_>>()?;
-        let mut raw = ptr::null_mut();
-        // SAFETY: PETSc copies the ghost list; `raw` receives one reference that this handle owns.
-        check(unsafe {
-            sys::VecCreateGhostBlock(
-                communicator(),
-                index(block, "block size")?,
-                index(block * owned, "unknowns of a rank")?,
-                sys::PETSC_DETERMINE,
-                index(ghosts.len(), "ghost nodes of a rank")?,
-                ghost_blocks.as_ptr(),
-                &mut raw,
-            )
-        })?;
-        let mut vector = Self { raw, not_send: PhantomData };
+        let (length, block) = (index(block * owned, "unknowns of a rank")?, index(block, "block size")?);
+        let count = index(ghosts.len(), "ghost nodes of a rank")?;
+        let (all, ghosts) = (sys::PETSC_DETERMINE, ghost_blocks.as_ptr());
+        // SAFETY: PETSc copies the ghost list, which has `count` entries.
+        let raw = unsafe {
+            Reference::new(|raw| {
+                sys::VecCreateGhostBlock(communicator(), block, length, all, count, ghosts, raw)
+            })?
+        };
+        let mut vector = Self { raw };
         vector.fill(0.0)?;
         vector.update_ghosts()?;
         Ok(vector)
@@ -42,46 +36,46 @@ impl DistributedVector {
 
     /// A zero field of the same layout.
     pub fn like(&self) -> Result<Self> {
-        let mut raw = ptr::null_mut();
-        // SAFETY: `self.raw` is alive; `raw` receives one reference that the new handle owns.
-        check(unsafe { sys::VecDuplicate(self.raw, &mut raw) })?;
-        let mut vector = Self { raw, not_send: PhantomData };
+        // SAFETY: live vector.
+        let raw = unsafe { Reference::new(|raw| sys::VecDuplicate(self.raw.get(), raw))? };
+        let mut vector = Self { raw };
         vector.fill(0.0)?;
         Ok(vector)
     }
 
-    /// Views a vector that PETSc owns, for the length of a callback.
+    /// Another handle of a vector that PETSc lends to a callback.
     ///
     /// # Safety
-    /// `raw` must stay alive while the view is used; the view is never dropped.
-    pub(super) unsafe fn view(raw: sys::Vec) -> ManuallyDrop<Self> {
-        ManuallyDrop::new(Self { raw, not_send: PhantomData })
+    /// `raw` is alive.
+    pub(super) unsafe fn view(raw: sys::Vec) -> Result<Self> {
+        // SAFETY: the caller's promise.
+        Ok(Self { raw: unsafe { Reference::to(raw)? } })
     }
 
     /// Owned values, for reading.
     pub fn owned(&self) -> Result<LocalRead<'_>> {
-        LocalRead::of(self.raw, None)
+        LocalRead::of(self.raw.get(), None)
     }
 
     /// Owned values, for writing.
     pub fn owned_mut(&mut self) -> Result<LocalWrite<'_>> {
-        LocalWrite::of(self.raw, None)
+        LocalWrite::of(self.raw.get(), None)
     }
 
     /// Owned values followed by ghost values, for reading.
     pub fn local(&self) -> Result<LocalRead<'_>> {
-        LocalRead::of(self.raw, Some(self.local_form()?))
+        LocalRead::of(self.raw.get(), Some(self.local_form()?))
     }
 
     /// Owned values followed by ghost values, for writing.
     pub fn local_mut(&mut self) -> Result<LocalWrite<'_>> {
-        LocalWrite::of(self.raw, Some(self.local_form()?))
+        LocalWrite::of(self.raw.get(), Some(self.local_form()?))
     }
 
     fn local_form(&self) -> Result<sys::Vec> {
         let mut form = ptr::null_mut();
         // SAFETY: `self.raw` is alive; the form is given back when the guard is dropped.
-        check(unsafe { sys::VecGhostGetLocalForm(self.raw, &mut form) })?;
+        check(unsafe { sys::VecGhostGetLocalForm(self.raw.get(), &mut form) })?;
         if form.is_null() {
             return Err(Error::Internal("a vector without ghost values was asked for them".into()));
         }
@@ -102,40 +96,40 @@ impl DistributedVector {
         // SAFETY: `self.raw` is a live ghosted vector; no array of it is borrowed: guards borrow the handle, which is
         // borrowed mutably here.
         unsafe {
-            check(sys::VecGhostUpdateBegin(self.raw, mode, direction))?;
-            check(sys::VecGhostUpdateEnd(self.raw, mode, direction))
+            check(sys::VecGhostUpdateBegin(self.raw.get(), mode, direction))?;
+            check(sys::VecGhostUpdateEnd(self.raw.get(), mode, direction))
         }
     }
 
     /// Sets every owned value.
     pub fn fill(&mut self, value: f64) -> Result<()> {
         // SAFETY: live vector, no array of which is borrowed, as in all calls below that write.
-        check(unsafe { sys::VecSet(self.raw, value) })
+        check(unsafe { sys::VecSet(self.raw.get(), value) })
     }
 
     /// Copies the owned values of `from`.
     pub fn copy_from(&mut self, from: &Self) -> Result<()> {
         // SAFETY: two live vectors of one layout.
-        check(unsafe { sys::VecCopy(from.raw, self.raw) })
+        check(unsafe { sys::VecCopy(from.raw.get(), self.raw.get()) })
     }
 
     /// Adds `factor * other` to the owned values.
     pub fn add_scaled(&mut self, factor: f64, other: &Self) -> Result<()> {
         // SAFETY: two live vectors of one layout; they differ, as `self` is borrowed mutably.
-        check(unsafe { sys::VecAXPY(self.raw, factor, other.raw) })
+        check(unsafe { sys::VecAXPY(self.raw.get(), factor, other.raw.get()) })
     }
 
     /// Multiplies the owned values.
     pub fn scale(&mut self, factor: f64) -> Result<()> {
         // SAFETY: live vector.
-        check(unsafe { sys::VecScale(self.raw, factor) })
+        check(unsafe { sys::VecScale(self.raw.get(), factor) })
     }
 
     /// Euclidean norm over all ranks. Collective.
     pub fn norm(&self) -> Result<f64> {
         let mut norm = 0.0;
         // SAFETY: live vector and a live number.
-        check(unsafe { sys::VecNorm(self.raw, sys::NORM_2, &mut norm) })?;
+        check(unsafe { sys::VecNorm(self.raw.get(), sys::NORM_2, &mut norm) })?;
         Ok(norm)
     }
 
@@ -143,7 +137,7 @@ impl DistributedVector {
     pub fn equals(&self, other: &Self) -> Result<bool> {
         let mut equal = 0;
         // SAFETY: live vectors and a live PetscBool.
-        check(unsafe { sys::VecEqual(self.raw, other.raw, &mut equal) })?;
+        check(unsafe { sys::VecEqual(self.raw.get(), other.raw.get(), &mut equal) })?;
         Ok(equal != 0)
     }
 
@@ -151,15 +145,8 @@ impl DistributedVector {
     pub fn dot(&self, other: &Self) -> Result<f64> {
         let mut product = 0.0;
         // SAFETY: live vectors and a live number.
-        check(unsafe { sys::VecDot(self.raw, other.raw, &mut product) })?;
+        check(unsafe { sys::VecDot(self.raw.get(), other.raw.get(), &mut product) })?;
         Ok(product)
-    }
-}
-
-impl Drop for DistributedVector {
-    fn drop(&mut self) {
-        // SAFETY: this handle owns one reference.
-        unsafe { sys::VecDestroy(&mut self.raw) };
     }
 }
 

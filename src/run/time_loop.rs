@@ -111,8 +111,8 @@ enum Ended {
     Stopped(String),
 }
 
-struct Run<'a, 'u, const D: usize, const S: usize> {
-    session: &'a Session<'u>,
+struct Run<'a, const D: usize, const S: usize> {
+    session: &'a Session,
     job: &'a Job,
     body: Body<D, S>,
     state: State,
@@ -134,7 +134,7 @@ struct Run<'a, 'u, const D: usize, const S: usize> {
     stepping: (Instant, u64),
 }
 
-impl<const D: usize, const S: usize> Run<'_, '_, D, S> {
+impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Steps to the end, to a request to stop, or to a failure. Collective.
     fn advance(&mut self) -> Result<Ended> {
         let (end, length) = (self.job.time.end, self.job.time.step);

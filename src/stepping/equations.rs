@@ -69,7 +69,7 @@ pub struct ContactEquations<'a, const D: usize> {
     /// Solves with the Jacobian; its constant matrix is `K`.
     pub linear_solver: &'a mut ProjectedKsp,
     /// All ranks.
-    pub session: &'a Session<'a>,
+    pub session: &'a Session,
     /// Whether to fail when the branches of the contact graph come back.
     pub stop_at_cycles: bool,
     /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.

@@ -63,6 +63,7 @@ fn scenario() {
         "linear" => petsc_boundary::solve_linear(&session),
         "petsc_fails_alone" => petsc_boundary::fail_alone(&session),
         "options" => petsc_boundary::set_options(&session),
+        "outlive" => petsc_boundary::outlive(mpi, session),
         "newton" => callbacks::solve_nonlinear(&session),
         "callback_error" => callbacks::fail_on_the_last_rank(&session),
         "callback_panic" => callbacks::panic_on_the_last_rank(&session, &folder),

@@ -3,9 +3,10 @@
 use crate::run_on;
 use clarke::{
     error::Exit,
-    petsc::{BlockRows, DistributedVector, Ksp, Matrix, set_default_option, set_option},
-    session::Session,
+    petsc::{BlockRows, DistributedVector, Ksp, Matrix, Stage, has_option, set_default_option, set_option},
+    session::{Mpi, Session},
 };
+use mpi::environment::is_finalized;
 
 pub const BLOCK: usize = 2;
 
@@ -196,6 +197,49 @@ pub fn set_options(session: &Session) {
     assert_eq!(limited_iterations(session, "asked_"), 2, "PETSc still works after errors");
 }
 
+/// Every way to PETSc that needs no handle fails with words.
+fn assert_refused() {
+    let refused = [
+        DistributedVector::ghosted(1, 1, &[]).err(),
+        Matrix::symmetric(1, &BlockRows { offsets: vec![0], ..BlockRows::default() }).err(),
+        Ksp::new("").err(),
+        Stage::register("late").err(),
+        set_option("late", "1").err(),
+        has_option("late").err(),
+    ];
+    for error in refused {
+        let words = error.expect("an error").to_string();
+        assert!(words.contains("PETSc is not started"), "{words}");
+    }
+}
+
+/// Drops the session and MPI first, then what they were needed for.
+pub fn outlive(mpi: Mpi, session: Session) {
+    std::thread::spawn(assert_refused).join().expect("PETSc belongs to the thread that started it");
+    assert!(mpi.session().is_err(), "PETSc is started once");
+    let matrix = matrix(&session);
+    let (mut x, mut y) = (vector(&session), vector(&session));
+    set(&session, &mut x, |_| 1.0);
+    let mut ksp = Ksp::new("").expect("solver");
+    ksp.set_preconditioner("jacobi", None).expect("jacobi");
+    ksp.set_matrix(&matrix).expect("matrix");
+    let all = share(&session).2;
+    drop(session);
+    drop(mpi);
+    assert!(!is_finalized(), "handles keep MPI");
+    let stage = Stage::register("after the session").expect("handles keep PETSc").enter().expect("stage");
+    matrix.multiply(&x, &mut y).expect("product");
+    let sum: f64 = (0..all * BLOCK).map(|row| product(all, row, |_| 1.0)).sum();
+    assert!((y.dot(&x).expect("dot") - sum).abs() < 1e-9 * sum);
+    drop((ksp, matrix, x));
+    assert!(y.norm().expect("norm") > 0.0);
+    drop(y);
+    assert!(!is_finalized(), "a stage that was entered keeps PETSc");
+    drop(stage);
+    assert!(is_finalized(), "the last of all ends MPI");
+    assert_refused();
+}
+
 #[test]
 fn vectors_exchange_ghosts_both_ways_also_where_a_rank_has_no_nodes() {
     run_on(&[1, 2, 3], "vectors");
@@ -239,4 +283,9 @@ fn a_fault_of_petsc_on_one_rank_ends_those_that_wait_inside_it() {
 #[test]
 fn options_are_heard_in_order_of_rank_and_errors_carry_message_and_trace() {
     run_on(&[1, 2], "options");
+}
+
+#[test]
+fn handles_that_outlive_their_session_keep_petsc_and_without_petsc_there_are_none() {
+    run_on(&[1, 2], "outlive");
 }
