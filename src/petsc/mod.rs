@@ -47,7 +47,7 @@ pub use projected::ProjectedKsp;
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use variational_inequality::{BoundedSnes, UNBOUNDED};
-pub use vector::{DistributedVector, LocalRead, LocalWrite};
+pub use vector::{DistributedVector, Local, LocalRead, LocalWrite};
 
 use crate::error::{Error, Result};
 use std::{

@@ -54,22 +54,22 @@ impl DistributedVector {
 
     /// Owned values, for reading.
     pub fn owned(&self) -> Result<LocalRead<'_>> {
-        LocalRead::of(self.raw.get(), None)
+        Local::of(self.raw.get(), None)
     }
 
     /// Owned values, for writing.
     pub fn owned_mut(&mut self) -> Result<LocalWrite<'_>> {
-        LocalWrite::of(self.raw.get(), None)
+        Local::of(self.raw.get(), None)
     }
 
     /// Owned values followed by ghost values, for reading.
     pub fn local(&self) -> Result<LocalRead<'_>> {
-        LocalRead::of(self.raw.get(), Some(self.local_form()?))
+        Local::of(self.raw.get(), Some(self.local_form()?))
     }
 
     /// Owned values followed by ghost values, for writing.
     pub fn local_mut(&mut self) -> Result<LocalWrite<'_>> {
-        LocalWrite::of(self.raw.get(), Some(self.local_form()?))
+        Local::of(self.raw.get(), Some(self.local_form()?))
     }
 
     fn local_form(&self) -> Result<sys::Vec> {
@@ -158,69 +158,40 @@ fn length(raw: sys::Vec) -> Result<usize> {
 }
 
 /// Values of a vector on this rank, borrowed for reading.
-#[derive(Debug)]
-pub struct LocalRead<'v> {
-    raw: sys::Vec,
-    form: Option<sys::Vec>,
-    pointer: *const f64,
-    length: usize,
-    vector: PhantomData<&'v DistributedVector>,
-}
-
-impl LocalRead<'_> {
-    fn of(raw: sys::Vec, form: Option<sys::Vec>) -> Result<Self> {
-        let source = form.unwrap_or(raw);
-        let mut pointer = ptr::null();
-        // SAFETY: live vector; the array is given back on drop.
-        check(unsafe { sys::VecGetArrayRead(source, &mut pointer) })?;
-        Ok(Self { raw, form, pointer, length: length(source)?, vector: PhantomData })
-    }
-}
-
-impl Deref for LocalRead<'_> {
-    type Target = [f64];
-    fn deref(&self) -> &[f64] {
-        if self.length == 0 {
-            return &[];
-        }
-        // SAFETY: PETSc gave `length` values at `pointer`, valid until the array is restored on drop.
-        unsafe { std::slice::from_raw_parts(self.pointer, self.length) }
-    }
-}
-
-impl Drop for LocalRead<'_> {
-    fn drop(&mut self) {
-        // SAFETY: gives back what `of` and `local_form` took, in the opposite order.
-        unsafe {
-            sys::VecRestoreArrayRead(self.form.unwrap_or(self.raw), &mut self.pointer);
-            if let Some(form) = self.form.as_mut() {
-                sys::VecGhostRestoreLocalForm(self.raw, form);
-            }
-        }
-    }
-}
+pub type LocalRead<'v> = Local<'v, false>;
 
 /// Values of a vector on this rank, borrowed for writing.
+pub type LocalWrite<'v> = Local<'v, true>;
+
+/// Values of a vector on this rank, given back on drop.
 #[derive(Debug)]
-pub struct LocalWrite<'v> {
+pub struct Local<'v, const WRITABLE: bool> {
     raw: sys::Vec,
     form: Option<sys::Vec>,
     pointer: *mut f64,
     length: usize,
-    vector: PhantomData<&'v mut DistributedVector>,
+    vector: PhantomData<&'v DistributedVector>,
 }
 
-impl LocalWrite<'_> {
+impl<const WRITABLE: bool> Local<'_, WRITABLE> {
+    /// Values of a live vector, or of its local form; of a handle that is borrowed mutably for the guard's life if they are
+    /// writable.
     fn of(raw: sys::Vec, form: Option<sys::Vec>) -> Result<Self> {
         let source = form.unwrap_or(raw);
         let mut pointer = ptr::null_mut();
-        // SAFETY: live vector, borrowed mutably through its handle; the array is given back on drop.
-        check(unsafe { sys::VecGetArray(source, &mut pointer) })?;
+        // SAFETY: live vector; the array is given back on drop.
+        check(unsafe {
+            if WRITABLE {
+                sys::VecGetArray(source, &mut pointer)
+            } else {
+                sys::VecGetArrayRead(source, ptr::from_mut(&mut pointer).cast())
+            }
+        })?;
         Ok(Self { raw, form, pointer, length: length(source)?, vector: PhantomData })
     }
 }
 
-impl Deref for LocalWrite<'_> {
+impl<const WRITABLE: bool> Deref for Local<'_, WRITABLE> {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         if self.length == 0 {
@@ -241,11 +212,16 @@ impl DerefMut for LocalWrite<'_> {
     }
 }
 
-impl Drop for LocalWrite<'_> {
+impl<const WRITABLE: bool> Drop for Local<'_, WRITABLE> {
     fn drop(&mut self) {
+        let source = self.form.unwrap_or(self.raw);
         // SAFETY: gives back what `of` and `local_form` took, in the opposite order.
         unsafe {
-            sys::VecRestoreArray(self.form.unwrap_or(self.raw), &mut self.pointer);
+            if WRITABLE {
+                sys::VecRestoreArray(source, &mut self.pointer);
+            } else {
+                sys::VecRestoreArrayRead(source, ptr::from_mut(&mut self.pointer).cast());
+            }
             if let Some(form) = self.form.as_mut() {
                 sys::VecGhostRestoreLocalForm(self.raw, form);
             }
