@@ -46,7 +46,7 @@ pub fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
 /// Errors against what they cost, of a norm of which two runs are known.
 fn costs(results: &Results, norm: usize, shown: &NormResult) -> Result<Vec<Picture>> {
     let seconds = |run: &RunResult| run.seconds.map(|seconds| seconds.computing);
-    let work = |run: &RunResult| Some((run.unknowns * run.steps) as f64);
+    let work = |run: &RunResult| Some(run.counts.work() as f64);
     let by_time = curves(results, norm, seconds);
     if by_time.iter().map(|curve| curve.points.len()).sum::<usize>() < 2 {
         return Ok(Vec::new());
@@ -204,7 +204,7 @@ fn over_time(
     let chart =
         Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
     let worst = chosen.iter().map(|run| {
-        format!("{} ({} steps) largest at t = {} s", run.name, run.steps, size(run.places[norm].worst))
+        format!("{} ({} steps) largest at t = {} s", run.name, run.counts.steps, size(run.places[norm].worst))
     });
     let worst = worst.collect::<Vec<_>>().join("; ");
     Ok(Some(Picture::new(

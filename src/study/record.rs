@@ -27,6 +27,21 @@ pub struct Record {
     pub dimension: usize,
     /// Cells of the mesh.
     pub cells: u64,
+    /// What it took.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Effects that were simulated.
+    pub effects: Vec<String>,
+    /// Wall seconds of each repetition.
+    pub seconds: Vec<Seconds>,
+    /// Digests of the files that errors are computed from.
+    pub files: BTreeMap<String, String>,
+}
+
+/// What a run took, as its `summary.json` counts it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Counts {
     /// Velocity components that are solved for.
     pub unknowns: u64,
     /// Steps taken.
@@ -39,12 +54,13 @@ pub struct Record {
     pub newton_iterations: u64,
     /// Linear iterations.
     pub linear_iterations: u64,
-    /// Effects that were simulated.
-    pub effects: Vec<String>,
-    /// Wall seconds of each repetition.
-    pub seconds: Vec<Seconds>,
-    /// Digests of the files that errors are computed from.
-    pub files: BTreeMap<String, String>,
+}
+
+impl Counts {
+    /// Unknowns times steps.
+    pub fn work(&self) -> u64 {
+        self.unknowns * self.steps
+    }
 }
 
 /// Wall seconds of a run.
@@ -67,12 +83,7 @@ impl Record {
             error: None,
             dimension: 0,
             cells: 0,
-            unknowns: 0,
-            steps: 0,
-            rejected_steps: 0,
-            set_ups: 0,
-            newton_iterations: 0,
-            linear_iterations: 0,
+            counts: Counts::default(),
             effects: Vec::new(),
             seconds: Vec::new(),
             files: BTreeMap::new(),
@@ -94,12 +105,7 @@ impl Record {
         let seconds = |key: &str| summary["wall_seconds"][key].as_f64().unwrap_or(0.0);
         self.dimension = count("dimension") as usize;
         self.cells = count("cells");
-        self.unknowns = count("unknowns");
-        self.steps = count("steps");
-        self.rejected_steps = count("rejected_steps");
-        self.set_ups = count("set_ups");
-        self.newton_iterations = count("newton_iterations");
-        self.linear_iterations = count("linear_iterations");
+        self.counts = Counts::deserialize(&summary).map_err(|error| Error::unreadable(&path, error))?;
         let names = summary["effects"].as_array().into_iter().flatten();
         self.effects = names.filter_map(|name| name.as_str().map(str::to_owned)).collect();
         let total = seconds("total");

@@ -3,7 +3,7 @@
 use super::{
     measure::{Measured, Place},
     orders::Refined,
-    record::Seconds,
+    record::{Counts, Seconds},
 };
 use serde::Serialize;
 
@@ -70,18 +70,9 @@ pub struct RunResult {
     pub notes: Vec<String>,
     /// Whether an earlier study left it and it was not run again.
     pub found: bool,
-    /// Velocity components that are solved for.
-    pub unknowns: u64,
-    /// Steps taken.
-    pub steps: u64,
-    /// Steps taken back.
-    pub rejected_steps: u64,
-    /// Preconditioners made.
-    pub set_ups: u64,
-    /// Newton iterations.
-    pub newton_iterations: u64,
-    /// Linear iterations.
-    pub linear_iterations: u64,
+    /// What it took.
+    #[serde(flatten)]
+    pub counts: Counts,
     /// Wall seconds: the best or the median repetition.
     pub seconds: Option<Seconds>,
     /// Wall seconds of all repetitions.

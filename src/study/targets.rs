@@ -40,7 +40,7 @@ fn fastest(runs: &[RunResult], line: &str, norm: usize, target: f64) -> Reached 
         scheme: line.to_owned(),
         run: best.map(|run| run.name.clone()),
         error: best.and_then(error),
-        steps: best.map(|run| run.steps),
+        steps: best.map(|run| run.counts.steps),
         seconds: best.and_then(seconds),
         ratio: None,
         ruled_by,

@@ -63,11 +63,11 @@ fn csv(results: &Results) -> String {
         ];
         let seconds = |pick: fn(&super::record::Seconds) -> f64| number(run.seconds.as_ref().map(pick));
         let cost = [
-            run.unknowns.to_string(),
-            run.steps.to_string(),
-            run.rejected_steps.to_string(),
-            run.set_ups.to_string(),
-            (run.unknowns * run.steps).to_string(),
+            run.counts.unknowns.to_string(),
+            run.counts.steps.to_string(),
+            run.counts.rejected_steps.to_string(),
+            run.counts.set_ups.to_string(),
+            run.counts.work().to_string(),
             seconds(|s| s.total),
             seconds(|s| s.computing),
             seconds(|s| s.solve),
@@ -118,7 +118,7 @@ fn markdown(results: &Results, pictures: &[Picture]) -> String {
     if let Some(reference) = &results.reference {
         let cells: Vec<String> = reference.cells.iter().map(u32::to_string).collect();
         let steps = reference.adaptive.map_or(format!("steps of {} s", reference.step), |tolerance| {
-            format!("{} adaptive steps, tolerance {tolerance}", reference.steps)
+            format!("{} adaptive steps, tolerance {tolerance}", reference.counts.steps)
         });
         out.push_str(&format!(
             "Reference: {} with {} cells and {steps}.\n\n",
