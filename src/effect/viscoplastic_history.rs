@@ -185,10 +185,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
     }
 
     fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(histories) = self.stress.last_three(batch.number) else { return };
-        let cells = (batch.cells, &batch.integrity);
-        error.add_history(law.elasticity(), cells, &batch.strain, curvature, histories);
+        error.add_flow(&self.laws, &self.stress, curvature, batch);
     }
 
     fn keep_earlier(&mut self) {
