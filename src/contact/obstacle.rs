@@ -145,15 +145,15 @@ fn to_sphere<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, radius: f64
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn numbers(values: &[f64]) -> Vec<Scalar> {
+    pub fn numbers(values: &[f64]) -> Vec<Scalar> {
         values.iter().map(|&value| Scalar::Number(value)).collect()
     }
 
-    fn expression(text: &str) -> Scalar {
+    pub fn expression(text: &str) -> Scalar {
         Scalar::Expression(crate::job::Expression::parse(text).unwrap())
     }
 

@@ -156,14 +156,7 @@ fn in_plane<const D: usize>(vector: &Vector<3>) -> Vector<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn numbers(values: &[f64]) -> Vec<Scalar> {
-        values.iter().map(|&value| Scalar::Number(value)).collect()
-    }
-
-    fn expression(text: &str) -> Scalar {
-        Scalar::Expression(crate::job::Expression::parse(text).unwrap())
-    }
+    use crate::contact::obstacle::tests::{expression, numbers};
 
     const STEP: Rate = Rate { time: 0.5, before: [[0.25, 4.0], [0.0; 2]] };
 
