@@ -43,7 +43,7 @@ pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
 pub use matrix::{BlockRows, Matrix};
-pub use projected::ProjectedKsp;
+pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use variational_inequality::{BoundedSnes, UNBOUNDED};

@@ -46,9 +46,9 @@ const INDEFINITE: [i32; 2] = [-8, -10];
 /// PETSc's reason for a solve that has used up its iterations.
 const TOO_MANY: i32 = -3;
 
-/// Directions that a subspace lacks, from which on it has a preconditioner of its own: below, that of the constant matrix
-/// needs as many more iterations at most.
-const WORTH: f64 = 16.0;
+/// Directions that a subspace lacks, from which on a preconditioner is made for it alone: below, that of the whole space needs as
+/// many more iterations at most.
+pub const MISSING_DIRECTIONS: f64 = 16.0;
 
 /// A solve of no iterations.
 const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, residual: f64::INFINITY };
@@ -157,7 +157,7 @@ impl ProjectedKsp {
             return Ok([stale && self.reducing, false]);
         }
         // What a step starts with depends on its own subspace alone, not on steps before, which a restart does not know.
-        let worth = reduced.removed()? >= WORTH;
+        let worth = reduced.removed()? >= MISSING_DIRECTIONS;
         if worth && stale {
             self.refresh()?;
         } else if !worth && self.reducing {

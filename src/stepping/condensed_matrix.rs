@@ -4,14 +4,10 @@ use super::equations::StepMatrix;
 use crate::{
     error::Result,
     exchange::Gathering,
-    petsc::{DenseCholesky, DistributedVector, times_own_transpose},
+    petsc::{DenseCholesky, DistributedVector, MISSING_DIRECTIONS, times_own_transpose},
 };
 use mpi::topology::SimpleCommunicator;
 use std::{cell::RefCell, ops::Range};
-
-/// Directions that a subspace lacks, from which on its preconditioner is made for it alone: below, that of the whole space
-/// needs as many more iterations at most.
-const WORTH: f64 = 16.0;
 
 /// A motion of one contact node that laws see: one scalar unknown.
 #[derive(Debug, Clone, PartialEq)]
@@ -295,7 +291,7 @@ impl StepMatrix for CondensedMatrix {
             removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();
             first += count * count;
         }
-        subspace.in_use = removed.round() >= WORTH;
+        subspace.in_use = removed.round() >= MISSING_DIRECTIONS;
         if !subspace.in_use || (subspace.factor.is_some() && subspace.made_for == *blocks) {
             return Ok(false);
         }
