@@ -47,8 +47,7 @@ impl Flow {
     fn hand_over(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
         let forces = self.forces.owned()?;
-        let targets = out.owned_mut()?;
-        let mut targets = targets;
+        let mut targets = out.owned_mut()?;
         let free = targets.iter_mut().zip(forces.iter()).zip(fixed).filter(|(_, fixed)| !**fixed);
         free.for_each(|((target, force), _)| *target += force);
         Ok(())
