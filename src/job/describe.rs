@@ -2,13 +2,11 @@
 
 use serde_json::Value;
 
-use super::available;
 use super::nearest::nearest;
 use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
 
 const WIDTH: usize = 100;
-const NOT_YET: &str = " Not available yet.";
 
 /// A table of the document and its keys.
 struct Table {
@@ -103,9 +101,6 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
     if required {
         meaning.push_str(" Required.");
     }
-    if available::is_unavailable(path, None) {
-        meaning.push_str(NOT_YET);
-    }
     let tagged = body.tagged();
     let at = all.len();
     let mut keys = Vec::new();
@@ -128,13 +123,13 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
         {
             collect(&format!("{path}.{key}"), inner, required, all);
         } else {
-            keys.push((key, key_text(path, key, inner, branch, required)));
+            keys.push((key, key_text(key, inner, branch, required)));
         }
     }
     if let Some(free) = body.items().filter(|items| items.accepts("object")) {
         for (key, inner) in free.properties() {
             let required = free.required().any(|name| name == key);
-            keys.push((key, key_text(path, key, inner, None, required)));
+            keys.push((key, key_text(key, inner, None, required)));
         }
         meaning.push_str(&format!(" Each: [{path}.\"name\"] or \"name\" = {{ .. }}."));
     }
@@ -156,7 +151,7 @@ impl Table {
     }
 }
 
-fn key_text(path: &str, key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
+fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
     let mut facts = vec![kind(schema)];
     let range = range(schema.items().filter(|_| schema.accepts("array")).unwrap_or(schema));
     if range != "any number" {
@@ -173,17 +168,13 @@ fn key_text(path: &str, key: &str, schema: Schema, branch: Option<Schema>, requi
     text.push_str(&wrapped(&flat(meaning.unwrap_or_default()), 6));
     for choice in schema.alternatives() {
         if let (Some(word), Some(meaning)) = (choice.text("const"), choice.text("description")) {
-            text.push_str(&wrapped(&format!("\"{word}\": {}{}", flat(meaning), not_yet(path, key, word)), 8));
+            text.push_str(&wrapped(&format!("\"{word}\": {}", flat(meaning)), 8));
         }
     }
     for example in schema.get("examples").as_array().into_iter().flatten() {
         text.push_str(&format!("      example: {key} = {}\n", toml(example)));
     }
     text
-}
-
-fn not_yet(path: &str, key: &str, word: &str) -> &'static str {
-    if available::is_unavailable(&format!("{path}.{key}"), Some(word)) { NOT_YET } else { "" }
 }
 
 /// What may stand here, in words.

@@ -10,7 +10,7 @@ use super::report::{Fault, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
 use super::source::{Node, Place, parse};
-use super::{Job, Mesh, available, set, validate};
+use super::{Job, Mesh, set, validate};
 use crate::error::{Error, Result};
 
 /// Longest file in bytes.
@@ -94,7 +94,6 @@ impl Loaded {
         let findings = semantic::check(&document.root);
         document.faults.extend(findings.faults);
         let warnings = findings.warnings;
-        document.faults.extend(available::faults(&document.root));
         let (mut job, root, texts) = document.fill::<Job>()?;
         job.resolve_paths(folder, Path::new(name));
         Ok(Self { job, warnings, root, texts })

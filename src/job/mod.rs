@@ -1,10 +1,9 @@
 //! The job: a TOML document that says everything about a run.
 //!
 //! A document is parsed with the place of every key (`source`), changed by overrides (`set`), held against
-//! the schema of the structs (`validate`), against itself (`semantic`) and against what is built
-//! (`available`). All faults come in one report (`report`); only a document without any becomes a [`Job`].
+//! the schema of the structs (`validate`) and against itself (`semantic`). All faults come in one report
+//! (`report`); only a document without any becomes a [`Job`].
 
-mod available;
 mod describe;
 mod document;
 mod effective;
