@@ -193,7 +193,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// make in it, of this rank, given the displacement at the end.
     pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
         let mut error = StressError::default();
-        let state = SurfaceState { displacement, velocity: displacement, contact_traction: None };
+        let state = SurfaceState { displacement, velocity: displacement };
         self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, state, &mut error));
         let Some(needs) = self.needs(|p| p.error) else { return error };
         // Those that weaken before the others.
@@ -327,8 +327,6 @@ fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
 fn with_surface(state: &State, body: impl FnOnce(SurfaceState<'_>)) -> Result<()> {
     let displacement = state.displacement.local()?;
     let velocity = state.velocity.local()?;
-    let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
-    let contact_traction = traction.as_deref();
-    body(SurfaceState { displacement: &displacement, velocity: &velocity, contact_traction });
+    body(SurfaceState { displacement: &displacement, velocity: &velocity });
     Ok(())
 }

@@ -80,7 +80,7 @@ pub fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is at most `size`, which is above zero.
-pub fn round_below(size: f64) -> f64 {
+fn round_below(size: f64) -> f64 {
     let power = 10f64.powf(size.log10().floor());
     let leading = size / power;
     power * [5.0, 2.0].into_iter().find(|digit| leading >= *digit - 1e-9).unwrap_or(1.0)

@@ -1,15 +1,12 @@
 use super::{Curvature, Energy, History, Step, StressError};
 
-/// Nodal fields of the converged state, `D` values a node, with ghosts where not said otherwise.
+/// Nodal fields of the converged state with ghosts, `D` values a node.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfaceState<'a> {
     /// Displacement in m.
     pub displacement: &'a [f64],
     /// Velocity in m/s.
     pub velocity: &'a [f64],
-    /// Traction of nodal contacts in Pa at owned nodes, if there are any: see
-    /// [`crate::state::State::contact_traction`].
-    pub contact_traction: Option<&'a [f64]>,
 }
 
 /// An effect at nodes of boundaries, explicit in time: it acts on the equations by force alone.

@@ -2,6 +2,7 @@
 
 use super::hanging::refuse_hanging_nodes;
 use super::shape::{self, longest_edge};
+#[cfg(test)]
 use super::surface::Topology;
 use super::tags::{Tags, place};
 use super::{GlobalMesh, Mesh};
@@ -31,14 +32,15 @@ pub struct Quality {
 
 /// Refuses a mesh with node ids that do not exist, coordinates that are not finite, degenerate or inverted or
 /// overlapping cells, coincident nodes or hanging nodes; otherwise tells which cells share facets.
-pub fn validate<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<Topology<D>> {
+#[cfg(test)]
+pub(super) fn validate<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<Topology<D>> {
     cells(mesh, tags)?;
     let topology = Topology::new(&mesh.cells, mesh.nodes.len(), tags)?;
     nodes(mesh, tags)?;
     Ok(topology)
 }
 
-/// The part of [`validate`] that looks at each cell alone.
+/// Refuses node ids that do not exist, coordinates that are not finite, and degenerate or inverted cells.
 pub(super) fn cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
     if let Some(at) = mesh.cells.iter().position(|&node| node as usize >= mesh.nodes.len()) {
         return Err(Error::Refused(format!("{} has a node that does not exist", tags.cell(at / (D + 1)))));
@@ -83,7 +85,7 @@ pub(super) fn cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
     )))
 }
 
-/// The part of [`validate`] that looks at where nodes lie: coincident and hanging nodes.
+/// Refuses coincident and hanging nodes.
 pub(super) fn nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
     refuse_coincident_nodes(mesh, tags)?;
     refuse_hanging_nodes(mesh, tags)
@@ -120,10 +122,12 @@ fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) ->
     Ok(())
 }
 
+#[cfg(test)]
 impl<const D: usize> GlobalMesh<D> {
     /// The shape qualities of all cells in short; of an empty mesh, none is poor.
-    pub fn quality_summary(&self) -> Quality {
-        Quality::of((0..self.cell_count()).map(|cell| (cell, self.quality(cell))))
+    pub(super) fn quality_summary(&self) -> Quality {
+        let quality = |cell| (cell, shape::quality(&self.corners(cell)[..=D]));
+        Quality::of((0..self.cell_count()).map(quality))
     }
 }
 

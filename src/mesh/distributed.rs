@@ -42,8 +42,6 @@ pub struct Mesh<const D: usize> {
     pub cells: Vec<u32>,
     /// Original ids of the cells, ascending.
     pub cell_ids: Vec<u32>,
-    /// Position of the first cell when the cells of all ranks stand one after another.
-    pub first_cell: usize,
     /// Cells over all ranks.
     pub total_cells: usize,
     /// Index into `regions`, one a cell.
@@ -173,7 +171,6 @@ impl<const D: usize> Mesh<D> {
             ghosts: ghost_numbers,
             node_starts,
             cells: piece.cells.iter().map(|&node| local[node as usize]).collect(),
-            first_cell: session.share_start(piece.cell_ids.len()),
             total_cells: session.total(piece.cell_ids.len()),
             cell_ids: piece.cell_ids,
             cell_regions: piece.cell_regions,

@@ -1,27 +1,8 @@
-//! Boundaries by the names jobs use.
+//! Facets that a job claims twice.
 
+use super::Mesh;
 use super::shape::centroid;
 use super::tags::place;
-use super::{Boundary, GlobalMesh, Mesh};
-use crate::error::{Error, Result};
-
-impl<const D: usize> GlobalMesh<D> {
-    /// The boundary with this name; otherwise the nearest name and all there are.
-    pub fn boundary(&self, name: &str) -> Result<&Boundary> {
-        self.boundaries.iter().find(|boundary| boundary.name == name).ok_or_else(|| {
-            unknown("boundary", name, self.boundaries.iter().map(|boundary| boundary.name.as_str()))
-        })
-    }
-
-    /// The position in `regions` of the region with this name; otherwise the nearest name and all there are.
-    pub fn region(&self, name: &str) -> Result<u16> {
-        self.regions
-            .iter()
-            .position(|region| region == name)
-            .map(|at| at as u16)
-            .ok_or_else(|| unknown("region", name, self.regions.iter().map(String::as_str)))
-    }
-}
 
 /// Facets of this rank that belong to a boundary with a support and to one with contact: their motion would be prescribed
 /// and unknown at once.
@@ -65,51 +46,13 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str>) -> Error {
-    let known: Vec<&str> = known.collect();
-    if known.is_empty() {
-        return Error::Refused(format!(
-            "the mesh has no {kind} `{name}`: it names none at all. Give its facets physical groups in Gmsh"
-        ));
-    }
-    let nearest = known
-        .iter()
-        .map(|candidate| (strsim::normalized_damerau_levenshtein(name, candidate), candidate))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(likeness, _)| *likeness >= 0.5)
-        .map(|(_, candidate)| format!(" Did you mean `{candidate}`?"));
-    Error::Refused(format!(
-        "the mesh has no {kind} `{name}`.{} It has: {}",
-        nearest.unwrap_or_default(),
-        known.join(", ")
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::generate::{Diagonal, rectangle};
-
-    #[test]
-    fn a_misspelt_boundary_gets_the_nearest_name_and_the_list() {
-        let mesh = rectangle([1.0, 1.0], [2, 2], Diagonal::Right, [1.0; 2]).unwrap();
-        assert_eq!(mesh.boundary("top").unwrap().name, "top");
-        let error = mesh.boundary("botom").unwrap_err().to_string();
-        assert!(error.contains("Did you mean `bottom`? It has: left, right, bottom, top"), "{error}");
-        let error = mesh.boundary("xyz").unwrap_err().to_string();
-        assert!(!error.contains("Did you mean"), "{error}");
-        assert_eq!(mesh.region("body").unwrap(), 0);
-        assert!(
-            mesh.region("bodi").unwrap_err().to_string().contains("no region `bodi`. Did you mean `body`?")
-        );
-    }
-
-    #[test]
-    fn a_mesh_without_names_says_so() {
-        let mut mesh = rectangle([1.0, 1.0], [1, 1], Diagonal::Right, [1.0; 2]).unwrap();
-        mesh.boundaries.clear();
-        assert!(mesh.boundary("left").unwrap_err().to_string().contains("names none at all"));
-    }
+    use crate::mesh::{
+        GlobalMesh,
+        generate::{Diagonal, rectangle},
+    };
 
     #[test]
     fn facets_with_support_and_contact_are_found_with_both_names() {

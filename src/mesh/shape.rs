@@ -117,11 +117,6 @@ impl<const D: usize> GlobalMesh<D> {
         centroid(&self.corners(cell)[..=D])
     }
 
-    /// Shape quality of a cell, see [`quality`].
-    pub fn quality(&self, cell: usize) -> f64 {
-        quality(&self.corners(cell)[..=D])
-    }
-
     /// The corners of a facet (m).
     pub fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
         self.facets[facet].map(|node| self.nodes[node as usize])

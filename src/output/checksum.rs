@@ -22,7 +22,7 @@ pub fn table_checksum(
 /// The part of these rows in the checksum of their table: parts add up, wrapping at 2^64.
 ///
 /// `values` holds `width` numbers for each of `ids`.
-pub fn rows_checksum(ids: &[u64], width: usize, values: &[f64]) -> u64 {
+fn rows_checksum(ids: &[u64], width: usize, values: &[f64]) -> u64 {
     let mut row = vec![0_u8; width * size_of::<f64>()];
     let mut sum = 0_u64;
     for (position, id) in ids.iter().enumerate() {
@@ -36,7 +36,7 @@ pub fn rows_checksum(ids: &[u64], width: usize, values: &[f64]) -> u64 {
 }
 
 /// The part of a table's name and width in its checksum.
-pub fn title_checksum(name: &str, width: usize) -> u64 {
+fn title_checksum(name: &str, width: usize) -> u64 {
     let mut hash = Xxh3::new();
     hash.update(name.as_bytes());
     hash.update(&(width as u64).to_le_bytes());

@@ -110,7 +110,7 @@ impl<'a, const D: usize> Pair<'a, D> {
 
 /// The squares over pieces of two meshes, exact for fields that are linear (vectors) or constant (tensors) in each cell; each
 /// is added with its cell of the first mesh.
-pub fn over_pieces<const D: usize>(
+fn over_pieces<const D: usize>(
     space: Space,
     (one_mesh, one): (&StoredMesh<D>, &Values<D>),
     (other_mesh, other): (&StoredMesh<D>, &Values<D>),

@@ -37,11 +37,6 @@ impl Scalar {
         }
     }
 
-    /// Whether it has the same value everywhere and always.
-    pub fn is_constant(&self) -> bool {
-        !self.depends_on_time() && !self.depends_on_position()
-    }
-
     /// Whether t occurs in it.
     pub fn depends_on_time(&self) -> bool {
         self.uses(Variable::T)
