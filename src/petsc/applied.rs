@@ -13,10 +13,9 @@ impl Ksp {
     /// GMRES: V-cycles of multigrid with Chebyshev's smoother, without the coarsest level, or a factor twice. `None`
     /// for all else.
     pub fn bytes_applied(&self, ranks: usize) -> Result<Option<u64>> {
-        let (mut pc, mut kind, mut method) = (ptr::null_mut(), ptr::null(), ptr::null());
+        let (pc, mut kind, mut method) = (self.preconditioner()?, ptr::null(), ptr::null());
         // SAFETY: live solver; names and preconditioner are its own.
         unsafe {
-            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             check(sys::PCGetType(pc, &mut kind))?;
             check(sys::KSPGetType(self.raw.get(), &mut method))?;
         }

@@ -83,14 +83,21 @@ impl Ksp {
     /// is that of the preconditioned residual.
     pub(super) fn sharing_preconditioner(&self, prefix: &str, method: &str) -> Result<Self> {
         let other = Self::new(prefix)?;
-        let (mut pc, method) = (ptr::null_mut(), c_string(method)?);
+        let (pc, method) = (self.preconditioner()?, c_string(method)?);
         // SAFETY: live objects; PETSc counts its own reference to the shared preconditioner, copies the name.
         unsafe {
-            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             check(sys::KSPSetPC(other.raw.get(), pc))?;
             check(sys::KSPSetType(other.raw.get(), method.as_ptr()))?;
         }
         Ok(other)
+    }
+
+    /// The preconditioner, which belongs to the solver.
+    pub(super) fn preconditioner(&self) -> Result<sys::PC> {
+        let mut pc = ptr::null_mut();
+        // SAFETY: live object.
+        check(unsafe { sys::KSPGetPC(self.raw.get(), &mut pc) })?;
+        Ok(pc)
     }
 
     /// Solves with this matrix, which also makes the preconditioner.
@@ -116,11 +123,9 @@ impl Ksp {
 
     /// Preconditioner by PETSc's name, with the package that factors if it is a factorisation.
     pub fn set_preconditioner(&mut self, name: &str, package: Option<&str>) -> Result<()> {
-        let name = c_string(name)?;
-        let mut pc = ptr::null_mut();
-        // SAFETY: the preconditioner belongs to the live solver; PETSc copies the names.
+        let (name, pc) = (c_string(name)?, self.preconditioner()?);
+        // SAFETY: live object; PETSc copies the names.
         unsafe {
-            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
             check(sys::PCSetType(pc, name.as_ptr()))?;
             if let Some(package) = package {
                 check(sys::PCFactorSetMatSolverType(pc, c_string(package)?.as_ptr()))?;
@@ -159,13 +164,10 @@ impl Ksp {
 
     /// Sets up the preconditioner now; to be called after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
-        let mut pc = ptr::null_mut();
-        // SAFETY: live object, which owns its preconditioner.
-        unsafe {
-            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
-            levels::give_back(pc, &self.levels)?;
-            check(sys::KSPSetUp(self.raw.get()))?;
-        }
+        let pc = self.preconditioner()?;
+        levels::give_back(pc, &self.levels)?;
+        // SAFETY: live object.
+        check(unsafe { sys::KSPSetUp(self.raw.get()) })?;
         self.levels = levels::in_single_precision(pc)?;
         Ok(())
     }
@@ -195,12 +197,8 @@ impl Ksp {
 
     /// `z = P^-1 r` with the preconditioner, which must be set up. Collective.
     pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        let mut pc = ptr::null_mut();
-        // SAFETY: the preconditioner belongs to the live solver; the two vectors differ.
-        unsafe {
-            check(sys::KSPGetPC(self.raw.get(), &mut pc))?;
-            check(sys::PCApply(pc, r.raw.get(), z.raw.get()))
-        }
+        // SAFETY: live objects; the two vectors differ.
+        check(unsafe { sys::PCApply(self.preconditioner()?, r.raw.get(), z.raw.get()) })
     }
 
     /// How the last solve ended.

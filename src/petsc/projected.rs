@@ -120,23 +120,21 @@ impl ProjectedKsp {
     /// Takes the operator's own preconditioner from now on.
     pub fn precondition_by_operator(&mut self) -> Result<()> {
         self.ksp.set_preconditioner("shell", None)?;
+        self.own = self.ksp.preconditioner()?;
         // SAFETY: live objects; the preconditioner is only applied inside `solve`, which sets its context.
         unsafe {
             check(sys::KSPSetOperators(self.ksp.raw.get(), self.shell.get(), self.shell.get()))?;
-            check(sys::KSPGetPC(self.ksp.raw.get(), &mut self.own))?;
             check(sys::PCShellSetApply(self.own, Some(precondition)))
         }
     }
 
     fn precondition_with(&mut self, matrix: sys::Mat) -> Result<()> {
         self.fallback = None;
-        let mut pc = ptr::null_mut();
         // SAFETY: live objects; PETSc keeps its own references. Multigrid smooths with its own matrix: the shell can only
         // be multiplied inside `solve`, and is another operator.
         unsafe {
             check(sys::KSPSetOperators(self.ksp.raw.get(), self.shell.get(), matrix))?;
-            check(sys::KSPGetPC(self.ksp.raw.get(), &mut pc))?;
-            check(sys::PCSetUseAmat(pc, 0))?;
+            check(sys::PCSetUseAmat(self.ksp.preconditioner()?, 0))?;
         }
         self.ksp.set_up()
     }
