@@ -2,17 +2,19 @@
 
 use super::Body;
 use crate::{
-    effect::{Blend, Contact, Effect, Energy, Step, Tangents},
+    effect::{Blend, Contact, Effect, Energy, Step, SurfaceEffect, SurfaceStep, Tangents},
+    lanes::Pack,
     mesh::Mesh,
     space::{Batch, Geometry, Needs, Nodal},
     tensor::{Mandel, add_scaled, component, dot, symmetric_part},
 };
 
-/// The cells of a body, apart from its contacts.
+/// The cells of a body and what acts at its surface beside contact.
 pub struct Cells<'a, const D: usize, const S: usize> {
     mesh: &'a Mesh<D>,
     geometry: &'a Geometry<D>,
     effects: &'a mut [Box<dyn Effect<D, S>>],
+    surface_effects: &'a mut [Box<dyn SurfaceEffect<D>>],
     /// One flag a local component: held by a support.
     pub fixed: &'a [bool],
 }
@@ -20,16 +22,24 @@ pub struct Cells<'a, const D: usize, const S: usize> {
 impl<const D: usize, const S: usize> Body<D, S> {
     /// Cells and contacts, to be used side by side.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
-        let Self { mesh, geometry, effects, fixed, contacts, .. } = self;
-        (Cells { mesh, geometry, effects, fixed }, contacts)
+        let Self { mesh, geometry, effects, surface_effects, fixed, contacts, .. } = self;
+        (Cells { mesh, geometry, effects, surface_effects, fixed }, contacts)
     }
 
-    /// Whether cells flow, so that an implicit step is nonlinear.
+    /// Whether implicit steps are nonlinear, contact apart: cells flow or are damaged, or something else acts at the surface.
     pub fn flows(&self) -> bool {
-        self.effects.iter().any(|effect| effect.flows())
+        self.surface_effects.iter().any(|effect| effect.is_implicit())
+            || self.effects.iter().any(|effect| effect.flows())
     }
 
-    /// Adds the forces of the state that a step starts from to `forces` (with ghosts). Gives the sum of the squares of the
+    /// Names of what may make the forces at the end of an implicit step fall with the displacement, contact apart.
+    pub fn softening(&self) -> impl Iterator<Item = &'static str> {
+        let cells = self.effects.iter().filter(|e| e.flows() && e.phases().weakens).map(|e| e.name());
+        cells.chain(self.surface_effects.iter().filter(|e| e.is_implicit() && e.softens()).map(|e| e.name()))
+    }
+
+    /// Adds the forces of the state that a step starts from to `forces` (with ghosts): `nodal` has the blended displacement, and the
+    /// converged one as that before. Gives the sum of the squares of the
     /// forces of each effect on cells, whose rounding no residual can be less than: large ones may cancel.
     pub fn add_start_forces(
         &mut self,
@@ -39,6 +49,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         forces: &mut [f64],
     ) -> f64 {
         self.effects.iter_mut().for_each(|effect| effect.begin(blend, step.length));
+        let before = nodal.previous_displacement;
+        self.surface_effects.iter_mut().for_each(|effect| effect.begin(blend, step.length, before));
         let Some(needs) = self.needs(|p| p.explicit) else { return 0.0 };
         let (mesh, effects) = (&self.mesh, &mut self.effects);
         let start = Step { length: blend.length, ..step };
@@ -61,12 +73,48 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Energies of a solved step that is not yet committed; writes trial histories.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
-        let needs = Needs { strain: true, strain_before: true, strain_rate: true, ..Needs::default() };
+        let Nodal { displacement: after, previous_displacement: before, velocity, .. } = nodal;
+        for effect in &mut self.surface_effects {
+            effect.advance(after);
+            effect.add_implicit_energy(step, SurfaceStep { before, after, velocity }, energy);
+        }
+        let needs =
+            Needs { strain: true, strain_before: true, strain_rate: true, ..flow_needs(&self.effects) };
         let effects = &mut self.effects;
         Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if needs.elastic_stress {
+                std::mem::swap(&mut batch.strain, &mut batch.strain_before);
+                effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+                std::mem::swap(&mut batch.strain, &mut batch.strain_before);
+                batch.elastic_stress_before = std::mem::replace(&mut batch.elastic_stress, Pack::ZERO);
+            }
+            add_flow(effects, batch, needs, None);
             effects.iter_mut().for_each(|effect| effect.add_implicit_energy(step, batch, energy));
         });
     }
+}
+
+/// What flow and damage at the end of a step need.
+fn flow_needs<const D: usize, const S: usize>(effects: &[Box<dyn Effect<D, S>>]) -> Needs {
+    let elastic_stress = effects.iter().any(|effect| effect.flows() && effect.phases().weakens);
+    Needs { strain: true, elastic_stress, ..Needs::default() }
+}
+
+/// Lets the cells of a batch flow and be damaged; gives whether that changed their stress.
+fn add_flow<const D: usize, const S: usize>(
+    effects: &mut [Box<dyn Effect<D, S>>],
+    batch: &mut Batch<D, S>,
+    needs: Needs,
+    mut tangents: Option<&mut Tangents>,
+) -> bool {
+    if needs.elastic_stress {
+        effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+    }
+    let mut any = false;
+    for effect in effects.iter_mut().filter(|e| e.flows()) {
+        any |= effect.add_flow(batch, tangents.as_deref_mut());
+    }
+    any
 }
 
 impl<const D: usize, const S: usize> Cells<'_, D, S> {
@@ -75,8 +123,8 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         self.effects.iter().all(|effect| effect.has_symmetric_tangent())
     }
 
-    /// Adds the forces of what flow takes from the stress at this displacement to `forces` (both with ghosts); writes trial
-    /// histories and, where they are wanted, the derivatives in place of those before.
+    /// Adds the forces of what flow and damage take from the stress at this displacement, and minus the forces at the surface, to
+    /// `forces` (both with ghosts); writes trial histories and, where they are wanted, the derivatives in place of those before.
     pub fn add_flow(
         &mut self,
         displacement: &[f64],
@@ -89,17 +137,20 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
             velocity: displacement,
             previous_velocity: displacement,
         };
-        let needs = Needs { strain: true, ..Needs::default() };
+        let needs = flow_needs(self.effects);
         let (mesh, effects) = (self.mesh, &mut self.effects);
         if let Some(tangents) = &mut tangents {
             tangents.restart::<S>(mesh.cell_count());
         }
+        for effect in self.surface_effects.iter_mut() {
+            effect.advance(displacement);
+            effect.add_forces(displacement, tangents.as_deref_mut(), forces);
+        }
+        if !effects.iter().any(|effect| effect.flows()) {
+            return;
+        }
         Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-            let mut any = false;
-            for effect in effects.iter_mut().filter(|e| e.flows()) {
-                any |= effect.add_flow(batch, tangents.as_deref_mut());
-            }
-            if any {
+            if add_flow(effects, batch, needs, tangents.as_deref_mut()) {
                 batch.scatter(mesh, forces);
             }
         });
@@ -107,6 +158,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
 
     /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
     pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
+        tangents.add_nodal::<D>(velocity, forces);
         for (number, tangent) in tangents.iter::<S>() {
             let (cell, nodes) = (self.geometry.cell(number), self.mesh.cell(number));
             let mut values = [[0.0; D]; 4];

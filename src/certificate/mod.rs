@@ -142,6 +142,11 @@ impl Certificates {
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
         known.not_covered = not_covered(&body.contacts, known.theta_step, known.slip_pressure_bound);
+        if scheme_is_implicit && known.theta_step.is_some() {
+            known.not_covered.extend(body.softening().map(|name| {
+                format!("{name} at the end of a step may soften the body: theta of a step does not cover it")
+            }));
+        }
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_step_bound();
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;

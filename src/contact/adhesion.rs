@@ -65,13 +65,43 @@ impl Adhesion {
         self.stiffness * square(opening) + self.tangential_stiffness * square(norm(&sliding))
     }
 
-    /// The bonding after a step of this length in s, implicit in the bonding: it never falls below where debonding ends.
-    /// Drive, energy and viscosity may be per area or of a node.
-    pub fn advance(bonding: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> f64 {
-        if bonding * drive <= energy {
-            return bonding;
+    /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
+    pub fn tangent<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> [Vector<D>; D] {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let along = if opening > 0.0 && opening < self.length { self.stiffness } else { 0.0 };
+        let size = norm(&sliding);
+        // Beyond the bond's length only the direction of the traction changes.
+        let (across, radial) = if size > self.length {
+            let across = self.tangential_stiffness * self.length / size;
+            (across, across / (size * size))
+        } else {
+            (self.tangential_stiffness, 0.0)
+        };
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let identity = if i == j { across } else { 0.0 };
+                identity + (along - across) * normal[i] * normal[j] - radial * sliding[i] * sliding[j]
+            })
+        })
+    }
+
+    /// The derivative of [`Adhesion::drive`] by the displacement, in J/m^3.
+    pub fn drive_gradient<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let along = if opening < self.length { -2.0 * self.stiffness * opening } else { 0.0 };
+        let across = if norm(&sliding) > self.length { 0.0 } else { 2.0 * self.tangential_stiffness };
+        add_scaled(&normal.map(|n| along * n), across, &sliding)
+    }
+
+    /// The bonding after a step of implicit Euler of this length in s from `start`: it never falls below where debonding ends; and
+    /// its derivative by the drive. Drive, energy and viscosity may be per area or of a node.
+    pub fn relax(start: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> [f64; 2] {
+        if start * drive <= energy {
+            return [start, 0.0];
         }
-        ((viscosity * bonding + length * energy) / (viscosity + length * drive)).min(bonding)
+        let resistance = viscosity + length * drive;
+        let bonding = ((viscosity * start + length * energy) / resistance).min(start);
+        [bonding, -length * bonding / resistance]
     }
 }
 
@@ -101,10 +131,10 @@ mod tests {
     #[test]
     fn bonds_give_way_by_hand() {
         // Drive 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
-        assert_eq!(Adhesion::advance(1.0, 1.0, 0.5, 2.0, 0.5), 0.9);
-        assert_eq!(Adhesion::advance(1.0, 1.0, 0.5, 0.0, 0.5), 0.5, "without viscosity at once");
-        assert_eq!(Adhesion::advance(0.4, 1.0, 0.5, 2.0, 0.5), 0.4, "the drive is too weak");
-        assert_eq!(Adhesion::advance(0.0, 1e9, 0.0, 2.0, 0.5), 0.0);
+        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 2.0, 0.5), [0.9, -0.18]);
+        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 0.0, 0.5), [0.5, -0.5], "without viscosity at once");
+        assert_eq!(Adhesion::relax(0.4, 1.0, 0.5, 2.0, 0.5), [0.4, 0.0], "the drive is too weak");
+        assert_eq!(Adhesion::relax(0.0, 1e9, 0.0, 2.0, 0.5)[0], 0.0);
     }
 
     #[test]
@@ -114,7 +144,7 @@ mod tests {
         let (steps, end) = (100_000, 5.0);
         for step in 0..steps {
             let u = [0.0, end * f64::from(step) / f64::from(steps)];
-            let next = Adhesion::advance(bonding, law.drive(&u, &DOWN), law.energy, law.viscosity, 1.0);
+            let [next, _] = Adhesion::relax(bonding, law.drive(&u, &DOWN), law.energy, law.viscosity, 1.0);
             dissipated += (bonding * bonding - next * next) * law.potential(&u, &DOWN);
             bonding = next;
             let pull = -bonding * bonding * law.traction(&u, &DOWN)[1];
@@ -134,7 +164,7 @@ mod tests {
         ) {
             let normal = [0.6, 0.0, -0.8];
             let (drive, potential) = (GLUE.drive(&u, &normal), GLUE.potential(&u, &normal));
-            let next = Adhesion::advance(bonding, drive, GLUE.energy, viscosity, length);
+            let [next, _] = Adhesion::relax(bonding, drive, GLUE.energy, viscosity, length);
             prop_assert!((0.0..=bonding).contains(&next));
             prop_assert!((bonding * bonding - next * next) * potential >= 0.0, "dissipation");
             prop_assert!(next == bonding || next * drive >= GLUE.energy * (1.0 - 1e-12), "no further than the end");
@@ -153,6 +183,31 @@ mod tests {
                 };
                 let quotient = (at(1.0) - at(-1.0)) / (2.0 * h);
                 prop_assert!((quotient + traction[i]).abs() < 1e-3, "{} {}", quotient, traction[i]);
+            }
+        }
+
+        #[test]
+        fn tangent_and_gradient_of_the_drive_are_derivatives(u in proptest::array::uniform3(-0.5f64..0.5)) {
+            let normal = [0.6, 0.0, -0.8];
+            let (opening, sliding) = Adhesion::stretch(&u, &normal);
+            let corners = [opening, opening - GLUE.length, norm(&sliding) - GLUE.length];
+            prop_assume!(corners.iter().all(|corner| corner.abs() > 1e-4) || opening == 0.0 && corners[2].abs() > 1e-4);
+            prop_assume!(dot(&u, &normal).abs() > 1e-4);
+            let (tangent, gradient) = (GLUE.tangent(&u, &normal), GLUE.drive_gradient(&u, &normal));
+            for j in 0..3 {
+                let h = 1e-6;
+                let [more, less] = [h, -h].map(|h| {
+                    let mut moved = u;
+                    moved[j] += h;
+                    moved
+                });
+                let [up, down] = [more, less].map(|u| GLUE.traction(&u, &normal));
+                for i in 0..3 {
+                    let quotient = (up[i] - down[i]) / (2.0 * h);
+                    prop_assert!((quotient + tangent[i][j]).abs() < 1e-4, "{} {} {} {}", i, j, quotient, tangent[i][j]);
+                }
+                let quotient = (GLUE.drive(&more, &normal) - GLUE.drive(&less, &normal)) / (2.0 * h);
+                prop_assert!((quotient - gradient[j]).abs() < 1e-4, "{} {}", quotient, gradient[j]);
             }
         }
     }

@@ -28,6 +28,18 @@ impl Memory {
         past.exp() * pressure - past.exp_m1() * self.stiffness() * displacement.max(0.0)
     }
 
+    /// The pressure in Pa after a step of this length in s, during which the displacement pressed in moves steadily between these two in
+    /// m, and its derivative by the second in Pa/m. Exact for such displacements.
+    pub fn follow(&self, pressure: f64, [before, after]: [f64; 2], length: f64) -> [f64; 2] {
+        let past = length / self.decay_time;
+        let kept = (-past).exp();
+        // (1 - e^-x) / x.
+        let mean = if past > 0.0 { -(-past).exp_m1() / past } else { 1.0 };
+        let [first, last] = [mean - kept, 1.0 - mean].map(|share| share * self.stiffness());
+        let slope = if after > 0.0 { last } else { 0.0 };
+        [kept * pressure + first * before.max(0.0) + last * after.max(0.0), slope]
+    }
+
     /// The stiffness in Pa/m against a displacement held for long.
     pub fn stiffness(&self) -> f64 {
         self.stiffness_rate * self.decay_time
@@ -59,6 +71,23 @@ mod tests {
         assert!((CLAY.advance(0.0, 0.1, short) / (5.0 * short) - 1.0).abs() < 1e-9);
         let halves = CLAY.advance(CLAY.advance(3.0, 0.1, 0.35), 0.1, 0.35);
         assert!((halves - CLAY.advance(3.0, 0.1, 0.7)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn steady_motion_is_followed_exactly() {
+        // u = v t from rest: m = rate v decay (t - decay (1 - e^(-t / decay))).
+        let (v, end) = (0.1, 3.0);
+        let exact = 50.0 * v * 2.0 * (end - 2.0 * (1.0 - (-end / 2.0f64).exp()));
+        let [once, slope] = CLAY.follow(0.0, [0.0, v * end], end);
+        assert!((once - exact).abs() < 1e-12, "{once} {exact}");
+        assert!((slope - once / (v * end)).abs() < 1e-12, "linear");
+        let [half, _] = CLAY.follow(0.0, [0.0, v * 1.0], 1.0);
+        assert!((CLAY.follow(half, [v, v * end], end - 1.0)[0] - exact).abs() < 1e-12);
+        let [held, _] = CLAY.follow(3.0, [0.2, 0.2], 0.7);
+        assert!((held - CLAY.advance(3.0, 0.2, 0.7)).abs() < 1e-14, "at rest as before");
+        assert_eq!(CLAY.follow(0.0, [-1.0, -3.0], 0.7), [0.0, 0.0], "lifted off");
+        let [short, slope] = CLAY.follow(1.0, [0.1, 0.1], 1e-12);
+        assert!((short - 1.0).abs() < 1e-9 && (0.0..1e-9).contains(&slope));
     }
 
     proptest! {

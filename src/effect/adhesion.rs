@@ -1,21 +1,29 @@
 use super::{
-    Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, node_history::NodeHistory,
+    Blend, Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, SurfaceStep, Tangents,
+    evolution::Evolution, node_history::NodeHistory,
 };
 use crate::{
     contact,
     space::SurfacePoint,
-    tensor::{Vector, dot},
+    tensor::{Vector, add_scaled, dot},
 };
 
 /// Bonds on contact boundaries, with the bonding `b` as one number a node.
 ///
-/// Their force follows the displacement before the step, as elastic stress does:
+/// Explicitly their force follows the displacement before the step, as elastic stress does:
 /// `w b_n^2 t(u_{n-1})` at a point of weight `w`, with `b_n` from `b_{n-1}` and `u_{n-1}`. With the potential `F` of the law
 /// the work against it is exactly
 ///
 /// ```text
 /// -w b_n^2 t(u_{n-1}) . (u_n - u_{n-1}) = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) F(u_{n-1}) - numerical
 /// numerical = w b_n^2 (F(u_n) - F(u_{n-1}) + t(u_{n-1}) . (u_n - u_{n-1})).
+/// ```
+///
+/// In an implicit step the force is `w b_n^2 t(u_n)` with `b_n` from `u_n`, and
+///
+/// ```text
+/// -k w b_n^2 t(u_n) . v_n = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) (F(u_{n-1}) + F(u_n)) / 2 - numerical
+/// numerical = w (b_{n-1}^2 + b_n^2) / 2 (F(u_n) - F(u_{n-1})) + k w b_n^2 t(u_n) . v_n.
 /// ```
 ///
 /// Faces of the body that meet at a node share its bonding, which follows from the sums over them.
@@ -27,6 +35,10 @@ pub struct Adhesion<const D: usize> {
     /// Points of each node that is bonded.
     counts: Vec<usize>,
     bonding: NodeHistory,
+    /// How a step advances the bonding, if it is an implicit one.
+    evolution: Option<Evolution>,
+    /// Derivatives of the bonding by the drives of nodes at the end of an implicit step, in 1/J.
+    slopes: Vec<f64>,
 }
 
 /// A law and the points where it holds.
@@ -39,8 +51,8 @@ pub struct Bonded<const D: usize> {
 }
 
 impl<const D: usize> Adhesion<D> {
-    /// Whole bonds at the points; the rank owns so many nodes.
-    pub fn new(bonded: Vec<Bonded<D>>, owned: usize) -> Self {
+    /// Whole bonds at the points, which follow the displacement before steps or at their end; the rank owns so many nodes.
+    pub fn new(bonded: Vec<Bonded<D>>, owned: usize, is_implicit: bool) -> Self {
         let (mut laws, mut points) = (Vec::new(), Vec::new());
         for Bonded { law, points: own } in bonded {
             points.extend(own.into_iter().map(|point| (laws.len(), point)));
@@ -50,7 +62,34 @@ impl<const D: usize> Adhesion<D> {
         let groups = || points.chunk_by(|(_, a), (_, b)| a.node == b.node);
         let nodes = groups().map(|group| group[0].1.node).collect();
         let counts = groups().map(<[_]>::len).collect();
-        Self { laws, counts, points, bonding: NodeHistory::new("bonding", nodes, owned, 1.0) }
+        Self {
+            laws,
+            counts,
+            points,
+            bonding: NodeHistory::new("bonding", nodes, owned, 1.0),
+            evolution: is_implicit.then_some(Evolution { blend: Blend::euler(0.0), length: 0.0 }),
+            slopes: Vec::new(),
+        }
+    }
+
+    /// What drives debonding at a node with these points in J, what it takes in J, and what slows it in J s.
+    fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> [f64; 3] {
+        let [mut drive, mut energy, mut viscosity] = [0.0; 3];
+        for (law, point) in group {
+            let law = &self.laws[*law];
+            drive += point.weight * law.drive(&at(displacement, point), &point.normal);
+            energy += point.weight * law.energy;
+            viscosity += point.weight * law.viscosity;
+        }
+        [drive, energy, viscosity]
+    }
+
+    /// What whole bonds at a node with these points store, in J.
+    fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
+        let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
+            point.weight * self.laws[*law].potential(&at(displacement, point), &point.normal)
+        };
+        group.iter().map(of_point).sum()
     }
 
     /// The points of each node in turn.
@@ -81,16 +120,10 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
     fn add_explicit(&mut self, step: Step, state: SurfaceState<'_>, forces: &mut [f64], energy: &mut Energy) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
-            let (mut drive, mut threshold, mut viscosity, mut potential) = (0.0, 0.0, 0.0, 0.0);
-            for (law, point) in group {
-                let (law, displacement) = (&self.laws[*law], at(state.displacement, point));
-                drive += point.weight * law.drive(&displacement, &point.normal);
-                threshold += point.weight * law.energy;
-                viscosity += point.weight * law.viscosity;
-                potential += point.weight * law.potential(&displacement, &point.normal);
-            }
-            *after = contact::Adhesion::advance(*before, drive, threshold, viscosity, step.length);
-            energy.debonding += (before * before - *after * *after) * potential;
+            let [drive, threshold, viscosity] = self.drive(group, state.displacement);
+            [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
+            energy.debonding +=
+                (before * before - *after * *after) * self.potential(group, state.displacement);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&at(state.displacement, point), &point.normal);
                 push(point, point.weight * *after * *after, &traction, forces);
@@ -99,18 +132,97 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         self.bonding.trial = trial;
     }
 
+    fn is_implicit(&self) -> bool {
+        self.evolution.is_some()
+    }
+
+    fn softens(&self) -> bool {
+        true
+    }
+
+    fn begin(&mut self, blend: Blend, length: f64, _: &[f64]) {
+        self.evolution = Some(Evolution { blend, length });
+    }
+
+    fn advance(&mut self, displacement: &[f64]) {
+        let Some(evolution) = self.evolution else { return };
+        let mut trial = std::mem::take(&mut self.bonding.trial);
+        let mut slopes = std::mem::take(&mut self.slopes);
+        slopes.clear();
+        for (node, (group, after)) in self.groups().zip(&mut trial).enumerate() {
+            let [drive, threshold, viscosity] = self.drive(group, displacement);
+            let relax = |start, length| contact::Adhesion::relax(start, drive, threshold, viscosity, length);
+            let (before, last) = (self.bonding.converged[node], self.bonding.last_change(node));
+            let slope;
+            [*after, slope] = evolution.advance(before, last, relax);
+            slopes.push(slope);
+        }
+        (self.bonding.trial, self.slopes) = (trial, slopes);
+    }
+
+    fn add_forces(&self, displacement: &[f64], mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
+        let Some(evolution) = self.evolution else { return };
+        for ((group, bonding), slope) in self.groups().zip(&self.bonding.trial).zip(&self.slopes) {
+            let square = bonding * bonding;
+            let (mut pull, mut gradient, mut tangent) = ([0.0; D], [0.0; D], [[0.0; D]; D]);
+            let mut truncated = false;
+            for (law, point) in group {
+                let (law, normal) = (&self.laws[*law], &point.normal);
+                let displacement = at(displacement, point);
+                pull = add_scaled(&pull, point.weight, &law.traction(&displacement, normal));
+                if tangents.is_some() {
+                    let own = law.tangent(&displacement, normal);
+                    tangent =
+                        std::array::from_fn(|i| add_scaled(&tangent[i], point.weight * square, &own[i]));
+                    gradient =
+                        add_scaled(&gradient, point.weight, &law.drive_gradient(&displacement, normal));
+                    truncated |= law.length < f64::INFINITY;
+                }
+            }
+            let Some((_, point)) = group.first() else { continue };
+            let target = &mut forces[point.node as usize * D..][..D];
+            target.iter_mut().zip(&pull).for_each(|(force, pull)| *force -= square * pull);
+            if let Some(tangents) = &mut tangents {
+                // The bonding falls with the displacement. Traction and gradient of the drive are parallel as far as nothing is cut.
+                let length = evolution.blend.length;
+                let tangent = std::array::from_fn(|i| {
+                    add_scaled(&tangent[i], -2.0 * bonding * slope * pull[i], &gradient).map(|t| length * t)
+                });
+                tangents.push_node(point.node, &tangent, !truncated || *slope == 0.0);
+            }
+        }
+    }
+
+    fn add_implicit_energy(&self, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy) {
+        let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
+        for (group, (before, after)) in self.groups().zip(bondings) {
+            let (before, after) = (before * before, after * after);
+            let potentials =
+                [ends.before, ends.after].map(|displacement| self.potential(group, displacement));
+            energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
+            energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
+            for (law, point) in group {
+                let traction = self.laws[*law].traction(&at(ends.after, point), &point.normal);
+                energy.numerical +=
+                    step.length * point.weight * after * dot(&traction, &at(ends.velocity, point));
+            }
+        }
+    }
+
     fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
         for (group, bonding) in self.groups().zip(&self.bonding.converged) {
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
                 let displacement = at(state.displacement, point);
-                let change = at(state.velocity, point).map(|v| step.length * v);
-                let before = std::array::from_fn(|i| displacement[i] - change[i]);
                 let share = point.weight * bonding * bonding;
                 let potential = law.potential(&displacement, normal);
-                let gain = potential - law.potential(&before, normal);
                 energy.stored_in_bonds += share * potential;
-                energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
+                if self.evolution.is_none() {
+                    let change = at(state.velocity, point).map(|v| step.length * v);
+                    let before = std::array::from_fn(|i| displacement[i] - change[i]);
+                    let gain = potential - law.potential(&before, normal);
+                    energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
+                }
             }
         }
     }

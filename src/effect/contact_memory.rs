@@ -1,5 +1,6 @@
 use super::{
-    Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, node_history::NodeHistory,
+    Blend, Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, SurfaceStep, Tangents,
+    node_history::NodeHistory,
 };
 use crate::{
     contact::Memory,
@@ -10,19 +11,31 @@ use crate::{
 
 /// Foundations that remember, with the pressure `m` as one number a node.
 ///
-/// Their force follows the displacement before the step, as elastic stress does: `w m_n nu` at a point of weight `w`, with
-/// `m_n` from `m_{n-1}` and `u_{n-1}`. Its work against the body, `w m_n nu . (u_n - u_{n-1})`, is what the foundation takes
-/// up, or gives back.
+/// Their force is `w m_n nu` at a point of weight `w`. Explicitly `m_n` follows from `m_{n-1}` and `u_{n-1}`, which counts as held; in an
+/// implicit step from `m_{n-1}` and both `u_{n-1}` and `u_n`, between which the displacement moves steadily: of second order whatever
+/// the scheme. The work against the body, `k w m_n nu . v_n`, is what the foundation takes up, or gives back.
 #[derive(Debug)]
 pub struct ContactMemory<const D: usize> {
     /// One a node, in the order of nodes.
     points: Vec<(Memory, SurfacePoint<D>)>,
     pressure: NodeHistory,
+    is_implicit: bool,
+    /// How an implicit step starts, its length in s, and the normal displacements before it in m.
+    blend: Blend,
+    length: f64,
+    before: Vec<f64>,
+    /// Derivatives of the pressures by the normal displacements at the end of an implicit step, in Pa/m.
+    slopes: Vec<f64>,
 }
 
 impl<const D: usize> ContactMemory<D> {
-    /// Foundations that remember nothing yet, each with its points at owned nodes. Refuses edges: a node has one memory.
-    pub fn new(foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>, mesh: &Mesh<D>) -> Result<Self> {
+    /// Foundations that remember nothing yet, each with its points at owned nodes, and follow the displacement before steps or at
+    /// their end. Refuses edges: a node has one memory.
+    pub fn new(
+        foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>,
+        mesh: &Mesh<D>,
+        is_implicit: bool,
+    ) -> Result<Self> {
         let of_each = foundations.into_iter();
         let mut points: Vec<(Memory, SurfacePoint<D>)> =
             of_each.flat_map(|(law, points)| points.into_iter().map(move |point| (law, point))).collect();
@@ -35,7 +48,15 @@ impl<const D: usize> ContactMemory<D> {
             )));
         }
         let nodes = points.iter().map(|(_, point)| point.node).collect();
-        Ok(Self { points, pressure: NodeHistory::new("memory_pressure", nodes, mesh.owned, 0.0) })
+        Ok(Self {
+            points,
+            pressure: NodeHistory::new("memory_pressure", nodes, mesh.owned, 0.0),
+            is_implicit,
+            blend: Blend::euler(0.0),
+            length: 0.0,
+            before: Vec::new(),
+            slopes: Vec::new(),
+        })
     }
 }
 
@@ -62,6 +83,44 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
             push(point, -point.weight * *after, forces);
         }
     }
+
+    fn is_implicit(&self) -> bool {
+        self.is_implicit
+    }
+
+    fn begin(&mut self, blend: Blend, length: f64, displacement: &[f64]) {
+        (self.blend, self.length) = (blend, length);
+        self.before.clear();
+        self.before.extend(self.points.iter().map(|(_, point)| along(displacement, point)));
+    }
+
+    fn advance(&mut self, displacement: &[f64]) {
+        self.slopes.clear();
+        let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
+        for (((law, point), (before, after)), start) in self.points.iter().zip(pressures).zip(&self.before) {
+            let slope;
+            [*after, slope] = law.follow(*before, [*start, along(displacement, point)], self.length);
+            self.slopes.push(slope);
+        }
+    }
+
+    fn add_forces(&self, _: &[f64], mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
+        for (((_, point), pressure), slope) in self.points.iter().zip(&self.pressure.trial).zip(&self.slopes)
+        {
+            push(point, point.weight * pressure, forces);
+            if let Some(tangents) = &mut tangents {
+                let stiffness = self.blend.length * point.weight * slope;
+                tangents.push_node(
+                    point.node,
+                    &point.normal.map(|n| point.normal.map(|m| stiffness * n * m)),
+                    true,
+                );
+            }
+        }
+    }
+
+    /// Nothing: what the pressure takes up is counted with that of the normal law.
+    fn add_implicit_energy(&self, _: Step, _: SurfaceStep<'_>, _: &mut Energy) {}
 
     fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
         for ((_, point), pressure) in self.points.iter().zip(&self.pressure.converged) {

@@ -1,27 +1,64 @@
-use super::{Curvature, Effect, Energy, History, Phases, Step, StressError, cell_history::CellHistory};
+use super::{
+    Blend, Curvature, Effect, Energy, History, Phases, Step, StressError, Tangents,
+    cell_history::CellHistory, evolution::Evolution,
+};
 use crate::{
     lanes::{LANES, Pack},
     material::{self, ByMaterial},
     space::{Batch, CellRun, Needs},
+    tensor::{Mandel, add_scaled},
 };
 
 /// Isotropic damage `d`, one number for each cell that may be damaged: the elastic and viscoplastic stress counts by the
 /// share `1 - d`, viscous stress in full.
 ///
-/// `d_n` follows from `d_{n-1}` and the energy `Y_{n-1}` of `S_{n-1} = E e(u_{n-1}) + H_{n-1}`, so that the loss of elastic
+/// Explicitly `d_n` follows from `d_{n-1}` and the energy `Y_{n-1}` of `S_{n-1} = E e(u_{n-1}) + H_{n-1}`, so that the loss of elastic
 /// energy in the step is exactly `(d_n - d_{n-1}) Y_{n-1}`, the dissipation; all other terms of the elastic energy count by
 /// `1 - d_n`.
+///
+/// In an implicit step `d_n` follows from `Y_n`, and the stress is `(1 - d_n) S_n` with `S_n` as flow leaves it. The dissipation is
+/// `(d_n - d_{n-1}) (Y_{n-1} + Y_n) / 2`.
 #[derive(Debug)]
 pub struct Damage {
     laws: ByMaterial<material::Damage>,
     damage: CellHistory<1>,
+    /// How a step advances the damage, if it is an implicit one.
+    evolution: Option<Evolution>,
 }
 
 impl Damage {
-    /// Sound cells, for the runs whose material has a law.
-    pub fn new(laws: ByMaterial<material::Damage>, runs: &[CellRun]) -> Self {
+    /// Sound cells, for the runs whose material has a law; damaged by the stress before a step or, in implicit steps, at its end.
+    pub fn new(laws: ByMaterial<material::Damage>, runs: &[CellRun], is_implicit: bool) -> Self {
         let damage = CellHistory::new("damage", runs, |material| laws.get(material).is_some());
-        Self { laws, damage }
+        let evolution = is_implicit.then_some(Evolution { blend: Blend::euler(0.0), length: 0.0 });
+        Self { laws, damage, evolution }
+    }
+}
+
+/// Writes the change of the derivative of a cell's stress by its strain rate, beyond `k' E`, where the cell bears `1 - damage` of the
+/// sound stress: `(1 - d) C - dd/dY S (x) C^T E^-1 S` with the derivative `C` of the sound stress `S`.
+fn weaken_tangent<const S: usize>(
+    law: &material::Damage,
+    (damage, slope, length): (f64, f64, f64),
+    sound: &Mandel<S>,
+    beyond: &mut [f64],
+) {
+    let strain = law.elasticity.solve(sound);
+    let mut gradient = [0.0; S];
+    for (row, strain) in beyond.chunks_exact_mut(S).zip(&strain) {
+        for (gradient, value) in gradient.iter_mut().zip(&*row) {
+            *gradient += strain * value;
+        }
+    }
+    // What the constant matrix has: k' E, applied to E^-1 S.
+    gradient = add_scaled(&gradient, length, sound);
+    for (i, row) in beyond.chunks_exact_mut(S).enumerate() {
+        let mut unit = [0.0; S];
+        unit[i] = length;
+        let elastic = law.elasticity.apply(&unit);
+        for j in 0..S {
+            row[j] -= damage * (row[j] + elastic[j]) + slope * sound[i] * gradient[j];
+        }
     }
 }
 
@@ -37,7 +74,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
 
     fn phases(&self) -> Phases {
         let stress = Needs { strain: true, elastic_stress: true, ..Needs::default() };
-        Phases { explicit: Some(stress), error: Some(stress), weakens: true, ..Phases::default() }
+        let explicit = Some(stress).filter(|_| self.evolution.is_none());
+        Phases { explicit, error: Some(stress), weakens: true, ..Phases::default() }
     }
 
     fn is_everywhere(&self) -> bool {
@@ -53,6 +91,58 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
             energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
         }
         batch.integrity.weaken(left(after));
+    }
+
+    fn begin(&mut self, blend: Blend, length: f64) {
+        self.evolution = Some(Evolution { blend, length });
+    }
+
+    fn flows(&self) -> bool {
+        self.evolution.is_some()
+    }
+
+    /// Given the sound stress in the batch; weakens the batch as well.
+    fn add_flow(&mut self, batch: &mut Batch<D, S>, mut tangents: Option<&mut Tangents>) -> bool {
+        let (Some(law), Some(evolution)) = (self.laws.get(batch.material), self.evolution) else {
+            return false;
+        };
+        let Some(&Pack([before])) = self.damage.converged(batch.number) else { return false };
+        let mut left = [1.0; LANES];
+        for lane in 0..batch.count {
+            let sound = batch.elastic_stress.lane(lane);
+            let release_rate = law.release_rate(&sound);
+            let [last] = self.damage.last_change(batch.number, lane);
+            let relax = |start, length| law.relax(start, release_rate, length);
+            let [damage, slope] = evolution.advance(before[lane], last, relax);
+            self.damage.set_trial(batch.number, lane, [damage]);
+            left[lane] = 1.0 - damage;
+            if damage == 0.0 {
+                continue;
+            }
+            batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
+            if let Some(tangents) = &mut tangents {
+                let cell = batch.first + lane;
+                if slope != 0.0 && tangents.has(cell) {
+                    tangents.mark_skew();
+                }
+                let change = (damage, slope, evolution.blend.length);
+                weaken_tangent(law, change, &sound, tangents.last::<S>(cell));
+            }
+        }
+        batch.integrity.weaken(left);
+        left != [1.0; LANES]
+    }
+
+    fn add_implicit_energy(&mut self, _step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some((Pack([before]), Pack([after]))) = self.damage.both(batch.number) else { return };
+        for lane in 0..batch.count {
+            let stresses = [&batch.elastic_stress_before, &batch.elastic_stress];
+            let [first, last] = stresses.map(|stress| law.release_rate(&stress.lane(lane)));
+            let growth = batch.cells.volume[lane] * (after[lane] - before[lane]);
+            energy.damage += 0.5 * growth * (first + last);
+            energy.numerical += 0.5 * growth * (last - first);
+        }
     }
 
     fn weaken(&self, batch: &mut Batch<D, S>) {

@@ -7,9 +7,9 @@ mod cell_history;
 mod contact;
 mod contact_memory;
 mod damage;
-mod elastic_stress;
+mod elasticity;
 mod energy;
-mod implicit_elasticity;
+mod evolution;
 mod inertia;
 mod isotropic;
 mod load;
@@ -29,15 +29,14 @@ pub use contact::{
 };
 pub use contact_memory::ContactMemory;
 pub use damage::Damage;
-pub use elastic_stress::{ElasticLaw, ElasticStress};
+pub use elasticity::{ElasticLaw, Elasticity};
 pub use energy::Energy;
-pub use implicit_elasticity::ImplicitElasticity;
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
 pub use peaks::{PeakSquares, Peaks};
 pub use step_error::{Curvature, StressError};
 pub use support::{Held, Support, fixed_components};
-pub use surface::{SurfaceEffect, SurfaceState};
+pub use surface::{SurfaceEffect, SurfaceState, SurfaceStep};
 pub use tangents::Tangents;
 pub use viscoplastic_flow::ViscoplasticFlow;
 pub use viscoplastic_history::ViscoplasticHistory;
@@ -154,8 +153,10 @@ pub trait Effect<const D: usize, const S: usize> {
         false
     }
 
-    /// Adds minus the stress that flow takes from that of the constant matrix in an implicit step, given the strain at its
-    /// end; writes the trial history and, where they are wanted, the derivatives by the velocity. Gives whether it added.
+    /// Adds minus the stress that flow or damage takes from that of the constant matrix in an implicit step, given the strain at its
+    /// end; writes the trial history and, where they are wanted, the derivatives by the velocity. Gives whether it added. Flow
+    /// takes what it releases from the elastic stress of the batch, too, which is there where some effect weakens; effects that
+    /// weaken are called last, and weaken the batch as their trial history has it.
     fn add_flow(&mut self, _batch: &mut Batch<D, S>, _tangents: Option<&mut Tangents>) -> bool {
         false
     }
@@ -165,8 +166,9 @@ pub trait Effect<const D: usize, const S: usize> {
         true
     }
 
-    /// Adds the energies of an implicit step that was solved and not yet committed: what flow takes up, and the scheme's
-    /// own terms of the elastic energy. Given the strains before and after it and the strain rate.
+    /// Adds the energies of an implicit step that was solved and not yet committed: what flow and damage take up, and the scheme's
+    /// own terms of the elastic energy. Given the strains before and after it, the strain rate, and what cells bear; trial
+    /// histories are those of the solution.
     fn add_implicit_energy(&mut self, _step: Step, _batch: &mut Batch<D, S>, _energy: &mut Energy) {}
 
     /// Adds its energies after the step was committed.

@@ -20,9 +20,14 @@ impl NodeHistory {
         Self { name, nodes, owned, trial: converged.clone(), converged, earlier: None }
     }
 
-    /// Keeps the values before the last step, too, under this name.
+    /// Keeps the values before the last step, too, under this name, if they are not kept yet.
     pub fn keep_earlier(&mut self, name: &'static str) {
-        self.earlier = Some((name, self.converged.clone()));
+        self.earlier.get_or_insert_with(|| (name, self.converged.clone()));
+    }
+
+    /// What the last step added to the value of a node by its position; 0 where that is not kept.
+    pub fn last_change(&self, at: usize) -> f64 {
+        self.earlier.as_ref().map_or(0.0, |(_, earlier)| self.converged[at] - earlier[at])
     }
 
     /// Trial and converged value of each node and the one before the last step, if they are kept.

@@ -1,10 +1,14 @@
 use crate::material::Tangent;
 
-/// What flow takes from the derivative of a cell's stress by its strain rate, in Pa s, for the cells that flow.
+/// What the constant matrix of an implicit step lacks: for cells that flow or are damaged, the derivative of the stress by the strain
+/// rate beyond that of elasticity, in Pa s; for nodes that are bonded or remember, the derivative of minus the force by the velocity, in
+/// N s/m.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tangents {
     cells: Vec<u32>,
     values: Vec<f64>,
+    nodes: Vec<u32>,
+    nodal: Vec<f64>,
     skew: bool,
 }
 
@@ -12,6 +16,8 @@ impl Tangents {
     /// Forgets all cells; there is room for as many, which takes no memory before it is written.
     pub fn restart<const S: usize>(&mut self, cells: usize) {
         self.skew = false;
+        self.nodes.clear();
+        self.nodal.clear();
         self.cells.clear();
         self.cells.reserve(cells);
         self.values.clear();
@@ -26,7 +32,54 @@ impl Tangents {
         self.values.extend_from_slice(tangent.as_flattened());
     }
 
-    /// Whether those of all cells are.
+    /// The matrix of this cell, zero if it had none, where no cell after it has one yet; for effects that change what others made of the
+    /// stress.
+    pub fn last<const S: usize>(&mut self, cell: usize) -> &mut [f64] {
+        // Cells of a batch come in order, so that the cell is among the last few.
+        let at = self.cells.iter().rposition(|&known| known as usize <= cell);
+        let at = match at {
+            Some(at) if self.cells[at] as usize == cell => at,
+            before => {
+                let at = before.map_or(0, |before| before + 1);
+                self.cells.insert(at, cell as u32);
+                let zeros = std::iter::repeat_n(0.0, S * S);
+                self.values.splice(at * S * S..at * S * S, zeros);
+                at
+            }
+        };
+        &mut self.values[at * S * S..][..S * S]
+    }
+
+    /// Whether this cell has a matrix.
+    pub fn has(&self, cell: usize) -> bool {
+        let last = self.cells.iter().rev().find(|&&known| known as usize <= cell);
+        last.is_some_and(|&known| known as usize == cell)
+    }
+
+    /// Says that a matrix is not symmetric.
+    pub fn mark_skew(&mut self) {
+        self.skew = true;
+    }
+
+    /// Adds the matrix of a node of this rank.
+    pub fn push_node<const D: usize>(&mut self, node: u32, tangent: &[[f64; D]; D], symmetric: bool) {
+        self.skew |= !symmetric;
+        self.nodes.push(node);
+        self.nodal.extend_from_slice(tangent.as_flattened());
+    }
+
+    /// Adds the change of the forces of nodes with a velocity to `forces`, `D` values a node.
+    pub fn add_nodal<const D: usize>(&self, velocity: &[f64], forces: &mut [f64]) {
+        for (&node, tangent) in self.nodes.iter().zip(self.nodal.chunks_exact(D * D)) {
+            let at = node as usize * D;
+            for (i, row) in tangent.chunks_exact(D).enumerate() {
+                let change = row.iter().zip(&velocity[at..at + D]).map(|(t, v)| t * v).sum::<f64>();
+                forces[at + i] += change;
+            }
+        }
+    }
+
+    /// Whether those of all cells and nodes are.
     pub fn are_symmetric(&self) -> bool {
         !self.skew
     }

@@ -4,8 +4,8 @@ use super::{
 };
 use crate::{
     lanes::Pack,
-    material::{ByMaterial, Extrapolated, Returned, Tangent, Viscoplasticity},
-    space::{Batch, CellRun, Needs},
+    material::{ByMaterial, Extrapolated, Tangent, Viscoplasticity},
+    space::{Batch, CellRun, Integrity, Needs},
     tensor::{Mandel, add_scaled, dot},
 };
 
@@ -39,17 +39,15 @@ impl<const S: usize> ViscoplasticFlow<S> {
         Self { laws, stress, accumulated, blend: Blend::euler(0.0), step_length: 0.0 }
     }
 
-    /// Lets each cell of the batch flow; `visit` gets the cell's lane, its law, the stress without flow and what flow made of
-    /// it.
-    #[inline(always)]
+    /// Lets each cell of the batch flow and takes what flow releases from its stresses; gives whether any flowed.
     fn advance<const D: usize>(
         &mut self,
         batch: &mut Batch<D, S>,
         mut tangents: Option<&mut Tangents>,
-        mut visit: impl FnMut(&mut Batch<D, S>, usize, &Viscoplasticity, &Mandel<S>, Option<&Returned<S>>),
-    ) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(&converged) = self.stress.converged(batch.number) else { return };
+    ) -> bool {
+        let mut any = false;
+        let Some(law) = self.laws.get(batch.material) else { return any };
+        let Some(&converged) = self.stress.converged(batch.number) else { return any };
         let Blend { length, earlier, .. } = self.blend;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
         for lane in 0..batch.count {
@@ -70,8 +68,12 @@ impl<const S: usize> ViscoplasticFlow<S> {
             };
             let (mut after, mut total) = (history, before);
             if let Some((found, symmetric)) = &found {
-                after = add_scaled(&history, -1.0, &law.elasticity().apply(&found.flow));
+                let release = law.elasticity().apply(&found.flow);
+                after = add_scaled(&history, -1.0, &release);
                 total = found.accumulated;
+                add_to(&mut batch.stress, lane, 1.0, &release);
+                add_to(&mut batch.elastic_stress, lane, -1.0, &release);
+                any = true;
                 if let Some(tangents) = &mut tangents {
                     tangents.push(batch.first + lane, &loss(law, &tangent, length), *symmetric);
                 }
@@ -80,14 +82,14 @@ impl<const S: usize> ViscoplasticFlow<S> {
             if let Some(accumulated) = &mut accumulated {
                 accumulated.set_trial(batch.number, lane, [total]);
             }
-            visit(batch, lane, law, &elastic, found.as_ref().map(|(found, _)| found));
         }
+        any
     }
 }
 
 /// Adds to the stress of a cell by its lane.
-fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, added: &Mandel<S>) {
-    let sum = add_scaled(&stresses.lane(lane), 1.0, added);
+fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, factor: f64, added: &Mandel<S>) {
+    let sum = add_scaled(&stresses.lane(lane), factor, added);
     stresses.set(lane, sum);
 }
 
@@ -122,6 +124,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         self.laws.is_everywhere()
     }
 
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
+    }
+
     fn begin(&mut self, blend: Blend, length: f64) {
         (self.blend, self.step_length) = (blend, length);
     }
@@ -136,14 +143,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     }
 
     fn add_flow(&mut self, batch: &mut Batch<D, S>, tangents: Option<&mut Tangents>) -> bool {
-        let mut any = false;
-        self.advance(batch, tangents, |batch, lane, law, _, found| {
-            if let Some(found) = found {
-                add_to(&mut batch.stress, lane, &law.elasticity().apply(&found.flow));
-                any = true;
-            }
-        });
-        any
+        self.advance(batch, tangents)
     }
 
     fn has_symmetric_tangent(&self) -> bool {
@@ -151,25 +151,29 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     }
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
-        let Some(&converged) = self.stress.converged(batch.number) else { return };
-        let two_steps = self.blend.earlier != 0.0;
-        self.advance(batch, None, |batch, lane, law, elastic, found| {
-            let elasticity = law.elasticity();
-            let stress = found.map_or(*elastic, |found| found.stress);
-            let before = batch.strain_before.lane(lane);
-            let change = add_scaled(&batch.strain.lane(lane), -1.0, &before);
-            let before = add_scaled(&elasticity.apply(&before), 1.0, &converged.lane(lane));
+        let Some(elasticity) = self.laws.get(batch.material).map(Viscoplasticity::elasticity) else { return };
+        let Some((converged, trial)) = self.stress.both(batch.number) else { return };
+        let (share, two_steps) = (batch.integrity.shares(), self.blend.earlier != 0.0);
+        for lane in 0..batch.count {
+            let [history, after] = [converged.lane(lane), trial.lane(lane)];
+            let [strain, before] = [batch.strain.lane(lane), batch.strain_before.lane(lane)];
+            let change = add_scaled(&strain, -1.0, &before);
+            let stress = add_scaled(&elasticity.apply(&strain), 1.0, &after);
+            let before = add_scaled(&elasticity.apply(&before), 1.0, &history);
             let jump = add_scaled(&stress, -1.0, &before);
             let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
-            let volume = batch.cells.volume[lane];
-            let taken = found.map_or(0.0, |found| dot(&stress, &found.flow));
-            // Of second order with the formula. What it extrapolates beyond the rest of the stress gives back, and is its own.
-            let with = |found: &Returned<S>| 0.5 * (taken + dot(&before, &found.flow));
-            let dissipated = found.filter(|_| two_steps).map_or(taken, with).max(0.0);
-            energy.viscoplastic += volume * dissipated;
+            let (mut taken, mut dissipated) = (0.0, 0.0);
+            if after != history {
+                let flow = elasticity.solve(&add_scaled(&history, -1.0, &after));
+                taken = dot(&stress, &flow);
+                // Of second order with the formula. What it extrapolates beyond the rest of the stress gives back, and is its own.
+                dissipated = if two_steps { 0.5 * (taken + dot(&before, &flow)) } else { taken }.max(0.0);
+            }
+            let share = share[lane] * batch.cells.volume[lane];
+            energy.viscoplastic += share * dissipated;
             let own = dot(&stress, &beside) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
-            energy.numerical += volume * own;
-        });
+            energy.numerical += share * own;
+        }
     }
 
     fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {

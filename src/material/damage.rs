@@ -48,6 +48,42 @@ impl Damage {
         let left = if self.exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(self.exponent) };
         (damage + length * left * excess / self.viscosity).min(self.largest).max(damage)
     }
+
+    /// Damage after a step of implicit Euler of this length in s from `start`, with `Y` in Pa at its end, and its derivative by `Y`
+    /// in 1/Pa.
+    pub fn relax(&self, start: f64, release_rate: f64, length: f64) -> [f64; 2] {
+        let growth = length * (release_rate - self.threshold) / self.viscosity;
+        if growth <= 0.0 || start >= self.largest {
+            return [start.min(self.largest), 0.0];
+        }
+        let left = |damage: f64| if self.exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(self.exponent) };
+        // The root lies between these: what is left falls with damage. Newton's method, halving where it leaves them.
+        let (mut low, mut high) = (start, (start + growth * left(start)).min(self.largest));
+        if high - start <= growth * left(high) {
+            return if high < self.largest {
+                [high, length / self.viscosity * left(high)]
+            } else {
+                [self.largest, 0.0]
+            };
+        }
+        let slope = |damage: f64| 1.0 + growth * self.exponent * (1.0 - damage).powf(self.exponent - 1.0);
+        let mut damage = high;
+        for _ in 0..100 {
+            let excess = damage - start - growth * left(damage);
+            if excess > 0.0 {
+                high = damage
+            } else {
+                low = damage
+            }
+            let next = damage - excess / slope(damage);
+            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+            if (next - damage).abs() <= f64::EPSILON {
+                break;
+            }
+            damage = next;
+        }
+        [damage, length / self.viscosity * left(damage) / slope(damage)]
+    }
 }
 
 #[cfg(test)]
@@ -80,7 +116,39 @@ mod tests {
         assert_eq!(law(0.0).advance(0.8, 1e9, 0.5), 0.9, "never beyond the largest");
     }
 
+    #[test]
+    fn implicit_growth_by_hand() {
+        // Excess 2 Pa over 10 Pa s in 0.5 s: 0.1, times what is left at the end.
+        let [found, slope] = law(0.0).relax(0.2, 2.5, 0.5);
+        assert!((found - 0.3).abs() < 1e-15 && (slope - 0.05).abs() < 1e-16);
+        let [found, _] = law(1.0).relax(0.2, 2.5, 0.5);
+        assert!((found - 0.3 / 1.1).abs() < 1e-15, "(0.2 + 0.1) / 1.1: {found}");
+        // d - 0.2 = 0.1 (1 - d)^2.
+        let [found, _] = law(2.0).relax(0.2, 2.5, 0.5);
+        assert!((found - (6.0 - 33.0f64.sqrt())).abs() < 1e-15, "d^2 - 12 d + 3 = 0: {found}");
+        assert_eq!(law(0.0).relax(0.2, 0.5, 0.5), [0.2, 0.0], "at the threshold");
+        assert_eq!(law(0.0).relax(0.8, 1e9, 0.5), [0.9, 0.0], "never beyond the largest");
+        assert_eq!(law(2.0).relax(0.95, 1e9, 0.5), [0.9, 0.0], "extrapolated beyond it");
+    }
+
     proptest! {
+        #[test]
+        fn implicit_growth_solves_its_equation_with_its_derivative(
+            start in 0.0f64..0.9, release in 0.0f64..1e4, length in 1e-4f64..10.0, exponent in 0.0f64..3.0,
+        ) {
+            let law = law(exponent);
+            let [found, slope] = law.relax(start, release, length);
+            let growth = (length * (release - law.threshold) / law.viscosity).max(0.0);
+            let residual = found - start - growth * (1.0 - found).powf(exponent);
+            prop_assert!(start <= found && found <= law.largest);
+            prop_assert!(residual.abs() < 1e-12 * (1.0 + growth) || (found == law.largest && residual < 0.0), "{}", residual);
+            let h = 1e-6 * (1.0 + release);
+            let [[more, _], [less, _]] = [h, -h].map(|h| law.relax(start, release + h, length));
+            let quotient = (more - less) / (2.0 * h);
+            let smooth = (release - law.threshold).abs() > 2.0 * h && more < law.largest;
+            prop_assert!(!smooth || (quotient - slope).abs() <= 1e-5 * (slope + 1e-4), "{} {}", quotient, slope);
+        }
+
         #[test]
         fn damage_never_heals_stays_below_its_largest_and_dissipates(
             s in proptest::array::uniform3(-200.0f64..200.0),

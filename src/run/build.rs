@@ -5,9 +5,9 @@ use crate::{
     body::Body,
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
     effect::{
-        Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, ElasticStress, Held,
-        ImplicitElasticity, Inertia, Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow,
-        ViscoplasticHistory, ViscousStress, choose_unknowns, fixed_components,
+        self, Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
+        Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscoplasticHistory,
+        ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
     job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Scalar},
@@ -62,7 +62,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body { mesh, geometry, effects, contacts, surface_effects, load, fixed };
-    if job.time.adaptive.is_some() {
+    if job.time.adaptive.is_some() || scheme(job).is_two_step() {
         body.keep_earlier();
     }
     Ok((body, state))
@@ -95,11 +95,7 @@ fn effects<const D: usize, const S: usize>(
         effects.push(Box::new(Inertia { density }));
     }
     if let Some(law) = by_material(materials, elastic_law::<S>) {
-        effects.push(if scheme.is_implicit() {
-            Box::new(ImplicitElasticity::new(law))
-        } else {
-            Box::new(ElasticStress { law })
-        });
+        effects.push(Box::new(effect::Elasticity::new(law, scheme.is_implicit())));
     }
     let viscosity = |v: &job::Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear };
     if let Some(tensor) = by_material(materials, |m| m.viscosity.as_ref().map(viscosity)) {
@@ -114,7 +110,7 @@ fn effects<const D: usize, const S: usize>(
         });
     }
     if let Some(laws) = by_material(materials, damage_law::<S>) {
-        effects.push(Box::new(Damage::new(laws, &geometry.runs)));
+        effects.push(Box::new(Damage::new(laws, &geometry.runs, scheme.is_implicit())));
     }
     Ok(effects)
 }
@@ -126,6 +122,7 @@ fn surface_effects<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
+    let is_implicit = scheme(job).is_implicit();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for contact in &job.contact {
         if let Some(memory) = &contact.memory {
@@ -144,10 +141,10 @@ fn surface_effects<const D: usize>(
         bonded.push(Bonded { law, points: surface_points(session, mesh, &facets(mesh, &contact.on))? });
     }
     if !bonded.is_empty() {
-        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
+        effects.push(Box::new(Adhesion::new(bonded, mesh.owned, is_implicit)));
     }
     if !foundations.is_empty() {
-        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh))?));
+        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh, is_implicit))?));
     }
     Ok(effects)
 }

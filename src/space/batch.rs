@@ -98,6 +98,8 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub velocity_change: Corners<D>,
     /// Elastic stress `E e(u) + H` in Pa before anything weakens it; effects add to it.
     pub elastic_stress: Pack<S>,
+    /// The same before the step that is being taken, in the balance of an implicit step.
+    pub elastic_stress_before: Pack<S>,
     /// What the cells still bear of it.
     pub integrity: Integrity,
     /// Output: stress in Pa.
@@ -130,6 +132,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             velocity: [Pack::ABSENT; 4],
             velocity_change: [Pack::ABSENT; 4],
             elastic_stress: Pack::ABSENT,
+            elastic_stress_before: Pack::ABSENT,
             integrity: Integrity::default(),
             stress: Pack::ZERO,
             force: [Pack::ZERO; 4],

@@ -69,7 +69,7 @@ pub(super) fn whole_newton<const D: usize, const S: usize>(
         session.agree(bounded::refuse(body))?;
         if body.flows() {
             return Err(Error::Refused(
-                "[solver] method = \"vinewtonrsls\" knows no flow at the end of a step: use method = \"newton\" or \
+                "[solver] method = \"vinewtonrsls\" knows no flow, damage, bonds or memory at the end of a step: use method = \"newton\" or \
                  [time] scheme = \"lagged_euler\""
                     .into(),
             ));

@@ -70,9 +70,10 @@ impl Implicit {
         write_blend(self.blend, &state.displacement, earlier, &mut self.displacement)?;
         write_blend(self.blend, &state.velocity, &state.previous_velocity, &mut self.velocity)?;
         let (displacement, velocity) = (self.displacement.local()?, self.velocity.local()?);
+        let before = state.displacement.local()?;
         let nodal = Nodal {
             displacement: &displacement,
-            previous_displacement: &displacement,
+            previous_displacement: &before,
             velocity: &velocity,
             previous_velocity: &velocity,
         };

@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
     effect::{
-        Damage, Effect, ElasticLaw, ElasticStress, Energy, Inertia, Phases, Step, ViscoplasticHistory,
+        Damage, Effect, ElasticLaw, Elasticity, Energy, Inertia, Phases, Step, ViscoplasticHistory,
         ViscousStress,
     },
     job::Job,
@@ -147,7 +147,10 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
             Box::new(Watched {
-                inner: ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) },
+                inner: Elasticity::new(
+                    ByMaterial::uniform(ElasticLaw { tensor, with_history: false }),
+                    false,
+                ),
                 seen: seen.clone(),
             }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
@@ -183,10 +186,10 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     );
     assert_eq!(seen.gathered["explicit"], ["strain", "strain_rate"]);
 
-    let elastic = || ElasticStress { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) };
+    let elastic = || Elasticity::new(ByMaterial::uniform(ElasticLaw { tensor, with_history: false }), false);
     let law =
         material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9, elasticity: tensor };
-    let damage = || Damage::new(ByMaterial::uniform(law), &runs);
+    let damage = || Damage::new(ByMaterial::uniform(law), &runs, false);
     let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
     });

@@ -180,10 +180,8 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
         job += &format!("hypothesis = \"{hypothesis}\"\n");
     }
     job += &material(draw, dynamic, hypothesis == "plane_stress");
-    // Damage, adhesion and memory go with the lagged scheme only.
-    let lags = scheme == "lagged_euler";
     let weak = &mut Draw(number + 5000, 0);
-    if lags && job.contains("elasticity") && weak.flip() {
+    if job.contains("elasticity") && weak.flip() {
         let (threshold, viscosity) = (weak.between(0.0, 2e-3), weak.between(1e-4, 2e-3));
         let (exponent, largest) = (weak.one_of(&["0", "1", "2.5"]), weak.between(0.3, 0.99));
         job += &format!(
@@ -204,8 +202,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
     if draw.between(0.0, 1.0) < 0.85 {
         let contact = contact::<D>(draw);
         let rubs_along_edges = D == 3 && contact.contains("friction");
-        if lags
-            && !rubs_along_edges
+        if !rubs_along_edges
             && !contact.contains("gauss")
             && !contact.contains("gap")
             && !contact.contains("obstacle")
@@ -223,7 +220,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
             job += &contact;
             // Memory goes with laws that know no gap and friction that does not follow the pressure, at nodes.
             let strange = ["gauss", "gap", "obstacle", "unilateral", "coulomb", "slip_weakening"];
-            if lags && !strange.iter().any(|word| contact.contains(word)) {
+            if !strange.iter().any(|word| contact.contains(word)) {
                 let (stiffness, time) = (weak.between(10.0, 200.0), weak.between(0.002, 0.5));
                 job += &format!(
                     "[contact.memory]\nstiffness_rate = {}\ndecay_time = {time}\n",
@@ -264,8 +261,8 @@ fn balanced<const D: usize, const S: usize>(
     (run.totals, text)
 }
 
-/// What each scheme must have met, as it stands in jobs, and what the lagged one alone knows.
-const MET: [&str; 20] = [
+/// What each scheme must have met, as it stands in jobs.
+const MET: [&str; 23] = [
     "plane_stress",
     "density",
     "viscosity",
@@ -286,8 +283,10 @@ const MET: [&str; 20] = [
     "tresca",
     "coulomb",
     "slip_weakening",
+    "damage",
+    "adhesion",
+    "[contact.memory]",
 ];
-const MET_BY_THE_LAGGED: [&str; 3] = ["damage", "adhesion", "[contact.memory]"];
 
 fn assert_met(scheme: &str, jobs: &[String], words: &[&str]) {
     let count = |word: &str| jobs.iter().filter(|job| job.contains(word)).count();
@@ -323,7 +322,6 @@ pub fn random_jobs(session: &Session) {
         active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
     }
     assert_met("lagged_euler", &jobs, &MET);
-    assert_met("lagged_euler", &jobs, &MET_BY_THE_LAGGED);
     let names = ["elastic", "viscous", "viscoplastic", "contact", "external", "damage", "adhesion"];
     for (count, what) in active.into_iter().zip(names) {
         let least = if what == "adhesion" { JOBS / 10 } else { JOBS / 5 };

@@ -36,6 +36,7 @@ mod pulses;
 mod random_laws;
 mod scenes;
 mod schemes;
+mod softening;
 mod subspace;
 mod taken_back;
 mod tolerance;
@@ -95,6 +96,7 @@ fn scenario() {
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
         "taken_back" => taken_back::in_the_plane(&session),
+        "softening" => softening::all(&session),
         "unloading" => unloading::all(&session),
         "orders_space" => orders::space(&session),
         "ladder_plane" => ladder::plane(&session),

@@ -1,6 +1,6 @@
 //! Steps that are taken back leave no trace in the state, in histories, or in what the surface keeps, to the last bit.
 
-use crate::orders::{Acting, EFFECTS, END};
+use crate::orders::{Acting, EFFECTS, END, SCHEMES};
 use crate::run_on;
 use crate::scenes::simulation;
 use clarke::{
@@ -50,7 +50,7 @@ fn tried_and_straight(session: &Session, effect: &Acting, scheme: &str) {
 
 pub fn in_the_plane(session: &Session) {
     for effect in &EFFECTS {
-        effect.schemes.iter().for_each(|(scheme, _)| tried_and_straight(session, effect, scheme));
+        SCHEMES.iter().for_each(|(scheme, _)| tried_and_straight(session, effect, scheme));
     }
 }
 

@@ -109,12 +109,12 @@ fn history(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
 }
 
 /// A stretched block that is held: damage `1 - exp(-r t)` with `r` the excess of the release rate over the viscosity.
-fn damage(session: &Session, bounds: [f64; 2]) {
+fn damage(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (modulus, ratio, strain, threshold, viscosity) = (100.0, 0.25, 0.1, 0.2, 0.3);
     let energy = 0.5 * modulus * (1.0 - ratio) / ((1.0 + ratio) * (1.0 - 2.0 * ratio)) * strain * strain;
     let rate = (energy - threshold) / viscosity;
     let job = |tolerance: f64| {
-        head("lagged_euler", 1.0, 0.25, tolerance)
+        head(scheme, 1.0, 0.25, tolerance)
             + &format!(
                 "elasticity = {{ youngs_modulus = {modulus}, poisson_ratio = {ratio} }}\n\
                  viscosity = {{ volumetric = 100, shear = 2000 }}\n\
@@ -128,16 +128,16 @@ fn damage(session: &Session, bounds: [f64; 2]) {
         let exact = 1.0 - (-rate * run.state.time).exp();
         history(run, "damage").iter().map(|d| (d - exact).abs()).fold(0.0, f64::max)
     };
-    falls(session, "damage", job, off, (1e-4, bounds));
+    falls(session, &format!("damage, {scheme}"), job, off, (1e-4, bounds));
 }
 
 /// A block held apart from the ground, too viscous to sag: its bonds give way by themselves, `b = l + (1 - l) exp(-drive t / viscosity)` with `l` the
 /// energy over the drive.
-fn bonds(session: &Session, bounds: [f64; 2]) {
+fn bonds(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (stiffness, opening, energy, viscosity) = (100.0, 0.1, 0.25, 0.5);
     let drive = stiffness * opening * opening;
     let job = |tolerance: f64| {
-        head("lagged_euler", 1.0, 0.25, tolerance)
+        head(scheme, 1.0, 0.25, tolerance)
             + "density = 100\nviscosity = { volumetric = 0, shear = 1e9 }\n"
             + "[[support]]\non = [\"left\", \"right\", \"top\"]\nfix = \"all\"\n"
             + &format!(
@@ -153,15 +153,15 @@ fn bonds(session: &Session, bounds: [f64; 2]) {
         let low = run.body.mesh.nodes.iter().zip(&bonding).filter(|(x, _)| x[1].abs() < 1e-12);
         low.map(|(_, b)| (b - exact).abs()).fold(0.0, f64::max)
     };
-    falls(session, "bonds", job, off, (1e-4, bounds));
+    falls(session, &format!("bonds, {scheme}"), job, off, (1e-4, bounds));
 }
 
 /// A stiff plate on a foundation that remembers, pressed in and lifted by turns: the differential equations of its depth and of
 /// the pressure, in much shorter steps.
-fn memory(session: &Session, bounds: [f64; 2]) {
+fn memory(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (mass, damping, rate, decay, load, frequency) = (10.0, 30.0, 600.0, 0.5, 60.0, 9.0);
     let job = |tolerance: f64| {
-        head("lagged_euler", 1.0, 0.0625, tolerance)
+        head(scheme, 1.0, 0.0625, tolerance)
             + &format!(
                 "density = {mass}\nviscosity = {{ volumetric = 0, shear = 1e6 }}\n[[contact]]\non = [\"bottom\"]\n\
                  normal.graph = {{ points = [[0, 0]], slope_before = {damping}, slope_after = {damping} }}\n\
@@ -192,7 +192,7 @@ fn memory(session: &Session, bounds: [f64; 2]) {
         let displacement = run.state.displacement.local().expect("values");
         displacement.chunks_exact(2).map(|u| (u[1] + exact).abs() / size).fold(0.0, f64::max)
     };
-    falls(session, "memory", job, off, (1e-3, bounds));
+    falls(session, &format!("memory, {scheme}"), job, off, (1e-3, bounds));
 }
 
 pub fn all(session: &Session) {
@@ -200,10 +200,10 @@ pub fn all(session: &Session) {
     for (scheme, bounds) in SCHEMES.into_iter().zip(of_each) {
         relaxation(session, scheme, bounds);
         creep(session, scheme, bounds);
+        damage(session, scheme, [0.25, 2e-2]);
+        bonds(session, scheme, [0.25, 2e-2]);
+        memory(session, scheme, [0.5, 5e-2]);
     }
-    damage(session, [0.25, 2e-2]);
-    bonds(session, [0.25, 2e-2]);
-    memory(session, [0.5, 5e-2]);
 }
 
 #[test]

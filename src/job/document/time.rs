@@ -32,8 +32,8 @@ pub struct Time {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
-    /// Wang and Cheng's (24)-(25): elastic and viscoplastic stress lag by a step; stable for small steps only. The only one
-    /// with damage, adhesion and contact memory, which take the state before a step.
+    /// Wang and Cheng's (24)-(25): elastic and viscoplastic stress, damage, adhesion and contact memory lag by a step; stable for small
+    /// steps only.
     #[default]
     LaggedEuler,
     /// Every stress at the end of the step: no bound on the step.

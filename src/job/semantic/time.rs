@@ -10,7 +10,6 @@ const MOST_STEPS: f64 = 1e12;
 pub fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
     check_landings(findings);
-    check_scheme(findings);
     check_checkpoint(findings);
     if let Some(Value::Table(options)) = findings.root.find("solver.petsc").map(|node| &node.value) {
         for (key, node) in options {
@@ -78,31 +77,6 @@ fn check_landings(findings: &mut Findings<'_>) {
             );
         }
         before = before.max(time);
-    }
-}
-
-/// Effects that take the state before the step go with the scheme that does so.
-fn check_scheme(findings: &mut Findings<'_>) {
-    let scheme = findings.root.read::<String>("time.scheme").unwrap_or_default();
-    if !["implicit_euler", "bdf2"].contains(&scheme.as_str()) {
-        return;
-    }
-    let list = |list: &str, key: &str| -> Vec<String> {
-        (0..findings.root.count(list)).map(|at| format!("{list}.{at}.{key}")).collect()
-    };
-    let mut places = vec!["material.damage".to_owned()];
-    places.extend(list("region", "material.damage"));
-    places.extend(list("contact", "adhesion"));
-    places.extend(list("contact", "memory"));
-    for place in places {
-        if findings.root.find(&place).is_none() {
-            continue;
-        }
-        let message = format!(
-            "damage, adhesion and contact memory take the state before a step: \"{scheme}\" would lose its order or its \
-             freedom of step with them"
-        );
-        findings.fault(&place, message, "take scheme = \"lagged_euler\"");
     }
 }
 

@@ -2,15 +2,16 @@ use super::{Curvature, Effect, Energy, Form, Phases, Step, StressError, isotropi
 use crate::{
     lanes::Pack,
     material::{ByMaterial, Isotropic},
-    space::{Batch, Integrity, Needs},
-    tensor::add_scaled,
+    space::{Batch, CellMatrix, Integrity, Needs, Simplex},
+    tensor::{add_scaled, dot},
 };
 
-/// Elastic stress of the displacement before the step: `E e(u_{n-1})` in (24).
+/// Elastic stress `E e(u)`: of the displacement before the step, `E e(u_{n-1})` in (24), or of that at its end, `u_n = u~ + k' v_n`, where
+/// `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.
 #[derive(Debug)]
-pub struct ElasticStress {
-    /// What the elastic materials are.
-    pub law: ByMaterial<ElasticLaw>,
+pub struct Elasticity {
+    law: ByMaterial<ElasticLaw>,
+    is_implicit: bool,
 }
 
 /// An elastic material.
@@ -22,25 +23,39 @@ pub struct ElasticLaw {
     pub with_history: bool,
 }
 
-impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
+impl Elasticity {
+    /// Elasticity of these materials, at the end of steps or before them.
+    pub fn new(law: ByMaterial<ElasticLaw>, is_implicit: bool) -> Self {
+        Self { law, is_implicit }
+    }
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
     fn name(&self) -> &'static str {
         "elasticity"
     }
 
     fn phases(&self) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
-        let both = Needs { strain_rate: true, ..strain };
+        let after = Needs { strain_rate: !self.is_implicit, ..strain };
         Phases {
+            matrix: self.is_implicit,
             explicit: Some(strain),
-            energy: Some(both),
-            stress: Some(both),
+            energy: Some(after),
+            stress: Some(after),
             error: Some(strain),
-            ..Phases::default()
+            weakens: false,
         }
     }
 
     fn is_everywhere(&self) -> bool {
         self.law.is_everywhere()
+    }
+
+    fn add_matrix(&self, material: usize, cell: &Simplex<D>, length: f64, matrix: &mut CellMatrix<D>) {
+        if let Some(law) = self.law.get(material) {
+            matrix.add_isotropic(cell, length * law.tensor.volumetric, length * law.tensor.shear);
+        }
     }
 
     fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
@@ -54,13 +69,28 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
         isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
+    fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
+        let share = batch.integrity.shares();
+        for lane in 0..batch.count {
+            let strain = batch.strain.lane(lane);
+            let change = add_scaled(&strain, -1.0, &batch.strain_before.lane(lane));
+            let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
+            let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
+            let work = dot(&law.tensor.apply(&strain), &beside);
+            energy.numerical += share[lane] * batch.cells.volume[lane] * (work - jump);
+        }
+    }
+
     fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
         let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
         if !law.with_history {
             energy.elastic += 0.5 * square(&batch.strain);
         }
-        energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
+        if !self.is_implicit {
+            energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
+        }
     }
 
     fn add_error(&self, _curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
@@ -83,9 +113,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ElasticStress {
 
     fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        let before = Pack::from_lanes(|lane| {
-            add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane))
-        });
-        isotropic::add_stresses(&law.tensor, 1.0, &before, &batch.integrity, &mut batch.stress);
+        let before = |lane| add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane));
+        let strain = if self.is_implicit { batch.strain } else { Pack::from_lanes(before) };
+        isotropic::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
     }
 }
