@@ -85,7 +85,7 @@ fn fields(needs: Needs) -> usize {
 mod tests {
     use super::*;
     use crate::{
-        effect::{Load, ViscoplasticHistory},
+        effect::{Load, ViscoplasticFlow},
         material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Viscoplasticity},
         mesh::Mesh,
         space::Geometry,
@@ -124,7 +124,7 @@ mod tests {
         let (geometry, mesh) = square();
         let elasticity = Elasticity { youngs_modulus: 10.0, poisson_ratio: 0.3 };
         let law = Viscoplasticity::Maxwell(Maxwell::new(elasticity, Hypothesis::PlaneStress, 0.5, None));
-        let history = ViscoplasticHistory::<3>::new(ByMaterial::uniform(law), &geometry.runs);
+        let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry.runs, false);
         let with_history = body(vec![Box::new(history)], geometry.clone(), mesh.clone());
         let passes = with_history.pass_bytes();
         // Displacement and velocity are read, forces read and written, three stresses of each cell read and written.

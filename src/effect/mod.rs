@@ -20,7 +20,6 @@ mod support;
 mod surface;
 mod tangents;
 mod viscoplastic_flow;
-mod viscoplastic_history;
 mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
@@ -39,7 +38,6 @@ pub use support::{Held, Support, fixed_components};
 pub use surface::{SurfaceEffect, SurfaceState, SurfaceStep};
 pub use tangents::Tangents;
 pub use viscoplastic_flow::ViscoplasticFlow;
-pub use viscoplastic_history::ViscoplasticHistory;
 pub use viscous_stress::ViscousStress;
 
 use crate::material::Isotropic;

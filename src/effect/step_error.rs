@@ -1,11 +1,13 @@
 //! The error that a step makes in stresses and histories.
 
-use super::{Step, cell_history::CellHistory, isotropic};
+use super::Step;
 use crate::{
     lanes::Pack,
-    material::{ByMaterial, Viscoplasticity},
-    space::Batch,
+    material::Isotropic,
+    space::{Integrity, SimplexPack},
 };
+
+use super::isotropic;
 
 /// What no straight line through the last values has of the next one: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
 /// x_{n-2}))` with `w = k_n / k_{n-1}`, the local error of implicit Euler. In the first step values count as steady before it.
@@ -44,22 +46,21 @@ pub struct StressError {
 }
 
 impl StressError {
-    /// Adds what a history of flow makes of the stresses of the batch's cells, if they keep one, and its error.
-    pub(super) fn add_flow<const D: usize, const S: usize>(
+    /// Adds a history of stresses of these cells and its error, given its values at the end of the step and before it, and the
+    /// strain at its end.
+    pub(super) fn add_history<const D: usize, const S: usize>(
         &mut self,
-        laws: &ByMaterial<Viscoplasticity>,
-        history: &CellHistory<S>,
+        elasticity: &Isotropic,
+        (cells, integrity): (&SimplexPack<D>, &Integrity),
+        strain: &Pack<S>,
         curvature: Curvature,
-        batch: &Batch<D, S>,
+        [now, before, earlier]: [&Pack<S>; 3],
     ) {
-        let Some(law) = laws.get(batch.material) else { return };
-        let Some([now, before, earlier]) = history.last_three(batch.number) else { return };
-        let (elasticity, cells, integrity) = (law.elasticity(), batch.cells, &batch.integrity);
         let error: Pack<S> = Pack::from_lanes(|lane| {
             std::array::from_fn(|c| curvature.error([now, before, earlier].map(|values| values.0[c][lane])))
         });
         self.error += isotropic::inverse_square(elasticity, cells, integrity, &Pack::ZERO, &error);
-        self.size += isotropic::inverse_square(elasticity, cells, integrity, &batch.strain, now);
+        self.size += isotropic::inverse_square(elasticity, cells, integrity, strain, now);
     }
 }
 

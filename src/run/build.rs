@@ -6,8 +6,8 @@ use crate::{
     contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
     effect::{
         self, Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
-        Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscoplasticHistory,
-        ViscousStress, choose_unknowns, fixed_components,
+        Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
+        fixed_components,
     },
     error::{Error, Result},
     job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Scalar},
@@ -103,11 +103,7 @@ fn effects<const D: usize, const S: usize>(
     }
     let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
-        effects.push(if scheme.is_implicit() {
-            Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs, scheme.is_two_step()))
-        } else {
-            Box::new(ViscoplasticHistory::<S>::new(laws, &geometry.runs))
-        });
+        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs, scheme.is_implicit())));
     }
     if let Some(laws) = by_material(materials, damage_law::<S>) {
         effects.push(Box::new(Damage::new(laws, &geometry.runs, scheme.is_implicit())));

@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
     effect::{
-        Damage, Effect, ElasticLaw, Elasticity, Energy, Inertia, Phases, Step, ViscoplasticHistory,
+        Damage, Effect, ElasticLaw, Elasticity, Energy, Inertia, Phases, Step, ViscoplasticFlow,
         ViscousStress,
     },
     job::Job,
@@ -175,7 +175,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let runs = Geometry::new(&part(session, whole)).runs;
     let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
-            Box::new(Watched { inner: ViscoplasticHistory::<S>::new(laws(), &runs), seen: seen.clone() }),
+            Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &runs, false), seen: seen.clone() }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
         ]
     });

@@ -1,41 +1,16 @@
-use super::{
-    Curvature, Effect, Energy, History, Phases, Step, StressError, cell_history::CellHistory, isotropic,
-};
+//! Flow at the start of a step: `H_n = H_{n-1} + k G(s_{n-1})`, the running sum of (24).
+//!
+//! `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
+
+use super::ViscoplasticFlow;
 use crate::{
+    effect::{Energy, Step},
     lanes::{LANES, Pack, sum},
-    material::{ByMaterial, Isotropic, Viscoplasticity},
-    space::{Batch, CellRun, Integrity, Needs, SimplexPack},
+    material::{Isotropic, Viscoplasticity},
+    space::{Batch, Integrity, SimplexPack},
     tensor::{Mandel, add_scaled, dot},
 };
 use multiversion::multiversion;
-
-/// The running sum `H_n = H_{n-1} + k G(s_{n-1})` of (24), one tensor for each cell that flows, and the viscoplastic strain
-/// that hardening cells accumulate.
-///
-/// `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
-#[derive(Debug)]
-pub struct ViscoplasticHistory<const S: usize> {
-    laws: ByMaterial<Viscoplasticity>,
-    stress: CellHistory<S>,
-    accumulated: Option<CellHistory<1>>,
-    /// With power laws: the fastest relaxation in 1/s at the stresses met since it was asked for.
-    fastest: Option<f64>,
-}
-
-impl<const S: usize> ViscoplasticHistory<S> {
-    /// No history yet, for the cells of these runs whose material has a law.
-    pub fn new(laws: ByMaterial<Viscoplasticity>, runs: &[CellRun]) -> Self {
-        let flows = |material: usize| laws.get(material).is_some();
-        let hardens = |material: usize| laws.get(material).is_some_and(Viscoplasticity::hardens);
-        let stress = CellHistory::new("viscoplastic_history", runs, flows);
-        let accumulated = laws
-            .laws()
-            .any(Viscoplasticity::hardens)
-            .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
-        let fastest = laws.laws().any(Viscoplasticity::is_power_law).then_some(0.0);
-        Self { laws, stress, accumulated, fastest }
-    }
-}
 
 /// What advances the history of a batch.
 struct Advance<'a, const D: usize, const S: usize> {
@@ -92,35 +67,17 @@ fn one_by_one<const S: usize>(
     Some(Pack::from_lanes(|lane| rate(lane, &stresses.lane(lane))))
 }
 
-impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
-    fn name(&self) -> &'static str {
-        "viscoplasticity"
-    }
-
-    fn phases(&self) -> Phases {
-        let strain = Needs { strain: true, ..Needs::default() };
-        let both = Needs { strain_rate: true, ..strain };
-        Phases {
-            explicit: Some(both),
-            energy: Some(strain),
-            stress: Some(Needs::default()),
-            error: Some(strain),
-            ..Phases::default()
-        }
-    }
-
-    fn is_everywhere(&self) -> bool {
-        self.laws.is_everywhere()
-    }
-
-    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
-        let Some(history) = self.stress.converged(batch.number) else { return };
-        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
-    }
-
-    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(histories) = self.stress.both(batch.number) else { return };
+impl<const S: usize> ViscoplasticFlow<S> {
+    /// Advances the histories of a batch and adds them to its stress; gives the fastest relaxation in 1/s of power laws at the stresses
+    /// that occur, 0 without any.
+    pub(super) fn advance_explicitly<const D: usize>(
+        &mut self,
+        step: Step,
+        batch: &mut Batch<D, S>,
+        energy: &mut Energy,
+    ) -> f64 {
+        let Some(law) = self.laws.get(batch.material) else { return 0.0 };
+        let Some(histories) = self.stress.both(batch.number) else { return 0.0 };
         let given = Advance {
             elasticity: *law.elasticity(),
             step,
@@ -149,7 +106,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
             }
             Viscoplasticity::Hardening(law) => {
                 let accumulated = self.accumulated.as_mut().and_then(|a| a.both(batch.number));
-                let Some((Pack([before]), Pack([after]))) = accumulated else { return };
+                let Some((Pack([before]), Pack([after]))) = accumulated else { return 0.0 };
                 advance(given, histories, stress, |all: &_| {
                     one_by_one(all, |lane, s| {
                         if law.perzyna.exponent != 1.0 {
@@ -164,63 +121,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
         };
         energy.viscoplastic += dissipated;
         energy.numerical += numerical;
-        if let Some(fastest) = &mut self.fastest
-            && overstress > 0.0
-        {
-            *fastest = fastest.max(law.fastest_rate::<S>(overstress));
-        }
-    }
-
-    fn add_energy(&self, _step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(history) = self.stress.converged(batch.number) else { return };
-        let (strain, integrity) = (&batch.strain, &batch.integrity);
-        energy.elastic +=
-            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
-    }
-
-    fn add_stress(&self, _step: Step, batch: &mut Batch<D, S>) {
-        let Some(history) = self.stress.converged(batch.number) else { return };
-        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
-    }
-
-    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
-        error.add_flow(&self.laws, &self.stress, curvature, batch);
-    }
-
-    fn keep_earlier(&mut self) {
-        self.stress.keep_earlier("previous_viscoplastic_history");
-    }
-
-    fn flow_step_bound(&self) -> Option<f64> {
-        self.laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).reduce(f64::min)
-    }
-
-    fn has_power_law(&self) -> bool {
-        self.fastest.is_some()
-    }
-
-    fn take_fastest_flow(&mut self) -> Option<f64> {
-        self.fastest.as_mut().map(std::mem::take)
-    }
-
-    fn commit(&mut self) {
-        self.stress.commit();
-        self.accumulated.iter_mut().for_each(CellHistory::commit);
-    }
-
-    fn histories(&self) -> Vec<History<'_>> {
-        let accumulated = self.accumulated.as_ref().map(CellHistory::history);
-        std::iter::once(self.stress.history()).chain(accumulated).collect()
-    }
-
-    fn earlier_histories(&self) -> Vec<History<'_>> {
-        self.stress.earlier_history().into_iter().collect()
-    }
-
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        self.stress.restore(name, values);
-        self.accumulated.iter_mut().for_each(|history| history.restore(name, values));
+        if overstress > 0.0 { law.fastest_rate::<S>(overstress) } else { 0.0 }
     }
 }
 
@@ -228,9 +129,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticHistory<S> {
 mod tests {
     use super::*;
     use crate::{
-        material::{Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna},
+        effect::Effect,
+        material::{ByMaterial, Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna},
         space::{
-            Geometry, Nodal,
+            Geometry, Needs, Nodal,
             samples::{number, row},
         },
     };
@@ -261,7 +163,7 @@ mod tests {
         let geometry = Geometry::with_materials(&mesh, material);
         let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
         let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
-        let mut effect = ViscoplasticHistory::<S>::new(laws, &geometry.runs);
+        let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry.runs, false);
         let values = |shift: usize| -> Vec<f64> {
             (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
         };
