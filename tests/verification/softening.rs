@@ -42,7 +42,7 @@ const ALL: [Softening; 5] = [
     Softening {
         name: "short bonds that give way at once",
         material: "",
-        contact: "[contact.adhesion]\nstiffness = 2000\ntangential_stiffness = 900\nenergy = 0.05\nlength = 0.004\n",
+        contact: "[contact.adhesion]\nstiffness = 2000\ntangential_stiffness = 900\nenergy = 0.01\nlength = 0.004\n",
         sign: |totals| totals.adhesion_dissipation,
         skew: true,
     },
