@@ -121,3 +121,20 @@ pub(super) fn evaluate<const D: usize>(
     }
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Expression;
+
+    #[test]
+    fn loads_are_steady_where_neither_tractions_nor_body_forces_depend_on_time() {
+        let of = |text: &str| vec![Scalar::Expression(Expression::parse(text).expect("an expression"))];
+        let load = |traction: &str, force: &str| Load {
+            tractions: vec![Traction { facets: Vec::new(), value: of(traction) }],
+            body_forces: vec![BodyForce { value: of(force) }],
+        };
+        assert!(load("x", "3*y").is_steady() && Load::default().is_steady());
+        assert!(!load("t", "3*y").is_steady() && !load("x", "3*t").is_steady());
+    }
+}

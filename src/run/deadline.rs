@@ -62,7 +62,7 @@ impl Deadline {
         let limits = Limits {
             wall: checkpoint.and_then(|c| c.wall_limit).unwrap_or(f64::INFINITY),
             slurm: if over.is_some() { f64::INFINITY } else { left },
-            margin: checkpoint.and_then(|c| c.margin).unwrap_or(MARGIN.min(LARGEST_SHARE * left)),
+            margin: checkpoint.and_then(|c| c.margin).unwrap_or_else(|| margin(left)),
         };
         let now = Instant::now();
         let zero = Duration::ZERO;
@@ -94,9 +94,14 @@ impl Deadline {
         self.longest_save = self.longest_save.max(spent);
     }
 
+    /// Learns how long a round of steps took.
+    fn took(&mut self, spent: Duration) {
+        self.longest_round = self.longest_round.max(spent);
+    }
+
     /// Asked after each step: why the run has to stop now, the same on all ranks. Collective.
     pub fn passed(&mut self, session: &Session) -> Option<String> {
-        self.longest_round = self.longest_round.max(self.checked.elapsed());
+        self.took(self.checked.elapsed());
         self.checked = Instant::now();
         if self.limits.wall.is_infinite() && self.limits.slurm.is_infinite() {
             return None;
@@ -113,6 +118,11 @@ impl Deadline {
             _ => None,
         }
     }
+}
+
+/// Seconds kept free where the job does not say how many, with so many left at the start.
+fn margin(left: f64) -> f64 {
+    MARGIN.min(LARGEST_SHARE * left)
 }
 
 fn now() -> f64 {
@@ -159,7 +169,12 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_checkpoint_counts() {
+    fn short_jobs_keep_a_tenth_of_their_time_free() {
+        assert_eq!([1000.0, 300.0, 200.0].map(margin), [30.0, 30.0, 20.0]);
+    }
+
+    #[test]
+    fn the_longest_checkpoint_and_the_longest_round_count() {
         let limits = Limits { wall: f64::INFINITY, slurm: f64::INFINITY, margin: 0.0 };
         let (now, zero) = (Instant::now(), Duration::ZERO);
         let mut deadline = Deadline {
@@ -173,7 +188,9 @@ mod tests {
         };
         for seconds in [2, 5, 3] {
             deadline.saved(Duration::from_secs(seconds));
+            deadline.took(Duration::from_secs(2 * seconds));
         }
         assert_eq!(deadline.longest_save, Duration::from_secs(5));
+        assert_eq!(deadline.longest_round, Duration::from_secs(10));
     }
 }

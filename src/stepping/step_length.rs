@@ -99,6 +99,9 @@ mod tests {
         assert_eq!(landings.steps_after(0.7, 0.1), 3);
         let with_output = Landings { interval: Some(0.5), ..landings };
         assert_eq!(times(&with_output), [0.0, 0.25, 0.5, 0.7, 1.0]);
+        let named = |times: Vec<f64>, interval| Landings { times, interval, end: 1.0 }.next(0.4).what;
+        assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
+        assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
         let none = Landings { times: Vec::new(), interval: None, end: 1.0 };
         assert_eq!((none.next(0.3).time, none.steps_after(0.0, 0.3)), (1.0, 4));
     }

@@ -61,6 +61,71 @@ fn by_hand(session: &Session) {
     }
 }
 
+/// A bar of viscosity `c` and modulus `E` without Poisson's effect under a pull that rises as `t^2`: its strain rate is uniform and
+/// follows the scheme's recursion `(c + k' E) e' = p(t_n) - E e~`, and the stress error is `E` times what the scheme's own length
+/// makes of the error of the rate.
+fn strained_by_hand(session: &Session, scheme: &str) {
+    let (modulus, shear, pull) = (50.0, 10.0, 3.0);
+    let job = time(scheme, 1.0, 0.1, 1e-3, [1e-6, 0.5])
+        + &format!(
+            "[material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = {modulus}, poisson_ratio = 0 }}\n\
+             viscosity = {{ volumetric = 0, shear = {shear} }}\n[[support]]\non = [\"left\"]\nfix = [\"x\"]\n\
+             [[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n[[traction]]\non = [\"right\"]\nvalue = [\"{pull}*t^2\", 0]\n"
+        );
+    let mut run = simulation::<2, 4>(session, &job, &square(2));
+    // The last two rates and strains, and the length of the step before.
+    let (mut time, mut rates, mut strains, mut last) = (0.0, [0.0; 2], [0.0; 2], 0.0);
+    for length in [0.1, 0.2, 0.1, 0.1] {
+        time += length;
+        let step = Step { time, length, previous_length: last };
+        let mut outcome = run.scheme.attempt(session, &mut run.body, &run.state, step).expect("a step");
+        let found = run.scheme.error(session, &mut run.body, &run.state, step).expect("an error");
+        run.scheme.accept(session, &mut run.body, &mut run.state, step, &mut outcome).expect("committed");
+        let ratio = if last > 0.0 { length / last } else { 0.0 };
+        let two_steps = scheme == "bdf2" && last > 0.0;
+        let (own, start) = if two_steps {
+            let below = 1.0 + 2.0 * ratio;
+            let start = ((1.0 + ratio).powi(2) * strains[0] - ratio * ratio * strains[1]) / below;
+            (length * (1.0 + ratio) / below, start)
+        } else {
+            (length, strains[0])
+        };
+        let rate = (pull * time * time - modulus * start) / (shear + own * modulus);
+        let off = if two_steps {
+            length / (length + last) * (rate - rates[0] - ratio * (rates[0] - rates[1]))
+        } else {
+            0.5 * (rate - rates[0])
+        };
+        let expected = own * modulus.sqrt() * off.abs();
+        let error = found.error.stress;
+        assert!((error / expected - 1.0).abs() < 1e-6, "{scheme}, t = {time}: {error} is not {expected}");
+        (rates, strains, last) = ([rate, rates[0]], [start + own * rate, strains[0]], length);
+    }
+}
+
+/// A block that is held stretched, so that only its damage grows, in the first step from 0 to `d`: the error is half of that times the
+/// stress of the sound block, and the size counts what the damaged one bears.
+fn damaged_by_hand(session: &Session, scheme: &str) {
+    let (modulus, strain, threshold, viscosity, length) = (100.0, 0.1, 0.2, 0.3, 0.2);
+    let job = time(scheme, 1.0, length, 1e-3, [1e-6, 0.5])
+        + &format!(
+            "[material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = {modulus}, poisson_ratio = 0 }}\n\
+             viscosity = {{ volumetric = 1, shear = 20 }}\ndamage = {{ threshold = {threshold}, viscosity = {viscosity}, exponent = 0 }}\n\
+             [[support]]\non = [\"left\", \"right\", \"bottom\", \"top\"]\nfix = \"all\"\n\
+             [[body_force]]\nvalue = [1e-8, 1e-8]\n[initial]\ndisplacement = [\"{strain}*x\", 0]\n"
+        );
+    let mut run = simulation::<2, 4>(session, &job, &square(2));
+    let step = Step { time: length, length, previous_length: 0.0 };
+    run.scheme.attempt(session, &mut run.body, &run.state, step).expect("a step");
+    let found = run.scheme.error(session, &mut run.body, &run.state, step).expect("an error");
+    let twice = modulus * strain * strain;
+    let damage = length * (0.5 * twice - threshold) / viscosity;
+    let expected = [0.5 * damage * twice.sqrt(), ((1.0 - damage) * twice).sqrt()];
+    for (found, expected) in [found.error.stress, found.size.stress].into_iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{scheme}: {found} is not {expected}");
+    }
+}
+
 /// The paper's square, small, with flow, that meets a rigid obstacle on its way: there steps are taken back.
 fn paper(scheme: &str) -> String {
     time(scheme, 0.5, 0.03125, 0.02, [1e-5, 0.0625])
@@ -121,6 +186,10 @@ fn no_number(session: &Session) {
 
 pub fn errors(session: &Session) {
     by_hand(session);
+    ["implicit_euler", "bdf2"].into_iter().for_each(|scheme| strained_by_hand(session, scheme));
+    ["lagged_euler", "implicit_euler", "bdf2"]
+        .into_iter()
+        .for_each(|scheme| damaged_by_hand(session, scheme));
     no_number(session);
     for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
         replay(session, scheme);

@@ -3,6 +3,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
+    effect::Step,
     mesh::{GlobalMesh, generate::box_mesh},
     run::Simulation,
     session::Session,
@@ -146,6 +147,31 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
     }
 }
 
+/// What sticks to a belt that speeds up has its velocity at the end of a step by the formula of the scheme, over steps of any length:
+/// of a belt at `t^2` exactly `2 t` by the second-order one, but for the first step.
+fn speeding_up(session: &Session) {
+    let material = "density = 2\nelasticity = { youngs_modulus = 100, poisson_ratio = 0.3 }\nviscosity = { volumetric = 1, shear = 2 }";
+    let job = format!(
+        "{}[[body_force]]\nvalue = [0, -10]\n[[contact]]\non = [\"bottom\"]\n{UNILATERAL}\
+         [contact.friction.tresca]\nbound = 1e4\n[contact.obstacle.plane]\npoint = [\"t^2\", 0]\nnormal = [0, 1]\n",
+        start::<2>("bdf2", 0.1, 10, material)
+    );
+    let mut run: Simulation<2, 4> = simulation(session, &job, &crossed([3, 2]));
+    let (mut time, mut previous_length) = (0.0, 0.0);
+    for length in [0.1, 0.05, 0.08, 0.03, 0.06] {
+        time += length;
+        let step = Step { time, length, previous_length };
+        run.scheme.advance(session, &mut run.body, &mut run.state, step).expect("a step");
+        let expected = if previous_length == 0.0 { length } else { 2.0 * time };
+        let velocity = run.state.velocity.owned().expect("velocity");
+        let feet = velocity.chunks_exact(2).zip(&run.body.mesh.nodes).filter(|(_, x)| x[1] == 0.0);
+        let off = feet.fold(0.0, |m, (v, _)| larger(m, (v[0] - expected).abs()));
+        let [off] = session.largest([off]);
+        assert!(off < 1e-9, "t = {time}: feet are {off:e} m/s off {expected} m/s");
+        previous_length = length;
+    }
+}
+
 /// Holds the friction at each node with pressure against Coulomb's law on an obstacle with the velocity `surface` in space at a
 /// place; gives the torque of friction on the body about `centre` along the last axis, and the points that touch.
 fn hold_against<const D: usize, const S: usize>(
@@ -280,6 +306,7 @@ fn held(session: &Session) {
 }
 
 pub fn all(session: &Session) {
+    speeding_up(session);
     seen_from_the_belt::<2, 4>(session, &crossed([6, 3]));
     seen_from_the_belt::<3, 6>(session, &brick([4, 3, 2]));
     let flat = clarke::mesh::generate::rectangle(

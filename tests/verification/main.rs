@@ -8,6 +8,7 @@ mod adhesion;
 mod allocations;
 mod assembly;
 mod belts;
+mod branches;
 mod callbacks;
 mod closed_forms;
 mod creep;
@@ -97,6 +98,7 @@ fn scenario() {
         "orders_plane" => orders::plane(&session),
         "taken_back" => taken_back::in_the_plane(&session),
         "softening" => softening::all(&session),
+        "branches" => branches::passed(&session),
         "unloading" => unloading::all(&session),
         "orders_space" => orders::space(&session),
         "ladder_plane" => ladder::plane(&session),

@@ -121,6 +121,19 @@ fn a_curved_surface_is_refused() {
 }
 
 #[test]
+fn how_flat_a_surface_has_to_be_depends_on_its_size() {
+    let square = |size: f64, rise: f64| Sample {
+        nodes: format!(
+            "1 5 1 9\n2 1 0 5\n1\n2\n3\n4\n9\n0 0 0\n{size} 0 0\n{size} {size} {rise}\n0 {size} 0\n7 7 7\n"
+        )
+        .leak(),
+        ..SQUARE
+    };
+    assert!(parse(square(1e3, 5e-10).text().as_bytes()).is_ok(), "rounding of a kilometre");
+    sample_refused(square(1e-6, 1e-15), &["constant z"]);
+}
+
+#[test]
 fn a_cell_needs_exactly_one_region() {
     let entities = "0 0 1 0\n1 0 0 0 1 1 0 2 5 6 0\n";
     let names = "2\n2 5 \"plate\"\n2 6 \"core\"\n";

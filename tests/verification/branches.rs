@@ -1,0 +1,27 @@
+//! Changes of branches are counted between the state before a step and that at its end, over all ranks.
+
+use crate::run_on;
+use crate::scenes::{any_mesh, crossed, simulation};
+use clarke::{run::Simulation, session::Session};
+
+/// A block that falls with `v = g t` beside a law whose slope changes at 0.25 m/s: all its feet change in the step that passes that
+/// velocity and in no other, also where the solution is what the step was started from.
+pub fn passed(session: &Session) {
+    let job = format!(
+        "{}[time]\nend = 0.6\nstep = 0.1\n[material]\nhypothesis = \"plane_strain\"\ndensity = 1\n\
+         viscosity = {{ volumetric = 1, shear = 2 }}\n[[body_force]]\nvalue = [0, -1]\n[[contact]]\non = [\"bottom\"]\n\
+         normal.graph = {{ points = [[-1, 0], [0.25, 0]], slope_after = 1e-6 }}\n",
+        any_mesh::<2>()
+    );
+    let mut run: Simulation<2, 4> = simulation(session, &job, &crossed([4, 2]));
+    let mut changes = Vec::new();
+    while let Some(outcome) = run.advance(session).expect("a step") {
+        changes.push(outcome.active_changes);
+    }
+    assert_eq!(changes, [0, 0, 5, 0, 0, 0]);
+}
+
+#[test]
+fn changes_of_branches_are_counted_from_the_state_before_the_step_on_all_ranks() {
+    run_on(&[1, 2], "branches");
+}
