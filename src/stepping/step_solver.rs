@@ -299,8 +299,10 @@ impl StepSolver {
                 "check loads and initial values; use smaller steps",
             ));
         }
-        // As many newtons as if all unknowns bore alike.
-        let total = norm * ((body.mesh.total_nodes * D) as f64).sqrt();
+        // As many newtons as if all unknowns bore alike. At rest under steady loads the forces cancel: pressures are told apart
+        // no better than what rounding leaves of them.
+        let told = norm.max(rounding / self.settings.inclusion_tolerance);
+        let total = told * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
         // No residual below the rounding of `K v` is asked for, however small the forces that are left; friction on a moving
         // obstacle rounds `v` as a difference from its velocity.

@@ -52,6 +52,41 @@ pub fn judged(session: &Session) {
     }
 }
 
+/// Under a steady load a body without inertia comes to rest: velocities and the forces of a step are rounding, which is no distance to
+/// laws that press next to nothing.
+pub fn at_rest(session: &Session) {
+    let mesh = rectangle([1.0, 1.0], [3, 3], Diagonal::Right, [1.0; 2]).expect("mesh");
+    let laws = [
+        "normal.graph = { points = [[0, 0]] }",
+        "normal.unilateral = { gap = 1 }\nfriction.coulomb = { coefficient = 0.3 }",
+        "normal.unilateral = { gap = 0.02 }",
+        "normal.compliance = { stiffness = 10, gap = 0.01 }",
+        "normal.compliance = { stiffness = 10, gap = 1 }\nfriction.tresca = { bound = 0.1 }",
+    ];
+    for (scheme, law) in
+        ["lagged_euler", "implicit_euler", "bdf2"].into_iter().flat_map(|s| laws.map(|l| (s, l)))
+    {
+        let viscosity =
+            if scheme == "lagged_euler" { "viscosity = { volumetric = 1, shear = 20 }\n" } else { "" };
+        let text = format!(
+            "{}[material]\nhypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 100, poisson_ratio = 0.3 }}\n{viscosity}\
+             [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
+             [[traction]]\non = [\"top\"]\nvalue = [0, \"-9*min(t, 0.5)\"]\n[[contact]]\non = [\"right\"]\n{law}\n\
+             [time]\nscheme = \"{scheme}\"\nend = 4\nstep = 0.05\n",
+            any_mesh::<2>()
+        );
+        let mut run = simulation::<2, 4>(session, &text, &mesh);
+        while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
+        assert_eq!(run.state.step, 80, "{text}");
+        assert!(run.totals.max_inclusion_residual <= 1e-6 && run.totals.elastic_energy > 0.05, "{text}");
+    }
+}
+
+#[test]
+fn bodies_come_to_rest_beside_obstacles_under_every_scheme() {
+    run_on(&[1, 2], "at_rest");
+}
+
 #[test]
 fn the_distance_to_the_graphs_does_not_depend_on_how_a_step_was_solved() {
     run_on(&[1, 2], "judged");

@@ -86,6 +86,7 @@ fn scenario() {
         "one_cell" => one_cell::all(&session),
         "held_by_contact" => held_by_contact::blocks(&session),
         "nearly_free" => held_by_contact::nearly_free(&session),
+        "at_rest" => inclusion::at_rest(&session),
         "judged" => inclusion::judged(&session),
         "indefinite" => indefinite::solve(&session),
         "belts" => belts::all(&session),

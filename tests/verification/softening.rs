@@ -96,7 +96,6 @@ fn long_steps(session: &Session, scheme: &str) {
              hypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 100, poisson_ratio = 0 }}\n\
              damage = {{ threshold = 0.1, viscosity = 0.5, exponent = 1, largest = 0.95 }}\n\
              [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
-             [[contact]]\non = [\"right\"]\nnormal.graph = {{ points = [[0, 0]] }}\n\
              [[traction]]\non = [\"right\"]\nvalue = [\"6*min(t, 0.5)\", 0]\n",
             any_mesh::<2>(),
             1.0 / steps as f64
