@@ -4,6 +4,7 @@ use crate::{
     agreement::Agreed,
     error::{Error, Exit, Result},
     job::{self, Job, Loaded},
+    nearest::nearest,
     output::{inspect::inspect, parallel_file::given_up},
     partitioned,
     report::report,
@@ -212,7 +213,7 @@ fn job_behind_restart(job: &str) -> String {
 /// What to say if this is no file but much like a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
-    let near = job::nearest(word, COMMANDS)?;
+    let near = nearest(word, COMMANDS)?;
     (!path.exists() && path.extension().is_none())
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
 }

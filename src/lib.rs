@@ -6,13 +6,15 @@
 pub mod error;
 pub mod tensor;
 pub mod lanes;
+pub mod nearest;
+pub mod expression;
+pub mod contact;
 pub mod job;
 pub mod petsc;
 pub mod agreement;
 pub mod session;
 pub mod exchange;
 pub mod material;
-pub mod contact;
 pub mod mesh;
 pub mod space;
 pub mod state;

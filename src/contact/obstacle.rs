@@ -15,7 +15,7 @@
 
 use crate::{
     error::{Error, Result},
-    job::Scalar,
+    expression::Scalar,
     tensor::{Vector, add_scaled, dot, norm},
 };
 
@@ -154,7 +154,7 @@ pub(super) mod tests {
     }
 
     pub fn expression(text: &str) -> Scalar {
-        Scalar::Expression(crate::job::Expression::parse(text).unwrap())
+        Scalar::Expression(crate::expression::Expression::parse(text).unwrap())
     }
 
     fn plane(point: Vec<Scalar>, normal: Vec<Scalar>) -> Gap {

@@ -15,7 +15,7 @@
 use super::{Gap, obstacle::vector};
 use crate::{
     error::{Error, Result},
-    job::Scalar,
+    expression::Scalar,
     tensor::{Vector, add_scaled, cross, norm},
 };
 

@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use super::nearest::nearest;
 use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
+use crate::nearest::nearest;
 
 const WIDTH: usize = 100;
 

@@ -7,9 +7,7 @@
 mod describe;
 mod document;
 mod effective;
-mod expression;
 mod load;
-mod nearest;
 mod report;
 mod schema;
 mod semantic;
@@ -17,13 +15,12 @@ mod set;
 mod source;
 mod validate;
 
+pub use crate::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub(crate) use describe::describe_kind;
 pub use describe::{describe, describe_json};
 pub use document::*;
 pub use effective::differing_keys;
-pub use expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub use load::Loaded;
 pub(crate) use load::{Document, normal, read};
-pub(crate) use nearest::nearest;
 pub(crate) use schema::{Kind, Schema, schema_of};
 pub use semantic::MeshNames;

@@ -2,9 +2,9 @@
 
 use toml_edit::Key;
 
-use super::expression::Expression;
 use super::report::Fault;
 use super::source::{Node, Place, Value, parse_value};
+use crate::expression::Expression;
 
 /// Writes the override `text`, which is file `file`, over the document.
 pub fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Fault> {

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::describe;
-use super::expression::Expression;
-use super::nearest::nearest;
 use super::report::Fault;
 use super::schema::{Kind, Schema};
 use super::source::{Node, Place, Value};
+use crate::{expression::Expression, nearest::nearest};
 
 /// What is wrong with the document by itself, before keys are held against each other.
 pub fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {

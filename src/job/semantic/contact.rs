@@ -2,8 +2,8 @@
 
 use super::boundary::{check_flat, check_vector};
 use super::{Findings, MeshNames, items};
+use crate::expression::Scalar;
 use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Method, Quadrature, SlipWeakening};
-use crate::job::expression::Scalar;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::functions::{Meaning, meaning, names};
 use super::{Binary, Instruction, Unary};
-use crate::job::nearest::nearest;
+use crate::nearest::nearest;
 
 /// Longest expression in bytes.
 const LONGEST: usize = 10_000;
