@@ -15,24 +15,65 @@
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
 //! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
 
+use super::{ContactTable, LawFault, NormalLaw};
 use crate::tensor::{Vector, add_scaled, dot, norm};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// Bonds at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Adhesive bonds on a contact boundary.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Adhesion {
-    /// Traction of whole bonds per opening, in Pa/m.
+    /// Traction per opening of whole bonds. They pull with at most `sqrt(stiffness energy)` when opened slowly.
+    #[schemars(range(min = 0), extend("unit" = "Pa/m"), example = 1e6)]
     pub stiffness: f64,
-    /// Traction of whole bonds per sliding, in Pa/m.
-    pub tangential_stiffness: f64,
-    /// Energy per area that breaks the bonds (Dupré's), in J/m².
+    /// Traction per sliding of whole bonds; absent: sliding stretches no bond.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0), extend("unit" = "Pa/m"), example = 5e5)]
+    pub tangential_stiffness: Option<f64>,
+    /// Dupré's energy: what it takes to part a unit of area slowly.
+    #[schemars(range(min = 0), extend("unit" = "J/m^2"), example = 10.0)]
     pub energy: f64,
-    /// What slows debonding, in J s/m²; 0: nothing.
+    /// What slows debonding; absent: bonds give way at once.
+    #[serde(default)]
+    #[schemars(range(min = 0), extend("unit" = "J s/m^2"), example = 0.1)]
     pub viscosity: f64,
-    /// Length in m beyond which the traction grows no more; infinite: never.
-    pub length: f64,
+    /// Opening or sliding beyond which bonds pull no harder; absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 0.01)]
+    pub length: Option<f64>,
 }
 
 impl Adhesion {
+    /// Traction of whole bonds per sliding, in Pa/m.
+    pub fn tangential_stiffness(&self) -> f64 {
+        self.tangential_stiffness.unwrap_or(0.0)
+    }
+
+    /// A length in m, cut where the traction grows no more.
+    fn cut(&self, length: f64) -> f64 {
+        self.length.map_or(length, |most| length.min(most))
+    }
+
+    /// What can't stand beside bonds, which are between what touches at first; keys are those of the contact's table.
+    pub fn faults(table: &ContactTable) -> Vec<LawFault> {
+        let message = "adhesion binds what touches at first: there is no gap";
+        let help = format!("delete it, or [{}.adhesion]", table.path);
+        let gap = table.normal.as_ref().and_then(NormalLaw::gap_key);
+        gap.into_iter().map(|gap| LawFault::at_value(gap, message, help.as_str())).collect()
+    }
+
+    /// What the user should know of the parameters.
+    pub fn warning(&self) -> Option<String> {
+        let (length, energy) = (self.length?, self.energy);
+        let most = (self.stiffness + self.tangential_stiffness()) * length * length;
+        (most <= energy && most > 0.0).then(|| {
+            format!(
+                "at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
+            )
+        })
+    }
+
     /// Opening in m, at least zero, and sliding.
     fn stretch<const D: usize>(displacement: &Vector<D>, normal: &Vector<D>) -> (f64, Vector<D>) {
         let along = dot(displacement, normal);
@@ -43,26 +84,26 @@ impl Adhesion {
     pub fn traction<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
         let (opening, sliding) = Self::stretch(displacement, normal);
         let size = norm(&sliding);
-        let cut = if size > self.length { self.length / size } else { 1.0 };
-        let pull = normal.map(|n| self.stiffness * opening.min(self.length) * n);
-        add_scaled(&pull, -self.tangential_stiffness * cut, &sliding)
+        let cut = if size > self.cut(size) { self.cut(size) / size } else { 1.0 };
+        let pull = normal.map(|n| self.stiffness * self.cut(opening) * n);
+        add_scaled(&pull, -self.tangential_stiffness() * cut, &sliding)
     }
 
     /// Energy in J/m² that whole bonds store: the traction is minus its derivative.
     pub fn potential<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
         let (opening, sliding) = Self::stretch(displacement, normal);
         let of = |length: f64| {
-            let cut = length.min(self.length);
+            let cut = self.cut(length);
             cut * (length - 0.5 * cut)
         };
-        self.stiffness * of(opening) + self.tangential_stiffness * of(norm(&sliding))
+        self.stiffness * of(opening) + self.tangential_stiffness() * of(norm(&sliding))
     }
 
     /// What drives debonding, in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
     pub fn drive<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
         let (opening, sliding) = Self::stretch(displacement, normal);
-        let square = |length: f64| length.min(self.length).powi(2);
-        self.stiffness * square(opening) + self.tangential_stiffness * square(norm(&sliding))
+        let square = |length: f64| self.cut(length).powi(2);
+        self.stiffness * square(opening) + self.tangential_stiffness() * square(norm(&sliding))
     }
 
     /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
@@ -110,8 +151,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const GLUE: Adhesion =
-        Adhesion { stiffness: 100.0, tangential_stiffness: 40.0, energy: 0.5, viscosity: 2.0, length: 0.2 };
+    const GLUE: Adhesion = Adhesion {
+        stiffness: 100.0,
+        tangential_stiffness: Some(40.0),
+        energy: 0.5,
+        viscosity: 2.0,
+        length: Some(0.2),
+    };
     const DOWN: [f64; 2] = [0.0, -1.0];
 
     #[test]
@@ -139,7 +185,7 @@ mod tests {
 
     #[test]
     fn slow_separation_takes_up_the_energy_and_peaks_at_the_root_of_stiffness_and_energy() {
-        let law = Adhesion { viscosity: 0.0, length: f64::INFINITY, ..GLUE };
+        let law = Adhesion { viscosity: 0.0, length: None, ..GLUE };
         let (mut bonding, mut dissipated, mut work, mut peak) = (1.0, 0.0, 0.0, 0.0f64);
         let (steps, end) = (100_000, 5.0);
         for step in 0..steps {

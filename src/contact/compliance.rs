@@ -4,15 +4,31 @@
 //! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
 //! constant is 0.
 
-use super::{NodeContext, Resolved};
+use super::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::{error::Result, expression::Scalar};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// Parameters of the law.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Compliance {
-    /// Pressure at unit penetration, in Pa/m^exponent, positive.
+    /// Pressure at unit penetration.
+    #[schemars(extend("unit" = "Pa/m^exponent", "exclusiveMinimum" = 0), example = 1e4)]
     pub stiffness: f64,
-    /// Exponent, at least 1.
+    /// Power of the penetration; 1 is a bed of springs.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 10), example = 1.5)]
     pub exponent: f64,
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
+    /// or what [contact.obstacle] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    pub gap: Option<Scalar>,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Bisection halves the bracket if Newton's method does not; more iterations than the bits of a number serve nothing.
@@ -20,7 +36,7 @@ const ITERATIONS: usize = 100;
 
 impl Compliance {
     /// Pressure in Pa at a penetration in m.
-    pub fn pressure(&self, penetration: f64) -> f64 {
+    fn pressure_at(&self, penetration: f64) -> f64 {
         if penetration <= 0.0 {
             return 0.0;
         }
@@ -32,34 +48,14 @@ impl Compliance {
     }
 
     /// Derivative of the pressure in Pa/m.
-    pub fn stiffness_at(&self, penetration: f64) -> f64 {
+    fn stiffness_at(&self, penetration: f64) -> f64 {
         if penetration <= 0.0 {
             return 0.0;
         }
         self.stiffness * self.exponent * penetration.powf(self.exponent - 1.0)
     }
 
-    /// Stored energy in J/m²: the integral of the pressure over the penetration.
-    pub fn energy(&self, penetration: f64) -> f64 {
-        self.pressure(penetration) * penetration.max(0.0) / (self.exponent + 1.0)
-    }
-
-    /// Velocity and pressure where `c r + p(d + k r) = s`, for a positive `c`.
-    pub fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
-        let NodeContext { penetration, step_length } = node;
-        let free = s / c;
-        let excess = penetration + step_length * free;
-        if excess <= 0.0 {
-            return Resolved { velocity: free, pressure: 0.0, derivative: 1.0 / c, branch: 0 };
-        }
-        // The penetration d at the end of the step solves d + (k / c) p(d) = excess: monotone and convex.
-        let ratio = step_length / c;
-        let reached = self.penetration(excess, ratio);
-        let pressure = self.pressure(reached);
-        let derivative = 1.0 / (c + step_length * self.stiffness_at(reached));
-        Resolved { velocity: (s - pressure) / c, pressure, derivative, branch: 1 }
-    }
-
+    /// Where `d + ratio p(d) = excess`: monotone and convex.
     fn penetration(&self, excess: f64, ratio: f64) -> f64 {
         if self.exponent == 1.0 {
             return excess / (1.0 + ratio * self.stiffness);
@@ -67,7 +63,7 @@ impl Compliance {
         let (mut low, mut high) = (0.0, excess);
         let mut at = excess;
         for _ in 0..ITERATIONS {
-            let value = at + ratio * self.pressure(at) - excess;
+            let value = at + ratio * self.pressure_at(at) - excess;
             if value > 0.0 {
                 high = at;
             } else {
@@ -84,6 +80,67 @@ impl Compliance {
     }
 }
 
+impl NormalParameters for Compliance {
+    type Response = Self;
+    const HAS_GAP: bool = true;
+
+    fn response(&self) -> Result<Self> {
+        Ok(self.clone())
+    }
+
+    fn gap(&self) -> Option<&Scalar> {
+        self.gap.as_ref()
+    }
+}
+
+impl Response for Compliance {
+    fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
+        let k = node.step_length;
+        let excess = node.penetration_at(s / c);
+        if excess > 0.0 {
+            // The penetration d at the end of the step solves d + (k / c) p(d) = excess.
+            let reached = self.penetration(excess, k / c);
+            let pressure = self.pressure_at(reached);
+            let derivative = 1.0 / (c + k * self.stiffness_at(reached));
+            Resolved { velocity: (s - pressure) / c, pressure, derivative, branch: 1 }
+        } else {
+            Resolved::free(s, c)
+        }
+    }
+
+    fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
+        self.pressure_at(node.penetration_at(velocity))
+    }
+
+    fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
+        node.step_length * self.stiffness_at(node.penetration_at(velocity))
+    }
+
+    fn branch(&self, velocity: f64, node: NodeContext) -> usize {
+        usize::from(node.penetration_at(velocity) > 0.0)
+    }
+
+    fn depends_on_displacement(&self) -> bool {
+        true
+    }
+
+    fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
+        Err("there is no growth constant because compliance follows the displacement")
+    }
+
+    fn energy(&self, penetration: f64) -> Option<f64> {
+        Some(self.pressure_at(penetration) * penetration.max(0.0) / (self.exponent + 1.0))
+    }
+
+    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
+        let slope = format!("{} Pa × (penetration / m)^{}", number(self.stiffness), number(self.exponent));
+        vec![
+            Branch::new("open", "below the gap", "no pressure"),
+            Branch::new("closed", "beyond the gap", slope),
+        ]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,8 +148,11 @@ mod tests {
 
     #[test]
     fn a_linear_foundation_by_hand() {
-        let law = Compliance { stiffness: 100.0, exponent: 1.0 };
-        assert_eq!([law.pressure(-1.0), law.pressure(0.5), law.energy(0.5)], [0.0, 50.0, 12.5]);
+        let law = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
+        assert_eq!(
+            [law.pressure_at(-1.0), law.pressure_at(0.5), law.energy(0.5).unwrap()],
+            [0.0, 50.0, 12.5]
+        );
         // d + 0.5 * 100 d = 1.02 with d = 0.02.
         let node = NodeContext { penetration: 0.02, step_length: 1.0 };
         let found = law.resolve(2.0, 2.0, node);
@@ -107,10 +167,10 @@ mod tests {
         fn the_resolvent_solves_its_equation(
             exponent in 1.0f64..2.0, stiffness in 0.1f64..1e4, start in -1.0f64..1.0, s in -1e3f64..1e3, c in 0.1f64..100.0,
         ) {
-            let law = Compliance { stiffness, exponent };
+            let law = Compliance { stiffness, exponent, gap: None };
             let node = NodeContext { penetration: start, step_length: 0.1 };
             let found = law.resolve(s, c, node);
-            let open = c * found.velocity + law.pressure(start + 0.1 * found.velocity) - s;
+            let open = c * found.velocity + law.pressure(found.velocity, node) - s;
             let size = s.abs() + c * found.velocity.abs() + (1.0 + law.stiffness_at(start.max(0.0)) ) * 1e-2;
             prop_assert!(open.abs() < 1e-9 * (1.0 + size), "{} of {}", open, size);
             let h = 1e-4 * (1.0 + s.abs());
@@ -123,10 +183,11 @@ mod tests {
 
         #[test]
         fn pressure_is_the_derivative_of_the_energy(exponent in 1.0f64..3.0, penetration in 0.01f64..1.0) {
-            let law = Compliance { stiffness: 7.0, exponent };
+            let law = Compliance { stiffness: 7.0, exponent, gap: None };
             let h = 1e-6;
-            let quotient = (law.energy(penetration + h) - law.energy(penetration - h)) / (2.0 * h);
-            prop_assert!((quotient - law.pressure(penetration)).abs() < 1e-7);
+            let energy = |at| law.energy(at).unwrap();
+            let quotient = (energy(penetration + h) - energy(penetration - h)) / (2.0 * h);
+            prop_assert!((quotient - law.pressure_at(penetration)).abs() < 1e-7);
         }
     }
 }

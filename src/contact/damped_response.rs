@@ -4,34 +4,43 @@
 //! on. For `v < 0` it is mirrored: `even` as in (72), `odd` (dissipative in both directions), or zero (`one_sided`: the
 //! foundation does not pull).
 
-use super::Graph;
+use super::{LawFault, NormalParameters, Polyline};
 use crate::error::{Error, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// What the response is for a body that leaves the foundation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Symmetry {
-    /// `g(-v) = g(v)`, the paper's (72).
-    Even,
-    /// `g(-v) = -g(v)`.
-    Odd,
-    /// `g(-v) = 0`.
-    OneSided,
-}
-
-/// Parameters of the law.
-#[derive(Debug, Clone, PartialEq)]
+/// Pressure as a continuous piecewise linear function of the normal velocity, zero at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct DampedResponse {
-    /// Velocities at which the slope changes, in m/s, positive, ascending.
+    /// Normal velocities r_1 < r_2 < ... above zero where the slope changes.
+    #[schemars(extend("unit" = "m/s"), example = [0.003, 0.005])]
     pub breakpoints: Vec<f64>,
-    /// Slopes in Pa s/m, one more than breakpoints.
+    /// Slopes before, between and after the breakpoints: one more than breakpoints; negative ones fall.
+    #[schemars(length(min = 1), extend("unit" = "Pa s/m"), example = [10.0, -10.0, 10.0])]
     pub slopes: Vec<f64>,
-    /// The response to negative velocities.
+    /// How the function goes on for negative velocities.
+    #[serde(default)]
     pub symmetry: Symmetry,
 }
 
-impl DampedResponse {
-    /// The law as a graph.
-    pub fn graph(&self) -> Result<Graph> {
+/// How a function of velocities above zero goes on below.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Symmetry {
+    /// p(-r) = p(r): the potential of (72) as printed.
+    #[default]
+    Even,
+    /// p(-r) = -p(r): resists both ways.
+    Odd,
+    /// p(r) = 0 below zero: only approach is resisted.
+    OneSided,
+}
+
+impl NormalParameters for DampedResponse {
+    type Response = Polyline;
+
+    fn response(&self) -> Result<Polyline> {
         let (Some(&first), Some(&last)) = (self.slopes.first(), self.slopes.last()) else {
             return Err(Error::Refused("damped_response needs at least one slope".into()));
         };
@@ -56,18 +65,39 @@ impl DampedResponse {
             points.retain(|p| p[0] != 0.0);
         }
         let after = if points.len() == 1 { first } else { last };
-        Graph::new(points, before, after)
+        Polyline::new(points, before, after)
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        let mut faults = Vec::new();
+        let mut last = 0.0;
+        for (index, &breakpoint) in self.breakpoints.iter().enumerate() {
+            if breakpoint <= last {
+                let help = "they are velocities above zero, each larger than the one before";
+                let key = format!("breakpoints.{index}");
+                faults.push(LawFault::at_value(key, "breakpoints must ascend from zero", help));
+            }
+            last = breakpoint;
+        }
+        let (slopes, breakpoints) = (self.slopes.len(), self.breakpoints.len());
+        if slopes != breakpoints + 1 {
+            let message = format!("{slopes} slope(s) for {breakpoints} breakpoint(s)");
+            let help = "one slope before, between and after the breakpoints: one more than breakpoints";
+            faults.push(LawFault::at_value("slopes", message, help));
+        }
+        faults
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::{NodeContext, Response};
 
-    fn paper(symmetry: Symmetry) -> Graph {
+    fn paper(symmetry: Symmetry) -> Polyline {
         let law =
             DampedResponse { breakpoints: vec![0.003, 0.005], slopes: vec![10.0, -10.0, 10.0], symmetry };
-        law.graph().unwrap()
+        law.response().unwrap()
     }
 
     /// Eq. (72) as it is printed.
@@ -102,13 +132,14 @@ mod tests {
             assert_eq!(one.pressure(-v), 0.0);
             assert!((one.pressure(v) - printed(v)).abs() < 1e-15);
         }
-        assert_eq!(odd.slope(0.0), 10.0);
+        assert_eq!(odd.slope(0.0, NodeContext::AT_THE_GAP), 10.0);
     }
 
     #[test]
     fn a_single_slope_is_a_linear_damper() {
         for (symmetry, back) in [(Symmetry::Even, 3.0), (Symmetry::Odd, -3.0), (Symmetry::OneSided, 0.0)] {
-            let graph = DampedResponse { breakpoints: vec![], slopes: vec![3.0], symmetry }.graph().unwrap();
+            let graph =
+                DampedResponse { breakpoints: vec![], slopes: vec![3.0], symmetry }.response().unwrap();
             assert_eq!(graph.pressure(1.0), 3.0);
             assert_eq!(graph.pressure(-1.0), back);
         }

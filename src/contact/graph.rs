@@ -1,377 +1,74 @@
-//! The graph of a contact law: pressure over normal velocity, a polyline with two half-lines at its ends.
-//!
-//! `-sigma_nu in g(v_nu)` with `g` piecewise linear; it may fall, and it may jump upwards: two points with the same
-//! velocity, or a vertical ray at an end (an infinite slope there). It is the Clarke subdifferential of the potential
-//! `j(v) = integral of g from 0 to v`, relation (8) of Wang and Cheng (2022). A graph that jumps downwards has no
-//! relaxed monotonicity and is refused.
-//!
-//! For any `c` above the steepest fall, `s = c v + p` grows along the graph: it is a parameter of the graph, and velocity
-//! and pressure are functions of it, Lipschitz continuous also where the graph is vertical ([`Graph::resolve`]).
+//! Any polyline of pressure over normal velocity.
 
-use super::Resolved;
-use crate::error::{Error, Result};
+use super::{LawFault, NormalParameters, Polyline};
+use crate::error::Result;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// A piecewise linear law that may fall, and jump upwards.
-#[derive(Debug, Clone, PartialEq)]
+/// Pressure over normal velocity as a polyline.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Graph {
-    points: Vec<[f64; 2]>,
-    slopes: Vec<f64>,
-    reach: [f64; 2],
+    /// Corners [normal velocity, pressure], velocities ascending; two with the same velocity are an upward jump.
+    #[schemars(length(min = 1), extend("unit" = "[m/s, Pa]"), example = [[0.0, 0.0], [0.003, 0.03]])]
+    pub points: Vec<[f64; 2]>,
+    /// Slope below the first point.
+    #[serde(default)]
+    #[schemars(extend("unit" = "Pa s/m"))]
+    pub slope_before: f64,
+    /// Slope above the last point.
+    #[serde(default)]
+    #[schemars(extend("unit" = "Pa s/m"))]
+    pub slope_after: f64,
 }
 
-impl Graph {
-    /// The polyline through `points` (velocity in m/s ascending, pressure in Pa), with these slopes (Pa s/m) before
-    /// the first and after the last. Two points of the same velocity are an upward jump, an infinite slope is a vertical
-    /// ray: downwards before the first point, upwards after the last.
-    pub fn new(points: Vec<[f64; 2]>, slope_before: f64, slope_after: f64) -> Result<Self> {
-        if points.is_empty() {
-            return Err(Error::Refused("a contact graph needs at least one point".into()));
-        }
-        let mut slopes = vec![slope_before];
-        for pair in points.windows(2) {
-            let [[v, p], [w, q]] = [pair[0], pair[1]];
-            if w < v {
-                return Err(Error::Refused(format!("contact graph: velocity {w} does not come after {v}")));
+impl NormalParameters for Graph {
+    type Response = Polyline;
+
+    fn response(&self) -> Result<Polyline> {
+        Polyline::new(self.points.clone(), self.slope_before, self.slope_after)
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        let mut faults = Vec::new();
+        for (index, pair) in self.points.windows(2).enumerate() {
+            let ([before, low], [after, high]) = (pair[0], pair[1]);
+            let mut fault = |message: &str, help: &str| {
+                faults.push(LawFault::at_value(format!("points.{}", index + 1), message, help));
+            };
+            if after < before {
+                let help = format!("it must be at least {before}");
+                fault("the velocities of a graph must ascend", &help);
+            } else if after == before && high < low {
+                fault(
+                    "a downward jump has no relaxed monotonicity: no step is small enough to be solvable",
+                    "order the two points upwards, or let the pressure fall along a steep slope",
+                );
+            } else if after == before && high == low {
+                fault("this point is there twice", "delete one");
             }
-            if w == v && q <= p {
-                return Err(Error::Refused(format!(
-                    "contact graph: at velocity {v} the pressure goes from {p} to {q}; only upward jumps have a relaxed \
-                     monotonicity: let it fall along a steep slope"
-                )));
+        }
+        for (index, three) in self.points.windows(3).enumerate() {
+            if three[0][0] == three[2][0] {
+                let help = "two points with the same velocity are a jump; the ones between say nothing";
+                let key = format!("points.{}", index + 2);
+                faults.push(LawFault::at_value(key, "three points with the same velocity", help));
             }
-            slopes.push(if w == v { f64::INFINITY } else { (q - p) / (w - v) });
         }
-        slopes.push(slope_after);
-        if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
-            return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
-        }
-        let reach = reach(&points);
-        Ok(Self { points, slopes, reach })
+        faults
     }
-
-    /// Velocity and pressure where `c v + p = s`, for a `c` above the steepest fall.
-    pub fn resolve(&self, s: f64, c: f64) -> Resolved {
-        let branch = self.branch_of(s, c);
-        let [v, p] = self.points[branch.saturating_sub(1)];
-        let slope = self.slopes[branch];
-        if slope == f64::INFINITY {
-            return Resolved { velocity: v, pressure: s - c * v, derivative: 0.0, branch };
-        }
-        let derivative = 1.0 / (c + slope);
-        // From the corner or from rest, whichever is nearer: a corner far off would cost digits.
-        let from_corner = s - (c * v + p);
-        if s.abs() < from_corner.abs() {
-            let at_rest = p - slope * v;
-            let velocity = (s - at_rest) * derivative;
-            return Resolved { velocity, pressure: at_rest + slope * velocity, derivative, branch };
-        }
-        let advance = from_corner * derivative;
-        Resolved { velocity: v + advance, pressure: p + slope * advance, derivative, branch }
-    }
-
-    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Self::branch).
-    fn branch_of(&self, s: f64, c: f64) -> usize {
-        self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
-    }
-
-    /// Whether the graph is vertical somewhere, so that the pressure is no function of the velocity.
-    pub fn has_vertical_parts(&self) -> bool {
-        self.slopes.contains(&f64::INFINITY)
-    }
-
-    /// Whether this branch is vertical.
-    pub fn is_vertical(&self, branch: usize) -> bool {
-        self.slopes[branch] == f64::INFINITY
-    }
-
-    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; at a jump its upper end. For graphs without a vertical
-    /// ray.
-    #[inline]
-    pub fn pressure(&self, velocity: f64) -> f64 {
-        let branch = self.branch(velocity);
-        let [v, p] = self.points[branch.saturating_sub(1)];
-        p + self.slopes[branch] * (velocity - v)
-    }
-
-    /// An element of the generalised derivative in Pa s/m: the slope, at a kink that of the branch after it.
-    #[inline]
-    pub fn slope(&self, velocity: f64) -> f64 {
-        self.slopes[self.branch(velocity)]
-    }
-
-    /// Which linear branch holds a velocity: 0 before the first point, `n` after the last of `n`.
-    #[inline]
-    pub fn branch(&self, velocity: f64) -> usize {
-        self.points.iter().take_while(|p| p[0] <= velocity).count()
-    }
-
-    /// Number of linear branches.
-    pub fn branches(&self) -> usize {
-        self.slopes.len()
-    }
-
-    /// The corners, velocity and pressure.
-    pub fn points(&self) -> &[[f64; 2]] {
-        &self.points
-    }
-
-    /// The potential `j` in W/m², zero at rest.
-    pub fn potential(&self, velocity: f64) -> f64 {
-        self.area_from_first(velocity) - self.area_from_first(0.0)
-    }
-
-    /// Signed area below the graph between its first point and `velocity`.
-    fn area_from_first(&self, velocity: f64) -> f64 {
-        let branch = self.branch(velocity);
-        let mut area = 0.0;
-        for pair in self.points.windows(2).take(branch.saturating_sub(1)) {
-            area += 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]);
-        }
-        let [v, p] = self.points[branch.saturating_sub(1)];
-        area + 0.5 * (p + self.pressure(velocity)) * (velocity - v)
-    }
-
-    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v): the steepest fall, 0 if the graph never falls.
-    pub fn monotonicity_constant(&self) -> f64 {
-        self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
-    }
-
-    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
-    /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
-    pub fn growth_constants(&self) -> [f64; 2] {
-        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
-        if slope == f64::INFINITY {
-            return [f64::INFINITY; 2];
-        }
-        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
-        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
-        let corners = self.points.iter().map(|point| excess(*point));
-        [corners.fold(self.pressure(0.0).abs(), f64::max), slope]
-    }
-
-    /// The largest pressure in Pa of all points; infinite where there is none.
-    pub fn greatest_pressure(&self) -> f64 {
-        if self.slopes[0] < 0.0 || self.slopes[self.points.len()] > 0.0 {
-            return f64::INFINITY;
-        }
-        self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
-    }
-
-    /// Whether there is no pressure at any velocity.
-    pub fn is_zero(&self) -> bool {
-        self.reach[1] == 0.0 && self.slopes.iter().all(|slope| *slope == 0.0)
-    }
-
-    /// Distance of a pair (velocity, pressure) to the graph, both scaled by the range of its corners, or by this one where
-    /// that is larger.
-    pub fn distance(&self, velocity: f64, pressure: f64, range: [f64; 2]) -> f64 {
-        let range = std::array::from_fn(|i| self.reach[i].max(range[i]));
-        self.distance_in(velocity, pressure, range)
-    }
-
-    /// The same, scaled by this velocity and this pressure.
-    pub(super) fn distance_in(&self, velocity: f64, pressure: f64, [width, height]: [f64; 2]) -> f64 {
-        let point = [velocity / width, pressure / height];
-        let scaled = |p: [f64; 2]| [p[0] / width, p[1] / height];
-        let steep = width / height;
-        let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
-        let along = |slope: f64| if slope == f64::INFINITY { [0.0, 1.0] } else { [1.0, slope * steep] };
-        let mut least = ray_distance(point, scaled(first), along(self.slopes[0]).map(|x| -x));
-        least = least.min(ray_distance(point, scaled(last), along(self.slopes[self.points.len()])));
-        for pair in self.points.windows(2) {
-            least = least.min(segment_distance(point, scaled(pair[0]), scaled(pair[1])));
-        }
-        least
-    }
-}
-
-/// Largest velocity and pressure among the corners.
-fn reach(points: &[[f64; 2]]) -> [f64; 2] {
-    points.iter().fold([0.0; 2], |[v, p], point| [f64::max(v, point[0].abs()), f64::max(p, point[1].abs())])
-}
-
-fn ray_distance(point: [f64; 2], from: [f64; 2], along: [f64; 2]) -> f64 {
-    let offset = [point[0] - from[0], point[1] - from[1]];
-    let t = (offset[0] * along[0] + offset[1] * along[1]) / (along[0] * along[0] + along[1] * along[1]);
-    let t = t.max(0.0);
-    (offset[0] - t * along[0]).hypot(offset[1] - t * along[1])
-}
-
-fn segment_distance(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
-    let (along, offset) = ([to[0] - from[0], to[1] - from[1]], [point[0] - from[0], point[1] - from[1]]);
-    let t = (offset[0] * along[0] + offset[1] * along[1]) / (along[0] * along[0] + along[1] * along[1]);
-    let t = t.clamp(0.0, 1.0);
-    (offset[0] - t * along[0]).hypot(offset[1] - t * along[1])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn valley() -> Graph {
-        Graph::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 0.0, 3.0).unwrap()
-    }
 
     #[test]
-    fn pressure_and_slope_by_hand() {
-        let g = valley();
-        assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|v| g.pressure(v)), [0.0, 1.0, 2.0, 1.5, 1.0, 4.0]);
-        assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0].map(|v| g.slope(v)), [0.0, 2.0, -1.0, -1.0, 3.0]);
-        assert_eq!(g.monotonicity_constant(), 1.0);
-    }
-
-    #[test]
-    fn potential_vanishes_at_rest_and_adds_up_areas() {
-        let g = valley();
-        assert_eq!(g.potential(0.0), 0.0);
-        assert_eq!(g.potential(1.0), 1.5);
-        assert_eq!(g.potential(2.0), 4.0);
-        assert_eq!(g.potential(-1.0), -1.0);
-    }
-
-    #[test]
-    fn the_greatest_pressure_is_that_of_a_corner_or_there_is_none() {
-        let bounded = Graph::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 3.0, -0.5).unwrap();
-        assert_eq!(bounded.greatest_pressure(), 2.0);
-        assert_eq!(valley().greatest_pressure(), f64::INFINITY);
-        assert_eq!(Graph::new(vec![[0.0, 0.0]], -1.0, 0.0).unwrap().greatest_pressure(), f64::INFINITY);
-    }
-
-    #[test]
-    fn growth_constants_by_hand() {
-        assert_eq!(valley().growth_constants(), [2.0, 3.0], "2 Pa at rest, a slope of 3 at last");
-        let growth = |points, before, after| Graph::new(points, before, after).unwrap().growth_constants();
-        // The corner at 2 m/s is 7 - 2 * 0.5 = 6 Pa above the cone; the line through it has 3 Pa at rest.
-        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), [6.0, 0.5]);
-        // A jump at rest counts with both ends, one beside it with what is left beyond the cone.
-        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), [4.0, 1.0]);
-        assert_eq!(growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0), [3.0, 2.0], "a law that falls for good");
-        // The line 2 v + 1 is 1 Pa above the cone 2 |v| from rest on, its corner 1 Pa below.
-        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), [1.0, 2.0]);
-        assert_eq!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY), [f64::INFINITY; 2], "a wall");
-        assert_eq!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0), [f64::INFINITY; 2]);
-    }
-
-    #[test]
-    fn points_off_the_graph_have_their_scaled_distance() {
-        let g = Graph::new(vec![[0.0, 0.0], [2.0, 10.0]], 0.0, 0.0).unwrap();
-        assert!((g.distance(-2.0, 5.0, [0.0, 0.0]) - 0.5).abs() < 1e-15);
-        assert!((g.distance(4.0, 10.0, [0.0, 0.0])).abs() < 1e-15);
-        // Where velocities or pressures go beyond the corners, errors are small against them.
-        assert!((g.distance(-2.0, 5.0, [8.0, 40.0]) - 0.125).abs() < 1e-15);
-    }
-
-    #[test]
-    fn branches_are_measured_from_the_nearer_of_corner_and_rest() {
-        // Near rest, far from the corner: through it, 1e-3 would be the difference of numbers of 2e8.
-        let far = Graph::new(vec![[1e8, 1e8]], 1.0, 1.0).unwrap();
-        let near_rest = far.resolve(1e-3, 1.0);
-        assert!((near_rest.velocity - 5e-4).abs() < 1e-18 && (near_rest.pressure - 5e-4).abs() < 1e-18);
-        // Near the corner of a steep branch: from rest, 1e-3 would be the difference of numbers of 1e8.
-        let steep = Graph::new(vec![[1.0, 0.0]], 0.0, 1e8).unwrap();
-        let near_corner = steep.resolve(1.0 + 0.0009765625, 1.0);
-        assert!((near_corner.pressure - 0.0009765625 / (1.0 + 1e-8)).abs() < 1e-17, "{near_corner:?}");
-    }
-
-    #[test]
-    fn velocities_out_of_order_are_refused() {
-        assert!(Graph::new(vec![[1.0, 0.0], [0.0, 0.0]], 0.0, 0.0).is_err());
-        assert!(Graph::new(vec![], 0.0, 0.0).is_err());
-    }
-
-    #[test]
-    fn only_downward_jumps_are_refused() {
-        let down = Graph::new(vec![[0.0, 1.0], [0.0, -1.0]], 0.0, 0.0).unwrap_err().to_string();
-        assert!(down.contains("only upward jumps"), "{down}");
-        assert!(Graph::new(vec![[0.0, 1.0]], f64::NEG_INFINITY, 0.0).is_err());
-        let up = Graph::new(vec![[0.0, -1.0], [0.0, 1.0]], 0.0, 0.0).unwrap();
-        assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
-        assert_eq!(up.monotonicity_constant(), 0.0);
-        assert_eq!([up.potential(-2.0), up.potential(0.0), up.potential(3.0)], [2.0, 0.0, 3.0]);
-        assert_eq!(up.distance(0.0, 0.3, [1.0, 0.0]), 0.0);
-        assert_eq!(up.distance(0.0, 1.5, [1.0, 0.0]), 0.5);
-    }
-
-    #[test]
-    fn a_wall_is_touched_at_any_pressure_and_left_at_none() {
-        let wall = Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY).unwrap();
-        let touching = wall.resolve(7.0, 2.0);
-        assert_eq!((touching.velocity, touching.pressure, touching.derivative), (0.0, 7.0, 0.0));
-        let open = wall.resolve(-6.0, 2.0);
-        assert_eq!((open.velocity, open.pressure, open.derivative), (-3.0, 0.0, 0.5));
-        assert_eq!(wall.distance(0.0, 5.0, [1.0, 1.0]), 0.0);
-        assert_eq!(wall.distance(-1.0, 0.0, [1.0, 1.0]), 0.0);
-        assert_eq!(wall.distance(3.0, 5.0, [1.0, 1.0]), 3.0);
-    }
-
-    /// Random graphs: each step is a velocity (0: a jump) and a rise, with or without vertical rays at the ends.
-    fn any_graph() -> impl Strategy<Value = Graph> {
-        let step = (0.1f64..2.0, -3.0f64..3.0, any::<bool>());
-        let ray = |finite: std::ops::Range<f64>| prop_oneof![3 => finite, 1 => Just(f64::INFINITY)];
-        (proptest::collection::vec(step, 1..7), ray(-0.5..2.0), ray(-0.5..2.0)).prop_map(
-            |(steps, before, after)| {
-                let mut at = [-2.0, 0.5];
-                let mut points = vec![at];
-                for (advance, rise, jumps) in steps {
-                    at = if jumps {
-                        [at[0], at[1] + rise.abs() + 0.1]
-                    } else {
-                        [at[0] + advance, at[1] + rise]
-                    };
-                    let collinear = jumps && points.len() > 1 && points[points.len() - 2][0] == at[0];
-                    if collinear {
-                        points.pop();
-                    }
-                    points.push(at);
-                }
-                Graph::new(points, before, after).unwrap()
-            },
-        )
-    }
-
-    proptest! {
-        #[test]
-        fn the_resolvent_finds_every_point_of_the_graph(g in any_graph(), s in -20.0f64..20.0, more in 1.01f64..5.0) {
-            let c = more * g.monotonicity_constant() + 0.3;
-            let found = g.resolve(s, c);
-            prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-11);
-            let off = g.distance_in(found.velocity, found.pressure, [1.0, 1.0]);
-            prop_assert!(off < 1e-11, "{} off the graph", off);
-            let bound = 1.0 / (c - g.monotonicity_constant());
-            prop_assert!((0.0..=bound * (1.0 + 1e-14)).contains(&found.derivative));
-            prop_assert_eq!(found.derivative == 0.0, g.is_vertical(found.branch));
-            let h = 1e-5;
-            let (above, below) = (g.resolve(s + h, c), g.resolve(s - h, c));
-            let quotient = (above.velocity - below.velocity) / (2.0 * h);
-            prop_assert!((-1e-8..=bound + 1e-8).contains(&quotient));
-            if above.branch == below.branch {
-                prop_assert!((quotient - found.derivative).abs() < 1e-6 * (1.0 + bound));
-            }
-        }
-
-        #[test]
-        fn laws_conform(steps in proptest::collection::vec((0.1f64..2.0, -3.0f64..3.0), 1..6), v in -9.0f64..9.0) {
-            let mut at = [-2.0, 0.5];
-            let points = steps.iter().map(|&(dv, p)| { at = [at[0] + dv, p]; at }).collect();
-            let g = Graph::new(points, -0.5, 2.0).unwrap();
-            let h = 1e-6;
-            let corner = g.points().iter().any(|p| (p[0] - v).abs() < 2.0 * h);
-            if !corner {
-                let by_value = (g.pressure(v + h) - g.pressure(v - h)) / (2.0 * h);
-                prop_assert!((by_value - g.slope(v)).abs() < 1e-6 * (1.0 + g.slope(v).abs()));
-            }
-            let by_potential = (g.potential(v + h) - g.potential(v - h)) / (2.0 * h);
-            prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v).abs()));
-            let size = v.abs() + g.pressure(v).abs() / g.reach[1];
-            let range = [v.abs(), g.pressure(v).abs()];
-            prop_assert!(g.distance(v, g.pressure(v), range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
-            let [at_rest, slope] = g.growth_constants();
-            prop_assert!(g.pressure(v).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
-            for w in [v - 1.0, v + 0.3] {
-                let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
-                prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);
-            }
-        }
+    fn corners_out_of_order_are_told_by_their_keys() {
+        let points = vec![[0.0, 0.0], [2.0, 2.0], [1.0, 3.0], [1.0, 1.0], [1.0, 1.0]];
+        let law = Graph { points, slope_before: 0.0, slope_after: 0.0 };
+        let keys: Vec<String> = law.own_faults().into_iter().map(|fault| fault.key).collect();
+        assert_eq!(keys, ["points.2", "points.3", "points.4", "points.4"]);
+        assert!(law.response().is_err());
     }
 }

@@ -12,16 +12,50 @@
 //! that swings: damping in the normal law or in the body has to take it up. (M. Sofonea, F. Pătrulescu, Analysis of a
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
-/// The memory of a foundation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+use super::{ContactTable, LawFault, NormalLaw};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Memory of the foundation below a contact boundary.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// How fast the pressure grows at first for each metre pressed in, `b(0)`, in Pa/(m s).
+    /// How fast the pressure grows at first, per normal displacement. Held for long, a displacement is opposed like by a spring
+    /// of `stiffness_rate decay_time`. The pressure follows late, so that a body on it swings more and more, whatever the step,
+    /// unless the normal law or the body damp that.
+    #[schemars(range(min = 0), extend("unit" = "Pa/(m s)"), example = 1e4)]
     pub stiffness_rate: f64,
-    /// Time in s in which the foundation forgets all but a part of 1/e.
+    /// Time in which the foundation forgets all but a part of 1/e.
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 2.0)]
     pub decay_time: f64,
 }
 
 impl Memory {
+    /// What can't stand beside memory, which is of how far a foundation that touches at first was pressed in; friction sees the
+    /// normal law alone. Keys are those of the contact's table.
+    pub fn faults(table: &ContactTable) -> Vec<LawFault> {
+        let mut faults = Vec::new();
+        let mut refuse = |key: String, message: &str, other: &str| {
+            let help = format!("delete it, or [{}.memory]{other}", table.path);
+            faults.push(LawFault::at_key(key, message, help));
+        };
+        if let Some(wall) = table.normal.as_ref().filter(|law| law.is_bound()) {
+            let message = "a rigid obstacle is never pressed in: there is nothing to remember";
+            refuse(wall.table(), message, "");
+        } else if let Some(gap) = table.normal.as_ref().and_then(NormalLaw::gap_key) {
+            refuse(gap, "memory is of what touches at first: there is no gap", "");
+        }
+        if table.has_obstacle {
+            let message = "memory is of what touches at first: there is no obstacle that moves";
+            refuse("obstacle".into(), message, "");
+        }
+        if let Some(friction) = table.friction.as_ref().filter(|law| law.follows_pressure()) {
+            let message = "this friction follows the pressure of the normal law, which memory is not part of";
+            refuse(friction.table(), message, ", or use tresca");
+        }
+        faults
+    }
+
     /// The pressure in Pa after a step of this length in s, during which the point is held at this normal displacement in m.
     pub fn advance(&self, pressure: f64, displacement: f64, length: f64) -> f64 {
         let past = -length / self.decay_time;

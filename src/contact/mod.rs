@@ -1,21 +1,62 @@
-//! Contact laws: pure functions at a point of the contact boundary.
+//! Contact laws: pure functions at a point of the contact boundary, with their keys in the job file.
+//!
+//! A normal or friction law is a file here, and an entry in one of the lists below: its parameters, as the job file has them, its
+//! formula and derivative, and what it can't be combined with.
 
 mod adhesion;
 mod compliance;
+mod coulomb;
 mod damped_response;
-mod friction;
+mod friction_law;
 mod graph;
+mod laws;
 mod memory;
 mod normal_law;
 mod obstacle;
 mod obstacle_motion;
+mod polyline;
+mod slip_weakening;
+mod table;
+mod tresca;
+mod unilateral;
 
 pub use adhesion::Adhesion;
 pub use compliance::Compliance;
+pub use coulomb::Coulomb;
 pub use damped_response::{DampedResponse, Symmetry};
-pub use friction::{FrictionLaw, Slip};
+pub use friction_law::{FrictionBound, Slip};
 pub use graph::Graph;
+pub use laws::LawFault;
 pub use memory::Memory;
-pub use normal_law::{NodeContext, NormalLaw, Resolved};
+pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle::Gap;
 pub use obstacle_motion::{ObstacleMotion, Rate};
+pub use polyline::Polyline;
+pub use slip_weakening::SlipWeakening;
+pub use table::{ContactTable, Quadrature};
+pub use tresca::Tresca;
+pub use unilateral::{Bound, Unilateral};
+
+use crate::{error::Result, expression::Scalar};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+normal_law::normal_laws! {
+    /// A piecewise linear function of the normal velocity that may fall, equation (72).
+    DampedResponse,
+    /// Any polyline of pressure over normal velocity, with upward jumps.
+    Graph,
+    /// A spring that is felt beyond the gap.
+    Compliance,
+    /// A rigid obstacle: the normal displacement never exceeds the gap.
+    Unilateral,
+}
+
+friction_law::friction_laws! {
+    /// A given bound on the friction traction.
+    Tresca,
+    /// A bound proportional to the contact pressure.
+    Coulomb,
+    /// A coefficient that falls with the sliding velocity.
+    SlipWeakening,
+}

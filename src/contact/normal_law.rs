@@ -1,6 +1,9 @@
-//! The choice of normal laws, as one step sees them: graphs in the normal velocity.
+//! Normal laws: the contact pressure, as one step sees it a graph over the normal velocity.
+//!
+//! A law is what a job says ([`NormalParameters`]) and what evaluates it at a point ([`Response`]), often the same type.
 
-use super::{Compliance, Graph};
+use super::{LawFault, NormalLaw, laws::key};
+use crate::{error::Result, expression::Scalar};
 
 /// What a step brings to a point of the contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -13,8 +16,16 @@ pub struct NodeContext {
 }
 
 impl NodeContext {
+    /// A point at its gap at the start of a step of 1 s: its velocity is its penetration, in other units.
+    pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0 };
+
+    /// The penetration in m at the end of the step, at a normal velocity in m/s.
+    pub fn penetration_at(&self, velocity: f64) -> f64 {
+        self.penetration + self.step_length * velocity
+    }
+
     /// The normal velocity in m/s that just closes the gap by the end of the step.
-    fn closing_velocity(&self) -> f64 {
+    pub fn closing_velocity(&self) -> f64 {
         -self.penetration / self.step_length
     }
 }
@@ -32,153 +43,280 @@ pub struct Resolved {
     pub branch: usize,
 }
 
-/// A law for the normal direction.
-#[derive(Debug, Clone, PartialEq)]
-pub enum NormalLaw {
-    /// A graph in the normal velocity.
-    Graph(Graph),
-    /// A spring that is felt beyond the gap.
-    Compliance(Compliance),
-    /// `u_nu <= gap`: the graph of a wall, zero and then vertical, at the velocity that closes the gap.
-    Unilateral(Graph),
+impl Resolved {
+    /// No pressure, on the first branch.
+    pub fn free(s: f64, c: f64) -> Self {
+        Self { velocity: s / c, derivative: 1.0 / c, ..Self::default() }
+    }
 }
 
-impl NormalLaw {
-    /// A rigid obstacle.
-    pub fn unilateral() -> crate::error::Result<Self> {
-        Ok(Self::Unilateral(Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY)?))
+/// A branch of a law, in words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Branch {
+    /// S1, S2 and so on; or what the branch means.
+    pub name: String,
+    /// Where it lies.
+    pub range: String,
+    /// How steep it is.
+    pub slope: String,
+}
+
+impl Branch {
+    /// A branch with these words.
+    pub fn new(name: impl Into<String>, range: impl Into<String>, slope: impl Into<String>) -> Self {
+        Self { name: name.into(), range: range.into(), slope: slope.into() }
+    }
+}
+
+/// Points of a curved law that are joined by straight lines.
+const SAMPLES: usize = 120;
+
+/// A normal law that a job may choose.
+pub trait NormalParameters {
+    /// What evaluates it.
+    type Response: Response;
+
+    /// Whether it is felt beyond a gap, and has the key `gap` for that.
+    const HAS_GAP: bool = false;
+
+    /// What evaluates the law; refuses parameters that make no law.
+    fn response(&self) -> Result<Self::Response>;
+
+    /// The key `gap`, if it is given.
+    fn gap(&self) -> Option<&Scalar> {
+        None
     }
 
+    /// What is wrong with the parameters; keys are those of the law's table.
+    fn own_faults(&self) -> Vec<LawFault> {
+        Vec::new()
+    }
+
+    /// Why these parameters of a law with a gap go with no obstacle, and what to do.
+    fn against_obstacle(&self) -> Option<[&'static str; 2]> {
+        None
+    }
+}
+
+/// What a step asks of a normal law. The defaults are those of a continuous law of the velocity that never falls, whose
+/// pressure begins at its only kink and has no bound.
+pub trait Response {
     /// Velocity and pressure where `c v + p = s`, for a `c` above the steepest fall.
-    pub fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
-        match self {
-            Self::Graph(graph) => graph.resolve(s, c),
-            Self::Compliance(law) => law.resolve(s, c, node),
-            Self::Unilateral(wall) => {
-                let closing = node.closing_velocity();
-                if s < c * closing {
-                    // Not by way of the closing velocity, which may be infinite.
-                    return Resolved { velocity: s / c, derivative: 1.0 / c, ..Resolved::default() };
-                }
-                let found = wall.resolve(s - c * closing, c);
-                Resolved { velocity: closing + found.velocity, ..found }
-            }
-        }
-    }
+    fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved;
 
-    /// Pressure in Pa at a normal velocity; for laws without vertical parts.
-    pub fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
-        match self {
-            Self::Graph(graph) => graph.pressure(velocity),
-            Self::Compliance(law) => law.pressure(node.penetration + node.step_length * velocity),
-            Self::Unilateral(wall) => wall.pressure(velocity - node.closing_velocity()),
-        }
-    }
+    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; for laws without vertical parts.
+    fn pressure(&self, velocity: f64, node: NodeContext) -> f64;
 
     /// An element of its generalised derivative in Pa s/m.
-    pub fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
-        match self {
-            Self::Graph(graph) => graph.slope(velocity),
-            Self::Compliance(law) => {
-                node.step_length * law.stiffness_at(node.penetration + node.step_length * velocity)
-            }
-            Self::Unilateral(wall) => wall.slope(velocity - node.closing_velocity()),
-        }
-    }
+    fn slope(&self, velocity: f64, node: NodeContext) -> f64;
+
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
+    /// `c1` and the least `c0` that goes with it; why there are none, otherwise.
+    fn growth_constants(&self) -> Result<[f64; 2], &'static str>;
+
+    /// Its branches in words, with numbers written by `number`.
+    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch>;
 
     /// Which branch holds a velocity; for laws without vertical parts.
-    pub fn branch(&self, velocity: f64, node: NodeContext) -> usize {
-        match self {
-            Self::Graph(graph) => graph.branch(velocity),
-            Self::Compliance(_) => usize::from(node.penetration + node.step_length * velocity > 0.0),
-            Self::Unilateral(wall) => wall.branch(velocity - node.closing_velocity()),
-        }
-    }
-
-    /// Whether it is vertical somewhere, so that the pressure is no function of the velocity.
-    pub fn has_vertical_parts(&self) -> bool {
-        match self {
-            Self::Graph(graph) | Self::Unilateral(graph) => graph.has_vertical_parts(),
-            Self::Compliance(_) => false,
-        }
-    }
-
-    /// The largest normal velocity in m/s that it allows, if to bound the velocity is all it does.
-    pub fn velocity_bound(&self, node: NodeContext) -> Option<f64> {
-        match self {
-            Self::Graph(graph) => match graph.points() {
-                [[v, 0.0]] if graph.is_vertical(1) && graph.slope(v - 1.0) == 0.0 => Some(*v),
-                _ => None,
-            },
-            Self::Compliance(_) => None,
-            Self::Unilateral(_) => Some(node.closing_velocity()),
-        }
-    }
-
-    /// Whether it depends on the displacement, so that it knows no velocity and no pressure of its own.
-    pub fn depends_on_displacement(&self) -> bool {
-        !matches!(self, Self::Graph(_))
-    }
-
-    /// Relaxed monotonicity constant `m_j`.
-    pub fn monotonicity_constant(&self) -> f64 {
-        match self {
-            Self::Graph(graph) => graph.monotonicity_constant(),
-            Self::Compliance(_) | Self::Unilateral(_) => 0.0,
-        }
-    }
-
-    /// Growth constants `c0` in Pa and `c1` in Pa s/m with `|p| <= c0 + c1 |v|`, see [`Graph::growth_constants`]; why there are
-    /// none, otherwise.
-    pub fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
-        match self {
-            Self::Graph(graph) | Self::Unilateral(graph) => {
-                let constants = graph.growth_constants();
-                if constants[1].is_finite() {
-                    Ok(constants)
-                } else {
-                    Err("the growth constant is infinite because a contact law ends in a vertical ray")
-                }
-            }
-            Self::Compliance(_) => {
-                Err("there is no growth constant because compliance follows the displacement")
-            }
-        }
-    }
-
-    /// The largest pressure in Pa that it ever gives; infinite where there is none.
-    pub fn greatest_pressure(&self) -> f64 {
-        match self {
-            Self::Graph(graph) => graph.greatest_pressure(),
-            Self::Compliance(_) | Self::Unilateral(_) => f64::INFINITY,
-        }
+    fn branch(&self, velocity: f64, node: NodeContext) -> usize {
+        usize::from(self.pressure(velocity, node) > 0.0)
     }
 
     /// Distance of a pair (velocity, pressure) to the graph, scaled by this range, or by that of the graph's corners where
     /// it has any and they are larger.
-    pub fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
-        match self {
-            Self::Graph(graph) => graph.distance(velocity, pressure, range),
-            Self::Compliance(_) => (self.pressure(velocity, node) - pressure).abs() / range[1],
-            Self::Unilateral(wall) => wall.distance_in(velocity - node.closing_velocity(), pressure, range),
-        }
+    fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
+        (self.pressure(velocity, node) - pressure).abs() / range[1]
     }
 
-    /// Energy in J/m² that it stores at a penetration in m.
-    pub fn energy(&self, penetration: f64) -> f64 {
-        if let Self::Compliance(law) = self { law.energy(penetration) } else { 0.0 }
+    /// Whether it is vertical somewhere, so that the pressure is no function of the velocity.
+    fn has_vertical_parts(&self) -> bool {
+        false
+    }
+
+    /// Whether it depends on the displacement, so that it knows no velocity and no pressure of its own.
+    fn depends_on_displacement(&self) -> bool {
+        false
+    }
+
+    /// Whether there is no pressure at any velocity.
+    fn is_zero(&self) -> bool {
+        false
+    }
+
+    /// The largest normal velocity in m/s that it allows, if to bound the velocity is all it does.
+    fn velocity_bound(&self, _node: NodeContext) -> Option<f64> {
+        None
+    }
+
+    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v): the steepest fall, 0 if the graph never falls.
+    fn monotonicity_constant(&self) -> f64 {
+        0.0
+    }
+
+    /// The largest pressure in Pa that it ever gives; infinite where there is none.
+    fn greatest_pressure(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Energy in J/m² that it stores at a penetration in m; nothing where it stores none at any.
+    fn energy(&self, _penetration: f64) -> Option<f64> {
+        None
+    }
+
+    /// The corners of its graph: velocity or penetration, and pressure.
+    fn corners(&self) -> &[[f64; 2]] {
+        &[[0.0; 2]]
+    }
+
+    /// The graph between these two velocities, or penetrations, and these two pressures, as a line through these points.
+    fn outline(&self, [left, right]: [f64; 2], _pressures: [f64; 2]) -> Vec<[f64; 2]> {
+        let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
+        (0..=SAMPLES).map(|n| [at(n), self.pressure(at(n), NodeContext::AT_THE_GAP)]).collect()
+    }
+}
+
+/// The choice of normal laws, from the list of them: the enum that the job holds, the enum that a step asks, and calls of the
+/// law that it is.
+macro_rules! normal_laws {
+    ($($(#[$about:meta])* $law:ident,)*) => {
+        /// The normal law.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum NormalLaw {
+            $($(#[$about])* $law($law),)*
+        }
+
+        /// What evaluates the normal law that was chosen.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum NormalResponse {
+            $($(#[$about])* $law(<$law as NormalParameters>::Response),)*
+        }
+
+        macro_rules! each_response {
+            ($chosen:expr, $bound:ident => $what:expr) => {
+                match $chosen {
+                    $(NormalResponse::$law($bound) => $what,)*
+                }
+            };
+        }
+
+        impl NormalResponse {
+            laws::calls! { each_response, Response:
+                resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
+                pressure(velocity: f64, node: NodeContext) -> f64;
+                slope(velocity: f64, node: NodeContext) -> f64;
+                growth_constants() -> Result<[f64; 2], &'static str>;
+                branches(number: fn(f64) -> String) -> Vec<Branch>;
+                branch(velocity: f64, node: NodeContext) -> usize;
+                distance(velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64;
+                has_vertical_parts() -> bool;
+                depends_on_displacement() -> bool;
+                is_zero() -> bool;
+                velocity_bound(node: NodeContext) -> Option<f64>;
+                monotonicity_constant() -> f64;
+                greatest_pressure() -> f64;
+                energy(penetration: f64) -> Option<f64>;
+                corners() -> &[[f64; 2]];
+                outline(along: [f64; 2], pressures: [f64; 2]) -> Vec<[f64; 2]>;
+            }
+        }
+
+        macro_rules! each_normal_law {
+            ($chosen:expr, $bound:ident => $what:expr) => {
+                match $chosen {
+                    $(NormalLaw::$law($bound) => $what,)*
+                }
+            };
+        }
+
+        impl NormalLaw {
+            /// The types of all laws, and whether they have the key `gap`.
+            const ALL: &[(&str, bool)] = &[$((stringify!($law), <$law as NormalParameters>::HAS_GAP),)*];
+
+            laws::calls! { each_normal_law, NormalParameters:
+                gap() -> Option<&Scalar>;
+                against_obstacle() -> Option<[&'static str; 2]>;
+                own_faults() -> Vec<LawFault>;
+            }
+
+            /// What evaluates the law; refuses parameters that make no law.
+            pub fn response(&self) -> Result<NormalResponse> {
+                Ok(match self {
+                    $(Self::$law(law) => NormalResponse::$law(law.response()?),)*
+                })
+            }
+
+            /// The name of its type, and whether it has the key `gap`.
+            fn kind(&self) -> (&'static str, bool) {
+                match self {
+                    $(Self::$law(_) => (stringify!($law), <$law as NormalParameters>::HAS_GAP),)*
+                }
+            }
+        }
+    };
+}
+pub(super) use normal_laws;
+
+impl NormalLaw {
+    /// Its table in the job, from that of the contact.
+    pub fn table(&self) -> String {
+        format!("normal.{}", key(self.kind().0))
+    }
+
+    /// The key of its gap, if that is given, from the table of the contact.
+    pub fn gap_key(&self) -> Option<String> {
+        self.gap().map(|_| format!("{}.gap", self.table()))
+    }
+
+    /// Whether to bound the displacement or the velocity is all it does.
+    pub fn is_bound(&self) -> bool {
+        self.response().is_ok_and(|law| law.velocity_bound(NodeContext::AT_THE_GAP).is_some())
+    }
+
+    /// Whether it acts at nodes only: Gauss points know neither jumps nor the displacement.
+    pub fn needs_nodes(&self) -> bool {
+        self.response().is_ok_and(|law| law.has_vertical_parts() || law.depends_on_displacement())
+    }
+
+    /// What is wrong with its parameters, alone and beside an obstacle; keys are those of the contact's table.
+    pub fn faults(&self, obstacle: bool) -> Vec<LawFault> {
+        let table = self.table();
+        let mut faults: Vec<LawFault> =
+            self.own_faults().into_iter().map(|fault| fault.within(&table)).collect();
+        if !obstacle {
+            return faults;
+        }
+        let (kind, has_gap) = self.kind();
+        if !has_gap {
+            let others = Self::ALL.iter().filter(|(_, has_gap)| *has_gap);
+            let others: Vec<String> = others.map(|(kind, _)| format!("`{}`", key(kind))).collect();
+            let message = format!("`{}` acts at any distance: it has no obstacle", key(kind));
+            let help = format!("delete the obstacle, or use {}", others.join(" or "));
+            faults.push(LawFault::at_key("obstacle", message, help));
+        }
+        faults.extend(self.against_obstacle().map(|[why, help]| LawFault::at_key("obstacle", why, help)));
+        let help = "give one of them: the obstacle says how far it is";
+        faults
+            .extend(self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help)));
+        faults
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::{Bound, Compliance, Graph, NormalResponse, Unilateral};
 
     const NOWHERE: NodeContext = NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5 };
 
-    fn laws() -> [NormalLaw; 3] {
-        let springs = |exponent| NormalLaw::Compliance(Compliance { stiffness: 100.0, exponent });
-        [NormalLaw::unilateral().unwrap(), springs(1.0), springs(1.5)]
+    fn wall(bound: Bound) -> NormalResponse {
+        NormalResponse::Unilateral(Unilateral { bound, gap: None })
+    }
+
+    fn laws() -> [NormalResponse; 3] {
+        let springs =
+            |exponent| NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, gap: None });
+        [wall(Bound::Displacement), springs(1.0), springs(1.5)]
     }
 
     #[test]
@@ -192,7 +330,7 @@ mod tests {
                     "{law:?}"
                 );
             }
-            assert_eq!(law.energy(NOWHERE.penetration), 0.0);
+            assert_eq!(law.energy(NOWHERE.penetration).unwrap_or(0.0), 0.0);
             assert_eq!(law.branch(3.0, NOWHERE), 0);
         }
     }
@@ -216,7 +354,7 @@ mod tests {
     #[test]
     fn a_gap_that_is_closed_exactly_bears_pressure_at_rest() {
         let node = NodeContext { penetration: 0.0, step_length: 0.5 };
-        let wall = NormalLaw::unilateral().unwrap();
+        let wall = wall(Bound::Displacement);
         let held = wall.resolve(7.0, 2.0, node);
         assert_eq!((held.velocity, held.pressure, held.derivative), (0.0, 7.0, 0.0));
         assert_eq!(wall.distance(held.velocity, held.pressure, node, [1.0, 1.0]), 0.0);
@@ -230,9 +368,12 @@ mod tests {
     #[test]
     fn only_walls_are_pure_bounds() {
         let node = NodeContext { penetration: -0.25, step_length: 0.5 };
-        let graph = |points, before, after| NormalLaw::Graph(Graph::new(points, before, after).unwrap());
-        assert_eq!(NormalLaw::unilateral().unwrap().velocity_bound(node), Some(0.5));
-        assert_eq!(NormalLaw::unilateral().unwrap().velocity_bound(NOWHERE), Some(f64::INFINITY));
+        let graph = |points, slope_before, slope_after| {
+            NormalLaw::Graph(Graph { points, slope_before, slope_after }).response().unwrap()
+        };
+        assert_eq!(wall(Bound::Velocity).velocity_bound(node), Some(0.0));
+        assert_eq!(wall(Bound::Displacement).velocity_bound(node), Some(0.5));
+        assert_eq!(wall(Bound::Displacement).velocity_bound(NOWHERE), Some(f64::INFINITY));
         assert_eq!(graph(vec![[0.25, 0.0]], 0.0, f64::INFINITY).velocity_bound(node), Some(0.25));
         assert_eq!(graph(vec![[0.0, 1.0]], 0.0, f64::INFINITY).velocity_bound(node), None);
         assert_eq!(graph(vec![[0.0, 0.0]], 1.0, f64::INFINITY).velocity_bound(node), None);
@@ -243,8 +384,8 @@ mod tests {
 
     #[test]
     fn laws_without_growth_constants_say_why() {
-        let damper = NormalLaw::Graph(Graph::new(vec![[0.0, 1.0]], 0.0, 2.0).unwrap());
-        assert_eq!(damper.growth_constants(), Ok([1.0, 2.0]));
+        let damper = Graph { points: vec![[0.0, 1.0]], slope_before: 0.0, slope_after: 2.0 };
+        assert_eq!(damper.response().unwrap().growth_constants(), Ok([1.0, 2.0]));
         let [wall, springs, _] = laws().map(|law| law.growth_constants().unwrap_err());
         assert!(wall.contains("vertical ray") && springs.contains("displacement"), "{wall} {springs}");
     }

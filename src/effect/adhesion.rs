@@ -252,8 +252,8 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         for (law, point) in &self.points {
             let (law, x) = (&self.laws[*law], at(x, point));
             let along = dot(&x, &point.normal);
-            let more = law.stiffness - law.tangential_stiffness;
-            push(point, point.weight * law.tangential_stiffness, &x, forces);
+            let more = law.stiffness - law.tangential_stiffness();
+            push(point, point.weight * law.tangential_stiffness(), &x, forces);
             push(point, point.weight * more * along, &point.normal, forces);
         }
     }

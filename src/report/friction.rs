@@ -74,6 +74,7 @@ pub fn picture(name: &str, time: f64, law: &FrictionLaw, nodes: &[Rubbing]) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::{Coulomb, Tresca};
 
     fn node(speed: f64, traction: f64, pressure: f64) -> Rubbing {
         Rubbing { speed, traction, pressure }
@@ -81,7 +82,7 @@ mod tests {
 
     #[test]
     fn nodes_stick_slip_or_bear_no_pressure() {
-        let law = FrictionLaw::Coulomb { coefficient: 0.3 };
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
         let nodes = [node(0.0, 1.0, 10.0), node(0.1, 3.0, 10.0), node(0.2, 6.0, 20.0), node(0.5, 0.0, 0.0)];
         let drawn = picture("bottom", 0.5, &law, &nodes).expect("drawn").expect("a picture");
         assert!(
@@ -94,10 +95,10 @@ mod tests {
 
     #[test]
     fn given_bounds_are_drawn_in_their_own_unit_and_a_boundary_in_the_air_not_at_all() {
-        let given = FrictionLaw::Tresca { bound: 2.0 };
+        let given = FrictionLaw::Tresca(Tresca { bound: 2.0 });
         let drawn = picture("left", 0.0, &given, &[node(0.1, 2.0, 0.0)]).expect("drawn").expect("a picture");
         assert!(drawn.svg.contains("friction traction / Pa"));
-        let law = FrictionLaw::Coulomb { coefficient: 0.3 };
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
         assert!(picture("left", 0.0, &law, &[node(0.1, 0.0, 0.0)]).expect("drawn").is_none());
     }
 }

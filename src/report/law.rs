@@ -2,51 +2,26 @@
 
 use super::scale::{extent, number};
 use crate::{
-    contact::{Gap, Graph, NormalLaw, Rate},
+    contact::{Branch, Gap, NodeContext, NormalResponse, Rate},
     error::Result,
     job::Contact,
     run::normal_law,
 };
 
-/// Points of a curved law that are joined by straight lines.
-const SAMPLES: usize = 120;
-
 /// A law whose pressure is a graph over one quantity of the node.
 #[derive(Debug, Clone)]
 pub struct Law {
-    shape: Shape,
+    law: NormalResponse,
     /// The distance that the body may move before it is felt, where the law is one of the displacement.
     gap: Option<Gap>,
-}
-
-#[derive(Debug, Clone)]
-enum Shape {
-    Graph(Graph),
-    Power { stiffness: f64, exponent: f64 },
-}
-
-/// A linear part of a law.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Branch {
-    /// S1, S2 and so on; or what the part means.
-    pub name: String,
-    /// Where it lies, in words.
-    pub range: String,
-    /// How steep it is, in words.
-    pub slope: String,
 }
 
 impl Law {
     /// The law of a contact of a job.
     pub fn of(contact: &Contact) -> Result<Self> {
         let (law, gap) = normal_law(contact)?;
-        Ok(match law {
-            NormalLaw::Graph(graph) => Self { shape: Shape::Graph(graph), gap: None },
-            NormalLaw::Unilateral(graph) => Self { shape: Shape::Graph(graph), gap: Some(gap) },
-            NormalLaw::Compliance(c) => {
-                Self { shape: Shape::Power { stiffness: c.stiffness, exponent: c.exponent }, gap: Some(gap) }
-            }
-        })
+        let gap = law.depends_on_displacement().then_some(gap);
+        Ok(Self { law, gap })
     }
 
     /// What the pressure is a graph of, and its unit.
@@ -87,112 +62,43 @@ impl Law {
         self.gap.as_ref().is_some_and(|gap| !matches!(gap, Gap::Distance(_)))
     }
 
-    /// Its parts, from left to right.
+    /// Its branches in words, from left to right.
     pub fn branches(&self) -> Vec<Branch> {
-        let (_, unit) = self.quantity();
-        match &self.shape {
-            Shape::Graph(graph) if self.gap.is_none() => graph_branches(graph, unit),
-            Shape::Graph(_) => vec![
-                named("open", "below the gap".into(), "no pressure".into()),
-                named("closed", "at the gap".into(), "vertical".into()),
-            ],
-            Shape::Power { stiffness, exponent } => vec![
-                named("open", "below the gap".into(), "no pressure".into()),
-                named(
-                    "closed",
-                    "beyond the gap".into(),
-                    format!("{} Pa × (penetration / m)^{}", number(*stiffness), number(*exponent)),
-                ),
-            ],
-        }
+        self.law.branches(number)
     }
 
-    /// The part that each of these nodes, abscissa and pressure, sits on.
+    /// The branch that each of these nodes, abscissa and pressure, sits on.
     pub fn branches_of(&self, nodes: &[[f64; 2]]) -> Vec<usize> {
-        match &self.shape {
-            Shape::Power { .. } => nodes.iter().map(|[x, _]| usize::from(*x > 0.0)).collect(),
-            Shape::Graph(graph) => {
-                let all = || graph.points().iter().chain(nodes);
-                let reach =
-                    |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
-                let steep = reach(1) / reach(0);
-                let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
-                let c = steep.max(2.0 * graph.monotonicity_constant());
-                // A node that has not touched the wall may lie beyond it by rounding.
-                let slack = if self.gap.is_some() { 1e-9 * c * reach(0) } else { 0.0 };
-                nodes.iter().map(|[x, p]| graph.resolve(c * x + p - slack, c).branch).collect()
-            }
-        }
+        let all = || self.law.corners().iter().chain(nodes);
+        let reach = |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
+        let steep = reach(1) / reach(0);
+        let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
+        let c = steep.max(2.0 * self.law.monotonicity_constant());
+        // A node that has not touched the wall may lie beyond it by rounding.
+        let is_wall = self.gap.is_some() && self.law.has_vertical_parts();
+        let slack = if is_wall { 1e-9 * c * reach(0) } else { 0.0 };
+        let branch = |s: f64| self.law.resolve(s, c, NodeContext::AT_THE_GAP).branch;
+        nodes.iter().map(|[x, p]| branch(c * x + p - slack)).collect()
     }
 
     /// The graph over the nodes and a little more, as a line through these points.
     pub fn line(&self, nodes: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let corners = if let Shape::Graph(graph) = &self.shape { graph.points() } else { &[[0.0, 0.0]] };
-        let along = |axis: usize| extent(corners.iter().chain(nodes).map(|p| p[axis])).unwrap_or((0.0, 1.0));
-        let ((left, right), (bottom, top)) = (along(0), along(1));
-        let room = |low: f64, high: f64| if high > low { 0.1 * (high - low) } else { high.abs().max(1.0) };
-        let (left, right) = (left - room(left, right), right + room(left, right));
-        let (bottom, top) = (bottom - room(bottom, top), top + room(bottom, top));
-        match &self.shape {
-            Shape::Power { stiffness, exponent } => {
-                let pressure = |x: f64| stiffness * x.max(0.0).powf(*exponent);
-                let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
-                (0..=SAMPLES).map(|n| [at(n), pressure(at(n))]).collect()
-            }
-            Shape::Graph(graph) => {
-                let last = graph.branches() - 1;
-                let end = |branch: usize, x: f64, p: f64, corner: [f64; 2]| {
-                    if graph.is_vertical(branch) { [corner[0], p] } else { [x, graph.pressure(x)] }
-                };
-                let (first_corner, last_corner) = (corners[0], corners[corners.len() - 1]);
-                let mut line = vec![end(0, left, bottom, first_corner)];
-                line.extend_from_slice(corners);
-                line.push(end(last, right, top, last_corner));
-                line
-            }
-        }
-    }
-}
-
-fn named(name: &str, range: String, slope: String) -> Branch {
-    Branch { name: name.into(), range, slope }
-}
-
-fn graph_branches(graph: &Graph, unit: &str) -> Vec<Branch> {
-    let points = graph.points();
-    let mut out = Vec::new();
-    for branch in 0..graph.branches() {
-        let before = branch.checked_sub(1).map(|at| points[at]);
-        let after = points.get(branch).copied();
-        let range = match (before, after) {
-            (None, Some([v, _])) => format!("below {} {unit}", number(v)),
-            (Some([v, _]), None) if graph.is_vertical(branch) => format!("at {} {unit}", number(v)),
-            (Some([v, _]), None) => format!("from {} {unit} on", number(v)),
-            (Some([v, _]), Some([w, _])) if v == w => format!("at {} {unit}", number(v)),
-            (Some([v, _]), Some([w, _])) => format!("{} to {} {unit}", number(v), number(w)),
-            (None, None) => "everywhere".into(),
+        let all = || self.law.corners().iter().chain(nodes);
+        let along = |axis: usize| {
+            let (low, high) = extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0));
+            let room = if high > low { 0.1 * (high - low) } else { high.abs().max(1.0) };
+            [low - room, high + room]
         };
-        let slope = if graph.is_vertical(branch) {
-            "vertical".to_owned()
-        } else {
-            let inside = match (before, after) {
-                (None, Some([v, _])) => v - 1.0,
-                (Some([v, _]), None) => v + 1.0,
-                (Some([v, _]), Some([w, _])) => 0.5 * (v + w),
-                (None, None) => 0.0,
-            };
-            format!("{} Pa s/m", number(graph.slope(inside)))
-        };
-        out.push(Branch { name: format!("S{}", branch + 1), range, slope });
+        self.law.outline(along(0), along(1))
     }
-    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{
-        self, Bound, Compliance, NormalLaw, Obstacle, Plane, Quadrature, Scalar, Sphere, Unilateral,
+    use crate::{
+        contact::{Bound, Compliance, DampedResponse, NormalLaw, Symmetry, Unilateral},
+        job::{Obstacle, Plane, Quadrature, Scalar, Sphere},
     };
 
     const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
@@ -210,10 +116,10 @@ mod tests {
     }
 
     fn paper() -> Law {
-        law(NormalLaw::DampedResponse(job::DampedResponse {
+        law(NormalLaw::DampedResponse(DampedResponse {
             breakpoints: vec![0.003, 0.005],
             slopes: vec![10.0, -10.0, 10.0],
-            symmetry: job::Symmetry::Even,
+            symmetry: Symmetry::Even,
         }))
     }
 

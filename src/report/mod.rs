@@ -14,7 +14,7 @@ mod table;
 use crate::{
     drawing::{body, chart, colour, markup, picture, scale, view},
     error::{Error, Result},
-    run::{VERSION, friction_law},
+    run::VERSION,
 };
 use body::Body;
 use boundary::{Boundary, Laws};
@@ -138,7 +138,7 @@ fn body_section(page: &mut Page, found: &Found) -> Result<()> {
 fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
     let mut contacts: Vec<(&[String], Laws)> = Vec::new();
     for contact in found.job.iter().flat_map(|job| &job.contact) {
-        let friction = contact.friction.as_ref().map(friction_law);
+        let friction = contact.friction;
         let steps = match (&found.history, &contact.obstacle) {
             (Some(history), Some(_)) => history.curve("time", "dt"),
             _ => Vec::new(),

@@ -3,14 +3,14 @@
 use super::{obstacles, steps};
 use crate::{
     body::Body,
-    contact::{self, DampedResponse, FrictionLaw, Gap, Graph, Symmetry},
+    contact::{Gap, NormalResponse},
     effect::{
         self, Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
-        Load, Quadrature, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
+        Load, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
         fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Friction, Job, Material, Named, NormalLaw, Scalar},
+    job::{self, Fix, Job, Material, Named},
     material::{
         self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
         Perzyna, Viscoplasticity,
@@ -39,14 +39,10 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut contacts = Vec::new();
     for contact in &job.contact {
         let facets = facets(&mesh, &contact.on);
-        let quadrature = match contact.quadrature {
-            job::Quadrature::Nodal => Quadrature::Nodal,
-            job::Quadrature::Gauss => Quadrature::Gauss,
-        };
         let (law, gap) = session.agree(normal_law(contact))?;
-        let mut laws = Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed)?;
-        if let Some(friction) = &contact.friction {
-            session.agree(laws.add_friction(friction_law(friction), &mesh, &fixed))?;
+        let mut laws = Contact::new(session, &mesh, &facets, contact.quadrature, law, gap, &fixed)?;
+        if let Some(friction) = contact.friction {
+            session.agree(laws.add_friction(friction, &mesh, &fixed))?;
         }
         contacts.push(laws);
     }
@@ -121,20 +117,13 @@ fn surface_effects<const D: usize>(
     let is_implicit = scheme(job).is_implicit();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for contact in &job.contact {
-        if let Some(memory) = &contact.memory {
-            let law =
-                contact::Memory { stiffness_rate: memory.stiffness_rate, decay_time: memory.decay_time };
-            foundations.push((law, surface_points(session, mesh, &facets(mesh, &contact.on))?));
+        let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
+        if let Some(law) = contact.memory {
+            foundations.push((law, points()?));
         }
-        let Some(adhesion) = &contact.adhesion else { continue };
-        let law = contact::Adhesion {
-            stiffness: adhesion.stiffness,
-            tangential_stiffness: adhesion.tangential_stiffness.unwrap_or(0.0),
-            energy: adhesion.energy,
-            viscosity: adhesion.viscosity,
-            length: adhesion.length.unwrap_or(f64::INFINITY),
-        };
-        bonded.push(Bonded { law, points: surface_points(session, mesh, &facets(mesh, &contact.on))? });
+        if let Some(law) = contact.adhesion {
+            bonded.push(Bonded { law, points: points()? });
+        }
     }
     if !bonded.is_empty() {
         effects.push(Box::new(Adhesion::new(bonded, mesh.owned, is_implicit)));
@@ -211,44 +200,14 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 }
 
 /// The law of a contact, and the gap it is felt beyond.
-pub fn normal_law(contact: &job::Contact) -> Result<(contact::NormalLaw, Gap)> {
-    let wall = || Graph::new(vec![[0.0, 0.0]], 0.0, f64::INFINITY);
-    let of_velocity = |graph| (contact::NormalLaw::Graph(graph), Gap::default());
-    let gap = |given: &Option<Scalar>| obstacles::gap(contact.obstacle.as_ref(), given.as_ref());
-    Ok(match &contact.normal {
-        NormalLaw::DampedResponse(d) => {
-            let symmetry = match d.symmetry {
-                job::Symmetry::Even => Symmetry::Even,
-                job::Symmetry::Odd => Symmetry::Odd,
-                job::Symmetry::OneSided => Symmetry::OneSided,
-            };
-            let law =
-                DampedResponse { breakpoints: d.breakpoints.clone(), slopes: d.slopes.clone(), symmetry };
-            of_velocity(law.graph()?)
-        }
-        NormalLaw::Graph(g) => of_velocity(Graph::new(g.points.clone(), g.slope_before, g.slope_after)?),
-        NormalLaw::Compliance(c) => {
-            let law = contact::Compliance { stiffness: c.stiffness, exponent: c.exponent };
-            (contact::NormalLaw::Compliance(law), gap(&c.gap))
-        }
-        NormalLaw::Unilateral(u) => match u.bound {
-            job::Bound::Displacement => (contact::NormalLaw::Unilateral(wall()?), gap(&u.gap)),
-            job::Bound::Velocity => of_velocity(wall()?),
-        },
-    })
-}
-
-/// The friction law that a job describes.
-pub fn friction_law(law: &Friction) -> FrictionLaw {
-    match law {
-        Friction::Tresca(t) => FrictionLaw::Tresca { bound: t.bound },
-        Friction::Coulomb(c) => FrictionLaw::Coulomb { coefficient: c.coefficient },
-        Friction::SlipWeakening(s) => FrictionLaw::SlipWeakening {
-            at_rest: s.at_rest,
-            dynamic: s.dynamic,
-            decay_velocity: s.decay_velocity,
-        },
-    }
+pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
+    let law = contact.normal.response()?;
+    let gap = if law.depends_on_displacement() {
+        obstacles::gap(contact.obstacle.as_ref(), contact.normal.gap())
+    } else {
+        Gap::default()
+    };
+    Ok((law, gap))
 }
 
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {

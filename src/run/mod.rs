@@ -20,7 +20,7 @@ mod steps;
 mod summary;
 mod time_loop;
 
-pub use build::{friction_law, normal_law};
+pub use build::normal_law;
 pub use check::Report;
 pub use inventory::Inventory;
 pub use scene::Scene;

@@ -3,7 +3,10 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Compliance, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, Symmetry},
+    contact::{
+        Bound, Compliance, Coulomb, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, NormalResponse,
+        SlipWeakening, Symmetry, Tresca, Unilateral,
+    },
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     job::{Expression, Scalar},
     material::{ByMaterial, Isotropic},
@@ -13,32 +16,32 @@ use clarke::{
     stepping::{ContactEquations, Effort, Scratch},
 };
 
-fn laws() -> Vec<NormalLaw> {
+fn laws() -> Vec<NormalResponse> {
     let damped = |symmetry| {
-        let law = DampedResponse { breakpoints: vec![0.2, 0.5], slopes: vec![40.0, -25.0, 60.0], symmetry };
-        law.graph().expect("graph")
+        let (breakpoints, slopes) = (vec![0.2, 0.5], vec![40.0, -25.0, 60.0]);
+        NormalLaw::DampedResponse(DampedResponse { breakpoints, slopes, symmetry })
     };
-    let polyline = vec![[-0.4, -3.0], [0.0, -3.0], [0.3, 9.0]];
-    let jumps = vec![[-0.4, -3.0], [-0.4, 20.0], [0.1, 2.0], [0.1, 40.0]];
-    let graphs = [
+    let graph =
+        |points, slope_before, slope_after| NormalLaw::Graph(Graph { points, slope_before, slope_after });
+    let springs = |stiffness, exponent| NormalLaw::Compliance(Compliance { stiffness, exponent, gap: None });
+    let laws = [
         damped(Symmetry::Even),
         damped(Symmetry::Odd),
         damped(Symmetry::OneSided),
-        Graph::new(polyline, 12.0, -8.0).expect("graph"),
-        Graph::new(jumps, 12.0, f64::INFINITY).expect("graph"),
+        graph(vec![[-0.4, -3.0], [0.0, -3.0], [0.3, 9.0]], 12.0, -8.0),
+        graph(vec![[-0.4, -3.0], [-0.4, 20.0], [0.1, 2.0], [0.1, 40.0]], 12.0, f64::INFINITY),
+        springs(300.0, 1.0),
+        springs(4000.0, 2.0),
+        NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap: None }),
     ];
-    let mut laws: Vec<NormalLaw> = graphs.into_iter().map(NormalLaw::Graph).collect();
-    laws.push(NormalLaw::Compliance(Compliance { stiffness: 300.0, exponent: 1.0 }));
-    laws.push(NormalLaw::Compliance(Compliance { stiffness: 4000.0, exponent: 2.0 }));
-    laws.push(NormalLaw::unilateral().expect("graph"));
-    laws
+    laws.iter().map(|law| law.response().expect("a law")).collect()
 }
 
 const FRICTION: [Option<FrictionLaw>; 4] = [
     None,
-    Some(FrictionLaw::Tresca { bound: 60.0 }),
-    Some(FrictionLaw::Coulomb { coefficient: 0.6 }),
-    Some(FrictionLaw::SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 }),
+    Some(FrictionLaw::Tresca(Tresca { bound: 60.0 })),
+    Some(FrictionLaw::Coulomb(Coulomb { coefficient: 0.6 })),
+    Some(FrictionLaw::SlipWeakening(SlipWeakening { at_rest: 0.9, dynamic: 0.4, decay_velocity: 0.5 })),
 ];
 
 fn wall() -> Gap {

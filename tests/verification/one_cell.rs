@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, part};
 use clarke::{
-    contact::{Gap, Graph, NormalLaw},
+    contact::{Gap, NormalResponse, Polyline},
     effect::{Contact, Quadrature, choose_unknowns},
     job::Job,
     mesh::{Boundary, GlobalMesh},
@@ -45,13 +45,13 @@ fn forces<const D: usize>(
     session: &Session,
     mesh: &GlobalMesh<D>,
     quadrature: Quadrature,
-    law: &Graph,
+    law: &Polyline,
     [normal, tangent]: [Vector<D>; 2],
     along: &[f64],
 ) -> Vec<f64> {
     let mesh = part(session, mesh);
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
-    let (law, gap, fixed) = (NormalLaw::Graph(law.clone()), Gap::default(), vec![false; (D + 1) * D]);
+    let (law, gap, fixed) = (NormalResponse::Graph(law.clone()), Gap::default(), vec![false; (D + 1) * D]);
     let contact = Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed).expect("contact");
     let mut contacts = [contact];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");
@@ -91,8 +91,8 @@ fn assert_along<const D: usize>(found: &[f64], normal: Vector<D>, expected: &[f6
 
 fn by_hand(session: &Session) {
     // 1 Pa at rest and 3 Pa s/m; and 2 Pa s/m for what approaches.
-    let damper = Graph::new(vec![[0.0, 1.0]], 3.0, 3.0).expect("graph");
-    let one_sided = Graph::new(vec![[0.0, 0.0]], 0.0, 2.0).expect("graph");
+    let damper = Polyline::new(vec![[0.0, 1.0]], 3.0, 3.0).expect("graph");
+    let one_sided = Polyline::new(vec![[0.0, 0.0]], 0.0, 2.0).expect("graph");
     let (nodal, gauss) = (Quadrature::Nodal, Quadrature::Gauss);
 
     let directions = [[0.6, -0.8], [0.8, 0.6]];
@@ -157,7 +157,8 @@ fn pushed_hard(session: &Session) {
     let nodes = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
     let mesh = part(session, &cell(nodes, vec![0, 1, 2], vec![[0, 1], [1, 2], [2, 0]]));
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
-    let law = NormalLaw::Graph(Graph::new(vec![[3e-10, -1e9], [3e-10, 1e9]], 1.0, 1.0).expect("graph"));
+    let law =
+        NormalResponse::Graph(Polyline::new(vec![[3e-10, -1e9], [3e-10, 1e9]], 1.0, 1.0).expect("graph"));
     let contact = Contact::new(session, &mesh, &facets, Quadrature::Nodal, law, Gap::default(), &[false; 6]);
     let mut contacts = [contact.expect("contact")];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");

@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Gap, NormalLaw},
+    contact::{Bound, Gap, NormalResponse, Unilateral},
     effect::{Contact, Effect, Held, Inertia, Quadrature},
     material::ByMaterial,
     mesh::GlobalMesh,
@@ -116,7 +116,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     }
     // With contact: the component of the traction along the part of the normal that no support holds.
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
-    let law = NormalLaw::unilateral().expect("a law");
+    let law = NormalResponse::Unilateral(Unilateral { bound: Bound::Displacement, gap: None });
     let contact =
         Contact::new(session, &body.mesh, &facets, Quadrature::Nodal, law, Gap::default(), &body.fixed);
     body.contacts.push(contact.expect("a contact"));

@@ -5,7 +5,7 @@ use super::{
     point::{Point, Unknown},
     tangential_point::span_without,
 };
-use crate::{contact::NormalLaw, tensor::Vector};
+use crate::tensor::Vector;
 use std::collections::BTreeMap;
 
 /// A node of contact boundaries with the directions in which their laws act.
@@ -59,10 +59,7 @@ impl<const D: usize> Contact<D> {
     /// Nodes of this rank with directions along which the contact can hold a body at rest: the normal, unless the law never
     /// presses or falls, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
-        let presses = match &self.law {
-            NormalLaw::Graph(graph) => !graph.is_zero() && graph.monotonicity_constant() == 0.0,
-            NormalLaw::Compliance(_) | NormalLaw::Unilateral(_) => true,
-        };
+        let presses = !self.law.is_zero() && self.law.monotonicity_constant() == 0.0;
         let normal = |point: &Point<D>| {
             let normal = point.normal;
             point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()

@@ -1,7 +1,7 @@
 //! What a contact stores, dissipates and takes from its obstacle, and how deep it lies in that.
 
 use super::{Contact, point::Point};
-use crate::{contact::NormalLaw, error::Result, tensor::larger};
+use crate::{error::Result, tensor::larger};
 
 impl<const D: usize> Contact<D> {
     /// Energy in J that a step of this length dissipated, the scheme's own term, and the work of the obstacle on the body, from
@@ -20,12 +20,13 @@ impl<const D: usize> Contact<D> {
             let after = point.context.penetration + change;
             let beside = length * v - change - point.shift;
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let stored = self.law.energy(after) - self.law.energy(before);
-            let numerical = match self.law {
-                NormalLaw::Compliance(_) if pressure == 0.0 => stored,
-                NormalLaw::Compliance(_) => stored - pressure * (after - before) - pressure * beside,
-                _ => 0.0,
+            let stored = self.law.energy(after).zip(self.law.energy(before)).map(|(e, before)| e - before);
+            let numerical = match stored {
+                None => 0.0,
+                Some(stored) if pressure == 0.0 => stored,
+                Some(stored) => stored - pressure * (after - before) - pressure * beside,
             };
+            let stored = stored.unwrap_or(0.0);
             let given = if pressure == 0.0 { 0.0 } else { pressure * point.growth };
             sums[0] += point.weight * (work - stored + numerical - given);
             sums[1] += point.weight * numerical;
@@ -50,10 +51,13 @@ impl<const D: usize> Contact<D> {
 
     /// Energy in J stored at `time`, from displacements with ghosts.
     pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
-        let NormalLaw::Compliance(law) = &self.law else { return Ok(0.0) };
+        if self.law.energy(0.0).is_none() {
+            return Ok(0.0);
+        }
         let energy = |point: &Point<D>| {
             let gap = self.gap.at(time, &point.place, &point.normal)?;
-            Ok(point.weight * law.energy(point.normal_component(displacement) - gap))
+            let stored = self.law.energy(point.normal_component(displacement) - gap);
+            Ok(point.weight * stored.unwrap_or(0.0))
         };
         self.points.iter().map(energy).sum()
     }

@@ -4,7 +4,7 @@ use super::{
     Contact,
     point::{Point, Unknown},
 };
-use crate::{contact::NormalLaw, tensor::larger};
+use crate::tensor::larger;
 
 /// Share of the mean pressure of all forces of a step, beside which errors of the pressure count at least.
 const FORCE_SHARE: f64 = 0.01;
@@ -43,7 +43,7 @@ impl<const D: usize> Contact<D> {
     /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs. Where the
     /// law knows no pressure, the velocity is that in any direction: what is felt along the others bounds what can be told.
     pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
-        let nothing = matches!(&self.law, NormalLaw::Graph(graph) if graph.is_zero());
+        let nothing = self.law.is_zero();
         let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
             let moved = if nothing { point.speed(velocity) } else { point.normal_component(velocity).abs() };
             let along = larger(moved, point.context_velocity());
@@ -59,10 +59,7 @@ impl<const D: usize> Contact<D> {
         let sliding = [range[2], range[3]];
         // The velocity that the pressures would change, and the pressure of the forces, count where there is no other; of the
         // latter a share where the law has a range of its own.
-        let share = match &self.law {
-            NormalLaw::Graph(graph) if !graph.is_zero() => FORCE_SHARE,
-            _ => 1.0,
-        };
+        let share = if self.law.is_zero() || self.law.depends_on_displacement() { 1.0 } else { FORCE_SHARE };
         let reference = self.reference;
         let range =
             [range[0].max(range[1] / reference.resistance[0]), range[1].max(share * reference.traction())];

@@ -33,7 +33,7 @@ mod tangential_point;
 mod unknowns;
 
 use crate::{
-    contact::{Gap, NodeContext, NormalLaw, Rate},
+    contact::{Gap, NodeContext, NormalResponse, Rate},
     error::Result,
     mesh::Mesh,
     session::Session,
@@ -43,25 +43,17 @@ use friction::Friction;
 use point::{Point, Unknown, gauss_points};
 use xxhash_rust::xxh3::Xxh3;
 
+pub use crate::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use inclusion::ReferenceValues;
 pub use unknowns::choose_unknowns;
 
-/// Where on a facet the law holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quadrature {
-    /// At its nodes (trapezoidal rule).
-    Nodal,
-    /// At Gauss points.
-    Gauss,
-}
-
 /// A law on a contact boundary.
 #[derive(Debug)]
 pub struct Contact<const D: usize> {
     /// The law.
-    pub law: NormalLaw,
+    pub law: NormalResponse,
     /// Distance to the obstacle along the normal.
     pub gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
@@ -81,7 +73,7 @@ impl<const D: usize> Contact<D> {
         mesh: &Mesh<D>,
         facets: &[u32],
         quadrature: Quadrature,
-        law: NormalLaw,
+        law: NormalResponse,
         gap: Gap,
         fixed: &[bool],
     ) -> Result<Self> {

@@ -1,7 +1,7 @@
 //! A quadrature point of a contact boundary.
 
 use crate::{
-    contact::{NodeContext, NormalLaw, Resolved},
+    contact::{NodeContext, NormalResponse, Resolved},
     mesh::{Mesh, shape::facet_normal},
     space::facet_rule,
     tensor::{Vector, norm},
@@ -171,7 +171,7 @@ impl<const D: usize> Point<D> {
 
     /// The point of the law's graph that the unknown `along` the direction stands for.
     #[inline]
-    pub fn resolve(&self, law: &NormalLaw, scale: f64, along: f64) -> Resolved {
+    pub fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
         law.resolve(scale * self.stretch * along, scale, self.context)
     }
 
@@ -190,7 +190,7 @@ impl<const D: usize> Point<D> {
     }
 
     /// Pressure in Pa, given nodal velocities.
-    pub fn pressure_at(&self, law: &NormalLaw, velocity: &[f64]) -> f64 {
+    pub fn pressure_at(&self, law: &NormalResponse, velocity: &[f64]) -> f64 {
         match self.unknown {
             Unknown::Parameter => self.pressure,
             Unknown::Velocity => law.pressure(self.normal_component(velocity), self.context),

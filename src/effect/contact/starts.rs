@@ -1,19 +1,12 @@
 //! Other velocities for a step to start from, where it may have several solutions.
 
 use super::Contact;
-use crate::contact::{FrictionLaw, NormalLaw};
 
 impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s at which a law here turns a corner; 0 where none is given.
     pub fn corner_velocity(&self) -> f64 {
-        let normal = match &self.law {
-            NormalLaw::Graph(graph) => graph.points().iter().fold(0.0, |most, p| f64::max(most, p[0].abs())),
-            NormalLaw::Compliance(_) | NormalLaw::Unilateral(_) => 0.0,
-        };
-        let sliding = match self.friction() {
-            Some(FrictionLaw::SlipWeakening { decay_velocity, .. }) => decay_velocity,
-            _ => 0.0,
-        };
+        let normal = self.law.corners().iter().fold(0.0, |most, p| f64::max(most, p[0].abs()));
+        let sliding = self.friction().map_or(0.0, |friction| friction.corner_velocity());
         f64::max(normal, sliding)
     }
 

@@ -3,28 +3,22 @@
 //! Doc comments become the text of `solver describe`; the `schemars` attributes become the ranges that
 //! `validate` checks before these structs are filled.
 
-mod adhesion;
 mod boundary;
 mod contact;
 mod damage;
 mod material;
-mod memory;
 mod mesh;
 mod output;
 mod time;
 
-pub use adhesion::Adhesion;
+pub use crate::contact::Quadrature;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
-pub use contact::{
-    Bound, Compliance, Contact, Coulomb, DampedResponse, Friction, Graph, NormalLaw, Obstacle, Plane,
-    Quadrature, SlipWeakening, Sphere, Symmetry, Tresca, Unilateral,
-};
+pub use contact::{Contact, Obstacle, Plane, Sphere};
 pub use damage::Damage;
 pub use material::{
     DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
     Viscosity,
 };
-pub use memory::Memory;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{

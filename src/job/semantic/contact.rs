@@ -1,141 +1,58 @@
-//! Contact laws: graphs that have a relaxed monotonicity, friction that falls the right way.
+//! Contact: what laws say of their parameters and of each other, and obstacles.
 
 use super::boundary::{check_flat, check_vector};
 use super::{Findings, MeshNames, items};
+use crate::contact::{Adhesion, ContactTable, NormalLaw};
 use crate::expression::Scalar;
-use crate::job::document::{Adhesion, Bound, DampedResponse, Graph, Method, Quadrature, SlipWeakening};
+use crate::job::document::Method;
+use crate::job::source::Node;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {
-    check_method(findings);
-    for contact in items(findings.root, "contact") {
-        check_damped_response(findings, &format!("{contact}.normal.damped_response"));
-        check_graph(findings, &format!("{contact}.normal.graph.points"));
-        check_quadrature(findings, &contact);
-        check_adhesion(findings, &contact);
-        check_memory(findings, &contact);
-        check_bound(findings, &format!("{contact}.normal.unilateral"));
-        check_obstacle(findings, &contact);
-        let path = format!("{contact}.friction.slip_weakening");
-        if let Some(SlipWeakening { at_rest, dynamic, .. }) = findings.root.read(&path)
-            && at_rest < dynamic
-        {
-            let message = "the static coefficient is below the dynamic one";
-            findings.fault(&format!("{path}.static"), message, format!("it must be at least {dynamic}"));
+    let root = findings.root;
+    let tables: Vec<ContactTable> =
+        items(root, "contact").into_iter().map(|path| table(root, path)).collect();
+    check_method(findings, &tables);
+    for table in tables {
+        for fault in table.faults() {
+            let key = format!("{}.{}", table.path, fault.key);
+            if fault.is_at_key {
+                findings.fault_at_key(&key, fault.message, fault.help);
+            } else {
+                findings.fault(&key, fault.message, fault.help);
+            }
         }
+        let warning = table.adhesion.as_ref().and_then(Adhesion::warning);
+        findings.warnings.extend(warning.map(|warning| format!("{}.adhesion: {warning}", table.path)));
+        check_obstacle(findings, &table.path);
+    }
+}
+
+/// What can be read of the table at this path.
+fn table(root: &Node, path: String) -> ContactTable {
+    let key = |key: &str| format!("{path}.{key}");
+    ContactTable {
+        quadrature: root.read(&key("quadrature")).unwrap_or_default(),
+        normal: root.read(&key("normal")),
+        friction: root.read(&key("friction")),
+        adhesion: root.read(&key("adhesion")),
+        memory: root.read(&key("memory")),
+        has_obstacle: root.find(&key("obstacle")).is_some(),
+        path,
     }
 }
 
 /// PETSc's solver for variational inequalities knows bounds only.
-fn check_method(findings: &mut Findings<'_>) {
-    let root = findings.root;
-    if root.read("solver.method") != Some(Method::Vinewtonrsls) {
+fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
+    if findings.root.read("solver.method") != Some(Method::Vinewtonrsls) {
         return;
     }
-    let contacts = items(root, "contact");
-    let bounds = |contact: &String| {
-        let has = |key: &str| root.find(&format!("{contact}.{key}")).is_some();
-        has("normal.unilateral") && !has("friction")
+    let is_bound = |table: &ContactTable| {
+        table.normal.as_ref().is_some_and(NormalLaw::is_bound) && table.friction.is_none()
     };
-    if contacts.is_empty() || !contacts.iter().all(bounds) {
+    if tables.is_empty() || !tables.iter().all(is_bound) {
         let message = "this method solves frictionless contact whose every normal law is `unilateral`";
         findings.fault("solver.method", message, "use \"newton\", or leave the key out");
-    }
-}
-
-/// Gauss points know neither jumps nor the displacement nor friction.
-fn check_quadrature(findings: &mut Findings<'_>, contact: &str) {
-    let root = findings.root;
-    if root.read::<Quadrature>(&format!("{contact}.quadrature")) != Some(Quadrature::Gauss) {
-        return;
-    }
-    if root.find(&format!("{contact}.friction")).is_some() {
-        let message = "friction does not act at Gauss points";
-        findings.fault(&format!("{contact}.quadrature"), message, "use \"nodal\", or leave the key out");
-    }
-    let graph: Option<Graph> = root.read(&format!("{contact}.normal.graph"));
-    let jumps = graph.is_some_and(|graph| graph.points.windows(2).any(|pair| pair[0][0] == pair[1][0]));
-    let displaced = ["compliance", "unilateral"]
-        .into_iter()
-        .any(|law| root.find(&format!("{contact}.normal.{law}")).is_some());
-    if jumps || displaced {
-        let message = "this contact law does not act at Gauss points";
-        findings.fault(&format!("{contact}.quadrature"), message, "use \"nodal\", or leave the key out");
-    }
-}
-
-/// Bonds are at nodes, and between what touches at first.
-fn check_adhesion(findings: &mut Findings<'_>, contact: &str) {
-    let root = findings.root;
-    let path = format!("{contact}.adhesion");
-    if root.find(&path).is_none() {
-        return;
-    }
-    if root.read::<Quadrature>(&format!("{contact}.quadrature")) == Some(Quadrature::Gauss) {
-        let message = "adhesion does not act at Gauss points";
-        let help = "use \"nodal\", or leave the key out";
-        findings.fault(&format!("{contact}.quadrature"), message, help);
-    }
-    for law in ["compliance", "unilateral"] {
-        let gap = format!("{contact}.normal.{law}.gap");
-        if root.find(&gap).is_some() {
-            let message = "adhesion binds what touches at first: there is no gap";
-            findings.fault(&gap, message, format!("delete it, or [{path}]"));
-        }
-    }
-    if let Some(Adhesion { stiffness, tangential_stiffness, energy, length: Some(length), .. }) =
-        root.read(&path)
-    {
-        let most = (stiffness + tangential_stiffness.unwrap_or(0.0)) * length * length;
-        if most <= energy && most > 0.0 {
-            findings.warnings.push(format!(
-                "{path}: at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
-            ));
-        }
-    }
-}
-
-/// What is remembered is how far a foundation that touches at first was pressed in; friction sees the normal law alone.
-fn check_memory(findings: &mut Findings<'_>, contact: &str) {
-    let root = findings.root;
-    let path = format!("{contact}.memory");
-    if root.find(&path).is_none() {
-        return;
-    }
-    if root.read::<Quadrature>(&format!("{contact}.quadrature")) == Some(Quadrature::Gauss) {
-        let help = "use \"nodal\", or leave the key out";
-        findings.fault(&format!("{contact}.quadrature"), "memory does not act at Gauss points", help);
-    }
-    let memory_or = |other: &str| format!("delete it, or [{path}]{other}");
-    for (key, message, other) in [
-        ("normal.unilateral", "a rigid obstacle is never pressed in: there is nothing to remember", ""),
-        ("normal.compliance.gap", "memory is of what touches at first: there is no gap", ""),
-        ("obstacle", "memory is of what touches at first: there is no obstacle that moves", ""),
-        (
-            "friction.coulomb",
-            "this friction follows the pressure of the normal law, which memory is not part of",
-            ", or use tresca",
-        ),
-        (
-            "friction.slip_weakening",
-            "this friction follows the pressure of the normal law, which memory is not part of",
-            ", or use tresca",
-        ),
-    ] {
-        let place = format!("{contact}.{key}");
-        if root.find(&place).is_some() {
-            findings.fault_at_key(&place, message, memory_or(other));
-        }
-    }
-}
-
-/// A bound on the velocity knows no gap.
-fn check_bound(findings: &mut Findings<'_>, path: &str) {
-    let gap = format!("{path}.gap");
-    if findings.root.read(&format!("{path}.bound")) == Some(Bound::Velocity)
-        && findings.root.find(&gap).is_some()
-    {
-        findings.fault(&gap, "a bound on the velocity has no gap", "delete it, or bound the displacement");
     }
 }
 
@@ -144,31 +61,12 @@ const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.cent
 /// How an obstacle turns.
 const OBSTACLE_ROTATIONS: [&str; 2] = ["plane.rotation", "sphere.rotation"];
 
-/// An obstacle is for laws that know a gap, stands in for it, and moves as one.
+/// An obstacle is rigid, moves as one, and has a direction.
 fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     let root = findings.root;
     let obstacle = format!("{contact}.obstacle");
     if root.find(&obstacle).is_none() {
         return;
-    }
-    let law = |name: &str| format!("{contact}.normal.{name}");
-    let known = ["damped_response", "graph"].into_iter().find(|name| root.find(&law(name)).is_some());
-    if let Some(name) = known {
-        let message = format!("`{name}` acts at any distance: it has no obstacle");
-        findings.fault_at_key(&obstacle, message, "delete the obstacle, or use `compliance` or `unilateral`");
-    }
-    if root.read(&law("unilateral.bound")) == Some(Bound::Velocity) {
-        let help = "delete the obstacle, or bound the displacement";
-        findings.fault_at_key(&obstacle, "a bound on the velocity has no obstacle", help);
-    }
-    for gap in ["compliance.gap", "unilateral.gap"].map(law) {
-        if root.find(&gap).is_some() {
-            findings.fault_at_key(
-                &gap,
-                "`gap` beside [contact.obstacle]",
-                "give one of them: the obstacle says how far it is",
-            );
-        }
     }
     let components = OBSTACLE_VECTORS.map(|vector| items(root, &format!("{obstacle}.{vector}")));
     let rotations = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));
@@ -196,60 +94,12 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     }
 }
 
-fn check_damped_response(findings: &mut Findings<'_>, path: &str) {
-    let root = findings.root;
-    let key = format!("{path}.breakpoints");
-    let breakpoints: Option<Vec<f64>> = root.read(&key);
-    let mut last = 0.0;
-    for (index, &breakpoint) in breakpoints.iter().flatten().enumerate() {
-        if breakpoint <= last {
-            let help = "they are velocities above zero, each larger than the one before";
-            findings.fault(&format!("{key}.{index}"), "breakpoints must ascend from zero", help);
-        }
-        last = breakpoint;
-    }
-    if let Some(DampedResponse { breakpoints, slopes, .. }) = root.read(path)
-        && slopes.len() != breakpoints.len() + 1
-    {
-        let message = format!("{} slope(s) for {} breakpoint(s)", slopes.len(), breakpoints.len());
-        let help = "one slope before, between and after the breakpoints: one more than breakpoints";
-        findings.fault(&format!("{path}.slopes"), message, help);
-    }
-}
-
-fn check_graph(findings: &mut Findings<'_>, path: &str) {
-    let points: Vec<[f64; 2]> = findings.root.read(path).unwrap_or_default();
-    for (index, pair) in points.windows(2).enumerate() {
-        let ([before, low], [after, high]) = (pair[0], pair[1]);
-        let key = format!("{path}.{}", index + 1);
-        if after < before {
-            findings.fault(
-                &key,
-                "the velocities of a graph must ascend",
-                format!("it must be at least {before}"),
-            );
-        } else if after == before && high < low {
-            let message =
-                "a downward jump has no relaxed monotonicity: no step is small enough to be solvable";
-            let help = "order the two points upwards, or let the pressure fall along a steep slope";
-            findings.fault(&key, message, help);
-        } else if after == before && high == low {
-            findings.fault(&key, "this point is there twice", "delete one");
-        }
-    }
-    for (index, three) in points.windows(3).enumerate() {
-        if three[0][0] == three[2][0] {
-            let help = "two points with the same velocity are a jump; the ones between say nothing";
-            findings.fault(&format!("{path}.{}", index + 2), "three points with the same velocity", help);
-        }
-    }
-}
-
 /// What depends on the dimension.
 pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     for contact in items(findings.root, "contact") {
-        for law in ["compliance", "unilateral"] {
-            check_flat(findings, &format!("{contact}.normal.{law}.gap"), mesh.dimension);
+        let normal: Option<NormalLaw> = findings.root.read(&format!("{contact}.normal"));
+        if let Some(gap) = normal.and_then(|law| law.gap_key()) {
+            check_flat(findings, &format!("{contact}.{gap}"), mesh.dimension);
         }
         for vector in OBSTACLE_VECTORS {
             check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);

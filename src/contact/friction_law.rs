@@ -1,0 +1,222 @@
+//! Friction laws: the friction traction as a function of the sliding velocity, at a given contact pressure.
+//!
+//! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g`
+//! never rises with the velocity. Along the direction of sliding this is a scalar graph with a jump at rest and a fall of at
+//! most [`steepest_fall`](FrictionBound::steepest_fall) times the contact pressure: its relaxed monotonicity constant. For a `c`
+//! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
+//! radial, so that `s` as a vector has the direction of both velocity and traction.
+
+use super::{FrictionLaw, LawFault};
+
+/// The point of a friction graph with a given parameter `s = c v + q`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Sliding velocity in m/s, not negative.
+    pub speed: f64,
+    /// Friction traction in Pa, not negative.
+    pub traction: f64,
+    /// Derivative of the velocity by the parameter in m/(Pa s): 0 where the point sticks.
+    pub derivative: f64,
+    /// Slope of the graph in Pa s/m, where the point slides.
+    pub slope: f64,
+    /// Derivative of the traction by the contact pressure at constant velocity; 0 where the point sticks.
+    pub coefficient: f64,
+}
+
+/// Bisection takes over where Newton's method leaves the bracket; more iterations than bits serve nothing.
+const ITERATIONS: usize = 100;
+
+/// What a friction law says of a point. The defaults are those of a bound that is proportional to the contact pressure and
+/// the same at any velocity.
+pub trait FrictionBound {
+    /// Friction traction per contact pressure at a sliding velocity; 0 for laws that know no pressure.
+    fn coefficient(&self, speed: f64) -> f64;
+
+    /// Largest friction traction in Pa at a sliding velocity in m/s and a contact pressure in Pa.
+    fn bound(&self, speed: f64, pressure: f64) -> f64 {
+        self.coefficient(speed) * pressure.max(0.0)
+    }
+
+    /// Derivative of the bound by the sliding velocity, in Pa s/m: not positive.
+    fn slope(&self, _speed: f64, _pressure: f64) -> f64 {
+        0.0
+    }
+
+    /// The potential in W/m² at a sliding velocity, zero at rest: the integral of the bound.
+    fn potential(&self, speed: f64, pressure: f64) -> f64 {
+        self.bound(speed, pressure) * speed
+    }
+
+    /// Whether the bound follows the contact pressure.
+    fn follows_pressure(&self) -> bool {
+        true
+    }
+
+    /// The steepest fall of the coefficient with the sliding velocity, in s/m: times the contact pressure it is the relaxed
+    /// monotonicity constant.
+    fn steepest_fall(&self) -> f64 {
+        0.0
+    }
+
+    /// The velocity in m/s by which the coefficient has changed, 0 where it does not.
+    fn corner_velocity(&self) -> f64 {
+        0.0
+    }
+
+    /// What is wrong with the parameters; keys are those of the law's table.
+    fn own_faults(&self) -> Vec<LawFault> {
+        Vec::new()
+    }
+
+    /// Velocity and traction where `c v + q = s`, for an `s` that is not negative and a `c` above the fall at this pressure.
+    fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
+        let at_rest = self.bound(0.0, pressure);
+        if at_rest > 0.0 && s <= at_rest {
+            return Slip { speed: 0.0, traction: s, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
+        }
+        let speed =
+            if self.steepest_fall() == 0.0 { (s - at_rest) / c } else { sliding_speed(self, s, c, pressure) };
+        let slope = self.slope(speed, pressure);
+        Slip {
+            speed,
+            // Without a bound exactly nothing.
+            traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
+            derivative: 1.0 / (c + slope),
+            slope,
+            coefficient: if pressure > 0.0 { self.coefficient(speed) } else { 0.0 },
+        }
+    }
+}
+
+/// The root of `c v + g(v) = s`, which rises and is convex: Newton's method with bisection where it leaves the bracket.
+fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f64) -> f64 {
+    let (mut low, mut high) = (0.0, s / c);
+    let mut at = high;
+    for _ in 0..ITERATIONS {
+        let open = c * at + law.bound(at, pressure) - s;
+        if open > 0.0 {
+            high = at;
+        } else {
+            low = at;
+        }
+        let newton = at - open / (c + law.slope(at, pressure));
+        let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+        if (next - at).abs() <= 2.0 * f64::EPSILON * high {
+            return next;
+        }
+        at = next;
+    }
+    at
+}
+
+/// The choice of friction laws, from the list of them: the enum that the job holds, and calls of the law that it is.
+macro_rules! friction_laws {
+    ($($(#[$about:meta])* $law:ident,)*) => {
+        /// The friction law.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        #[schemars(rename = "Friction")]
+        pub enum FrictionLaw {
+            $($(#[$about])* $law($law),)*
+        }
+
+        macro_rules! each_friction_law {
+            ($chosen:expr, $bound:ident => $what:expr) => {
+                match $chosen {
+                    $(FrictionLaw::$law($bound) => $what,)*
+                }
+            };
+        }
+
+        impl FrictionLaw {
+            laws::calls! { each_friction_law, FrictionBound:
+                coefficient(speed: f64) -> f64;
+                bound(speed: f64, pressure: f64) -> f64;
+                slope(speed: f64, pressure: f64) -> f64;
+                potential(speed: f64, pressure: f64) -> f64;
+                follows_pressure() -> bool;
+                steepest_fall() -> f64;
+                corner_velocity() -> f64;
+                own_faults() -> Vec<LawFault>;
+                resolve(s: f64, c: f64, pressure: f64) -> Slip;
+            }
+
+            /// Its table in the job, from that of the contact.
+            pub fn table(&self) -> String {
+                match self {
+                    $(Self::$law(_) => format!("friction.{}", laws::key(stringify!($law))),)*
+                }
+            }
+        }
+    };
+}
+pub(super) use friction_laws;
+
+impl FrictionLaw {
+    /// What is wrong with its parameters; keys are those of the contact's table.
+    pub fn faults(&self) -> Vec<LawFault> {
+        let table = self.table();
+        self.own_faults().into_iter().map(|fault| fault.within(&table)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{Coulomb, SlipWeakening, Tresca};
+    use proptest::prelude::*;
+
+    fn any_law() -> impl Strategy<Value = FrictionLaw> {
+        let weakening =
+            (0.0f64..1.0, 0.0f64..1.0, 0.01f64..2.0).prop_map(|(dynamic, more, decay_velocity)| {
+                FrictionLaw::SlipWeakening(SlipWeakening { at_rest: dynamic + more, dynamic, decay_velocity })
+            });
+        prop_oneof![
+            (0.0f64..5.0).prop_map(|bound| FrictionLaw::Tresca(Tresca { bound })),
+            (0.0f64..2.0).prop_map(|coefficient| FrictionLaw::Coulomb(Coulomb { coefficient })),
+            weakening,
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn laws_conform(law in any_law(), pressure in -1.0f64..5.0, speed in 0.001f64..3.0, other in 0.0f64..3.0) {
+            let h = 1e-6;
+            let by_value = (law.bound(speed + h, pressure) - law.bound(speed - h, pressure)) / (2.0 * h);
+            prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_fall()));
+            let by_potential = (law.potential(speed + h, pressure) - law.potential(speed - h, pressure)) / (2.0 * h);
+            prop_assert!((by_potential - law.bound(speed, pressure)).abs() < 1e-6 * (1.0 + law.steepest_fall()));
+            prop_assert_eq!(law.potential(0.0, pressure), 0.0);
+            let rise = (law.bound(speed, pressure) - law.bound(other, pressure)) * (speed - other);
+            let fall = law.steepest_fall() * pressure.max(0.0);
+            prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);
+            if law.follows_pressure() && pressure.abs() > 1e-5 {
+                let by_pressure = (law.bound(speed, pressure + h) - law.bound(speed, pressure - h)) / (2.0 * h);
+                let known = if pressure > 0.0 { law.coefficient(speed) } else { 0.0 };
+                prop_assert!((by_pressure - known).abs() < 1e-7);
+            }
+        }
+
+        #[test]
+        fn the_resolvent_finds_every_point_of_the_graph(
+            law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0,
+        ) {
+            let c = more * law.steepest_fall() * pressure.max(0.0) + 0.1;
+            let found = law.resolve(s, c, pressure);
+            prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
+            if found.speed > 0.0 {
+                prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+            } else {
+                prop_assert!(found.traction <= law.bound(0.0, pressure));
+            }
+            let h = 1e-6 * (1.0 + s);
+            if s > h {
+                let (above, below) = (law.resolve(s + h, c, pressure), law.resolve(s - h, c, pressure));
+                if (above.derivative == 0.0) == (below.derivative == 0.0) {
+                    let quotient = (above.speed - below.speed) / (2.0 * h);
+                    prop_assert!((quotient - found.derivative).abs() < 1e-3 * (found.derivative + 1e-6 / c));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,400 @@
+//! A graph of the pressure over the normal velocity: a polyline with two half-lines at its ends.
+//!
+//! `-sigma_nu in g(v_nu)` with `g` piecewise linear; it may fall, and it may jump upwards: two points with the same
+//! velocity, or a vertical ray at an end (an infinite slope there). It is the Clarke subdifferential of the potential
+//! `j(v) = integral of g from 0 to v`, relation (8) of Wang and Cheng (2022). A graph that jumps downwards has no
+//! relaxed monotonicity and is refused.
+//!
+//! For any `c` above the steepest fall, `s = c v + p` grows along the graph: it is a parameter of the graph, and velocity
+//! and pressure are functions of it, Lipschitz continuous also where the graph is vertical ([`Polyline::resolve`]).
+
+use super::{Branch, NodeContext, Resolved, Response};
+use crate::error::{Error, Result};
+
+/// A piecewise linear law that may fall, and jump upwards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polyline {
+    points: Vec<[f64; 2]>,
+    slopes: Vec<f64>,
+    /// Largest velocity and pressure among the corners.
+    reach: [f64; 2],
+}
+
+impl Polyline {
+    /// The polyline through `points` (velocity in m/s ascending, pressure in Pa), with these slopes (Pa s/m) before
+    /// the first and after the last. Two points of the same velocity are an upward jump, an infinite slope is a vertical
+    /// ray: downwards before the first point, upwards after the last.
+    pub fn new(points: Vec<[f64; 2]>, slope_before: f64, slope_after: f64) -> Result<Self> {
+        if points.is_empty() {
+            return Err(Error::Refused("a contact graph needs at least one point".into()));
+        }
+        let mut slopes = vec![slope_before];
+        for pair in points.windows(2) {
+            let [[v, p], [w, q]] = [pair[0], pair[1]];
+            if w < v {
+                return Err(Error::Refused(format!("contact graph: velocity {w} does not come after {v}")));
+            }
+            if w == v && q <= p {
+                return Err(Error::Refused(format!(
+                    "contact graph: at velocity {v} the pressure goes from {p} to {q}; only upward jumps have a relaxed \
+                     monotonicity: let it fall along a steep slope"
+                )));
+            }
+            slopes.push(if w == v { f64::INFINITY } else { (q - p) / (w - v) });
+        }
+        slopes.push(slope_after);
+        if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
+            return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
+        }
+        let larger = |[v, p]: [f64; 2], [w, q]: &[f64; 2]| [f64::max(v, w.abs()), f64::max(p, q.abs())];
+        let reach = points.iter().fold([0.0; 2], larger);
+        Ok(Self { points, slopes, reach })
+    }
+
+    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Self::branch).
+    fn branch_of(&self, s: f64, c: f64) -> usize {
+        self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
+    }
+
+    /// Whether this branch is vertical.
+    fn is_vertical(&self, branch: usize) -> bool {
+        self.slopes[branch] == f64::INFINITY
+    }
+
+    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; at a jump its upper end. For graphs without a vertical
+    /// ray.
+    #[inline]
+    pub fn pressure(&self, velocity: f64) -> f64 {
+        let branch = self.branch(velocity);
+        let [v, p] = self.points[branch.saturating_sub(1)];
+        p + self.slopes[branch] * (velocity - v)
+    }
+
+    /// Which linear branch holds a velocity: 0 before the first point, `n` after the last of `n`.
+    #[inline]
+    pub fn branch(&self, velocity: f64) -> usize {
+        self.points.iter().take_while(|p| p[0] <= velocity).count()
+    }
+
+    /// The potential `j` in W/m², zero at rest.
+    pub fn potential(&self, velocity: f64) -> f64 {
+        self.area_from_first(velocity) - self.area_from_first(0.0)
+    }
+
+    /// Signed area below the graph between its first point and `velocity`.
+    fn area_from_first(&self, velocity: f64) -> f64 {
+        let branch = self.branch(velocity);
+        let mut area = 0.0;
+        for pair in self.points.windows(2).take(branch.saturating_sub(1)) {
+            area += 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]);
+        }
+        let [v, p] = self.points[branch.saturating_sub(1)];
+        area + 0.5 * (p + self.pressure(velocity)) * (velocity - v)
+    }
+
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
+    /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
+    fn growth(&self) -> [f64; 2] {
+        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
+        if slope == f64::INFINITY {
+            return [f64::INFINITY; 2];
+        }
+        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
+        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
+        let corners = self.points.iter().map(|point| excess(*point));
+        [corners.fold(self.pressure(0.0).abs(), f64::max), slope]
+    }
+
+    /// Distance of a pair (velocity, pressure) to the graph, scaled by this velocity and this pressure.
+    fn distance_in(&self, velocity: f64, pressure: f64, [width, height]: [f64; 2]) -> f64 {
+        let point = [velocity / width, pressure / height];
+        let scaled = |p: [f64; 2]| [p[0] / width, p[1] / height];
+        let steep = width / height;
+        let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
+        let along = |slope: f64| if slope == f64::INFINITY { [0.0, 1.0] } else { [1.0, slope * steep] };
+        let mut least = ray_distance(point, scaled(first), along(self.slopes[0]).map(|x| -x));
+        least = least.min(ray_distance(point, scaled(last), along(self.slopes[self.points.len()])));
+        for pair in self.points.windows(2) {
+            least = least.min(segment_distance(point, scaled(pair[0]), scaled(pair[1])));
+        }
+        least
+    }
+}
+
+impl Response for Polyline {
+    fn resolve(&self, s: f64, c: f64, _node: NodeContext) -> Resolved {
+        let branch = self.branch_of(s, c);
+        let [v, p] = self.points[branch.saturating_sub(1)];
+        let slope = self.slopes[branch];
+        if slope == f64::INFINITY {
+            return Resolved { velocity: v, pressure: s - c * v, derivative: 0.0, branch };
+        }
+        let derivative = 1.0 / (c + slope);
+        // From the corner or from rest, whichever is nearer: a corner far off would cost digits.
+        let from_corner = s - (c * v + p);
+        if s.abs() < from_corner.abs() {
+            let at_rest = p - slope * v;
+            let velocity = (s - at_rest) * derivative;
+            return Resolved { velocity, pressure: at_rest + slope * velocity, derivative, branch };
+        }
+        let advance = from_corner * derivative;
+        Resolved { velocity: v + advance, pressure: p + slope * advance, derivative, branch }
+    }
+
+    fn pressure(&self, velocity: f64, _node: NodeContext) -> f64 {
+        self.pressure(velocity)
+    }
+
+    fn slope(&self, velocity: f64, _node: NodeContext) -> f64 {
+        self.slopes[self.branch(velocity)]
+    }
+
+    fn branch(&self, velocity: f64, _node: NodeContext) -> usize {
+        self.branch(velocity)
+    }
+
+    fn distance(&self, velocity: f64, pressure: f64, _node: NodeContext, range: [f64; 2]) -> f64 {
+        self.distance_in(velocity, pressure, std::array::from_fn(|i| self.reach[i].max(range[i])))
+    }
+
+    fn has_vertical_parts(&self) -> bool {
+        self.slopes.contains(&f64::INFINITY)
+    }
+
+    fn is_zero(&self) -> bool {
+        self.reach[1] == 0.0 && self.slopes.iter().all(|slope| *slope == 0.0)
+    }
+
+    fn velocity_bound(&self, _node: NodeContext) -> Option<f64> {
+        match self.points[..] {
+            [[v, 0.0]] if self.is_vertical(1) && self.slopes[0] == 0.0 => Some(v),
+            _ => None,
+        }
+    }
+
+    fn monotonicity_constant(&self) -> f64 {
+        self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
+    }
+
+    fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
+        let constants = self.growth();
+        let why = "the growth constant is infinite because a contact law ends in a vertical ray";
+        if constants[1].is_finite() { Ok(constants) } else { Err(why) }
+    }
+
+    fn greatest_pressure(&self) -> f64 {
+        if self.slopes[0] < 0.0 || self.slopes[self.points.len()] > 0.0 {
+            return f64::INFINITY;
+        }
+        self.points.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point[1]))
+    }
+
+    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
+        let words = |branch: usize| {
+            let before = branch.checked_sub(1).map(|at| number(self.points[at][0]));
+            let after = self.points.get(branch).map(|[v, _]| number(*v));
+            let vertical = self.is_vertical(branch);
+            let range = match (before, after) {
+                (Some(v), _) if vertical => format!("at {v} m/s"),
+                (Some(v), Some(w)) => format!("{v} to {w} m/s"),
+                (Some(v), None) => format!("from {v} m/s on"),
+                (None, after) => format!("below {} m/s", after.unwrap_or_default()),
+            };
+            let slope =
+                if vertical { "vertical".into() } else { format!("{} Pa s/m", number(self.slopes[branch])) };
+            Branch::new(format!("S{}", branch + 1), range, slope)
+        };
+        (0..self.slopes.len()).map(words).collect()
+    }
+
+    fn corners(&self) -> &[[f64; 2]] {
+        &self.points
+    }
+
+    fn outline(&self, [left, right]: [f64; 2], [bottom, top]: [f64; 2]) -> Vec<[f64; 2]> {
+        let last = self.points.len();
+        let end = |branch: usize, v: f64, p: f64, corner: [f64; 2]| {
+            if self.is_vertical(branch) { [corner[0], p] } else { [v, self.pressure(v)] }
+        };
+        let mut line = vec![end(0, left, bottom, self.points[0])];
+        line.extend_from_slice(&self.points);
+        line.push(end(last, right, top, self.points[last - 1]));
+        line
+    }
+}
+
+fn ray_distance(point: [f64; 2], from: [f64; 2], along: [f64; 2]) -> f64 {
+    let offset = [point[0] - from[0], point[1] - from[1]];
+    let t = (offset[0] * along[0] + offset[1] * along[1]) / (along[0] * along[0] + along[1] * along[1]);
+    let t = t.max(0.0);
+    (offset[0] - t * along[0]).hypot(offset[1] - t * along[1])
+}
+
+fn segment_distance(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
+    let (along, offset) = ([to[0] - from[0], to[1] - from[1]], [point[0] - from[0], point[1] - from[1]]);
+    let t = (offset[0] * along[0] + offset[1] * along[1]) / (along[0] * along[0] + along[1] * along[1]);
+    let t = t.clamp(0.0, 1.0);
+    (offset[0] - t * along[0]).hypot(offset[1] - t * along[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const NODE: NodeContext = NodeContext::AT_THE_GAP;
+
+    fn valley() -> Polyline {
+        Polyline::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 0.0, 3.0).unwrap()
+    }
+
+    #[test]
+    fn pressure_and_slope_by_hand() {
+        let g = valley();
+        assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|v| g.pressure(v)), [0.0, 1.0, 2.0, 1.5, 1.0, 4.0]);
+        assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0].map(|v| g.slope(v, NODE)), [0.0, 2.0, -1.0, -1.0, 3.0]);
+        assert_eq!(g.monotonicity_constant(), 1.0);
+    }
+
+    #[test]
+    fn potential_vanishes_at_rest_and_adds_up_areas() {
+        let g = valley();
+        assert_eq!(g.potential(0.0), 0.0);
+        assert_eq!(g.potential(1.0), 1.5);
+        assert_eq!(g.potential(2.0), 4.0);
+        assert_eq!(g.potential(-1.0), -1.0);
+    }
+
+    #[test]
+    fn the_greatest_pressure_is_that_of_a_corner_or_there_is_none() {
+        let bounded = Polyline::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 3.0, -0.5).unwrap();
+        assert_eq!(bounded.greatest_pressure(), 2.0);
+        assert_eq!(valley().greatest_pressure(), f64::INFINITY);
+        assert_eq!(Polyline::new(vec![[0.0, 0.0]], -1.0, 0.0).unwrap().greatest_pressure(), f64::INFINITY);
+    }
+
+    #[test]
+    fn growth_constants_by_hand() {
+        assert_eq!(valley().growth(), [2.0, 3.0], "2 Pa at rest, a slope of 3 at last");
+        let growth = |points, before, after| Polyline::new(points, before, after).unwrap().growth();
+        // The corner at 2 m/s is 7 - 2 * 0.5 = 6 Pa above the cone; the line through it has 3 Pa at rest.
+        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), [6.0, 0.5]);
+        // A jump at rest counts with both ends, one beside it with what is left beyond the cone.
+        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), [4.0, 1.0]);
+        assert_eq!(growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0), [3.0, 2.0], "a law that falls for good");
+        // The line 2 v + 1 is 1 Pa above the cone 2 |v| from rest on, its corner 1 Pa below.
+        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), [1.0, 2.0]);
+        assert_eq!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY), [f64::INFINITY; 2], "a wall");
+        assert_eq!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0), [f64::INFINITY; 2]);
+    }
+
+    #[test]
+    fn points_off_the_graph_have_their_scaled_distance() {
+        let g = Polyline::new(vec![[0.0, 0.0], [2.0, 10.0]], 0.0, 0.0).unwrap();
+        assert!((g.distance(-2.0, 5.0, NODE, [0.0, 0.0]) - 0.5).abs() < 1e-15);
+        assert!((g.distance(4.0, 10.0, NODE, [0.0, 0.0])).abs() < 1e-15);
+        // Where velocities or pressures go beyond the corners, errors are small against them.
+        assert!((g.distance(-2.0, 5.0, NODE, [8.0, 40.0]) - 0.125).abs() < 1e-15);
+    }
+
+    #[test]
+    fn branches_are_measured_from_the_nearer_of_corner_and_rest() {
+        // Near rest, far from the corner: through it, 1e-3 would be the difference of numbers of 2e8.
+        let far = Polyline::new(vec![[1e8, 1e8]], 1.0, 1.0).unwrap();
+        let near_rest = far.resolve(1e-3, 1.0, NODE);
+        assert!((near_rest.velocity - 5e-4).abs() < 1e-18 && (near_rest.pressure - 5e-4).abs() < 1e-18);
+        // Near the corner of a steep branch: from rest, 1e-3 would be the difference of numbers of 1e8.
+        let steep = Polyline::new(vec![[1.0, 0.0]], 0.0, 1e8).unwrap();
+        let near_corner = steep.resolve(1.0 + 0.0009765625, 1.0, NODE);
+        assert!((near_corner.pressure - 0.0009765625 / (1.0 + 1e-8)).abs() < 1e-17, "{near_corner:?}");
+    }
+
+    #[test]
+    fn velocities_out_of_order_are_refused() {
+        assert!(Polyline::new(vec![[1.0, 0.0], [0.0, 0.0]], 0.0, 0.0).is_err());
+        assert!(Polyline::new(vec![], 0.0, 0.0).is_err());
+    }
+
+    #[test]
+    fn only_downward_jumps_are_refused() {
+        let down = Polyline::new(vec![[0.0, 1.0], [0.0, -1.0]], 0.0, 0.0).unwrap_err().to_string();
+        assert!(down.contains("only upward jumps"), "{down}");
+        assert!(Polyline::new(vec![[0.0, 1.0]], f64::NEG_INFINITY, 0.0).is_err());
+        let up = Polyline::new(vec![[0.0, -1.0], [0.0, 1.0]], 0.0, 0.0).unwrap();
+        assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
+        assert_eq!(up.monotonicity_constant(), 0.0);
+        assert_eq!([up.potential(-2.0), up.potential(0.0), up.potential(3.0)], [2.0, 0.0, 3.0]);
+        assert_eq!(up.distance(0.0, 0.3, NODE, [1.0, 0.0]), 0.0);
+        assert_eq!(up.distance(0.0, 1.5, NODE, [1.0, 0.0]), 0.5);
+    }
+
+    /// Random graphs: each step is a velocity (0: a jump) and a rise, with or without vertical rays at the ends.
+    fn any_graph() -> impl Strategy<Value = Polyline> {
+        let step = (0.1f64..2.0, -3.0f64..3.0, any::<bool>());
+        let ray = |finite: std::ops::Range<f64>| prop_oneof![3 => finite, 1 => Just(f64::INFINITY)];
+        (proptest::collection::vec(step, 1..7), ray(-0.5..2.0), ray(-0.5..2.0)).prop_map(
+            |(steps, before, after)| {
+                let mut at = [-2.0, 0.5];
+                let mut points = vec![at];
+                for (advance, rise, jumps) in steps {
+                    at = if jumps {
+                        [at[0], at[1] + rise.abs() + 0.1]
+                    } else {
+                        [at[0] + advance, at[1] + rise]
+                    };
+                    let collinear = jumps && points.len() > 1 && points[points.len() - 2][0] == at[0];
+                    if collinear {
+                        points.pop();
+                    }
+                    points.push(at);
+                }
+                Polyline::new(points, before, after).unwrap()
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn the_resolvent_finds_every_point_of_the_graph(g in any_graph(), s in -20.0f64..20.0, more in 1.01f64..5.0) {
+            let c = more * g.monotonicity_constant() + 0.3;
+            let found = g.resolve(s, c, NODE);
+            prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-11);
+            let off = g.distance_in(found.velocity, found.pressure, [1.0, 1.0]);
+            prop_assert!(off < 1e-11, "{} off the graph", off);
+            let bound = 1.0 / (c - g.monotonicity_constant());
+            prop_assert!((0.0..=bound * (1.0 + 1e-14)).contains(&found.derivative));
+            prop_assert_eq!(found.derivative == 0.0, g.is_vertical(found.branch));
+            let h = 1e-5;
+            let (above, below) = (g.resolve(s + h, c, NODE), g.resolve(s - h, c, NODE));
+            let quotient = (above.velocity - below.velocity) / (2.0 * h);
+            prop_assert!((-1e-8..=bound + 1e-8).contains(&quotient));
+            if above.branch == below.branch {
+                prop_assert!((quotient - found.derivative).abs() < 1e-6 * (1.0 + bound));
+            }
+        }
+
+        #[test]
+        fn laws_conform(steps in proptest::collection::vec((0.1f64..2.0, -3.0f64..3.0), 1..6), v in -9.0f64..9.0) {
+            let mut at = [-2.0, 0.5];
+            let points = steps.iter().map(|&(dv, p)| { at = [at[0] + dv, p]; at }).collect();
+            let g = Polyline::new(points, -0.5, 2.0).unwrap();
+            let h = 1e-6;
+            let corner = g.corners().iter().any(|p| (p[0] - v).abs() < 2.0 * h);
+            if !corner {
+                let by_value = (g.pressure(v + h) - g.pressure(v - h)) / (2.0 * h);
+                prop_assert!((by_value - g.slope(v, NODE)).abs() < 1e-6 * (1.0 + g.slope(v, NODE).abs()));
+            }
+            let by_potential = (g.potential(v + h) - g.potential(v - h)) / (2.0 * h);
+            prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v, NODE).abs()));
+            let size = v.abs() + g.pressure(v).abs() / g.reach[1];
+            let range = [v.abs(), g.pressure(v).abs()];
+            prop_assert!(g.distance(v, g.pressure(v), NODE, range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            let [at_rest, slope] = g.growth();
+            prop_assert!(g.pressure(v).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
+            for w in [v - 1.0, v + 0.3] {
+                let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
+                prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);
+            }
+        }
+    }
+}

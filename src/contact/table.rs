@@ -1,0 +1,59 @@
+//! What the laws of one `[[contact]]` table say of their parameters and of each other.
+
+use super::{Adhesion, FrictionLaw, LawFault, Memory, NormalLaw};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where on a facet the contact laws hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Quadrature {
+    /// At its nodes (trapezoidal rule): each node has its own law.
+    #[default]
+    Nodal,
+    /// At Gauss points.
+    Gauss,
+}
+
+/// What stands in a `[[contact]]` table, as far as it can be read.
+#[derive(Debug, Clone)]
+pub struct ContactTable {
+    /// Its path in the job, for words: `contact.0`.
+    pub path: String,
+    /// Where on a facet the laws hold.
+    pub quadrature: Quadrature,
+    /// The normal law.
+    pub normal: Option<NormalLaw>,
+    /// The friction law.
+    pub friction: Option<FrictionLaw>,
+    /// Bonds to the obstacle.
+    pub adhesion: Option<Adhesion>,
+    /// Memory of the foundation.
+    pub memory: Option<Memory>,
+    /// Whether an obstacle stands in for the gap.
+    pub has_obstacle: bool,
+}
+
+impl ContactTable {
+    /// What is wrong with its laws, each alone and all together; keys are those of the table.
+    pub fn faults(&self) -> Vec<LawFault> {
+        let mut faults = Vec::new();
+        faults.extend(self.normal.iter().flat_map(|law| law.faults(self.has_obstacle)));
+        faults.extend(self.friction.iter().flat_map(FrictionLaw::faults));
+        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(self)));
+        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(self)));
+        if self.quadrature == Quadrature::Gauss {
+            let nodal = self.normal.as_ref().is_some_and(NormalLaw::needs_nodes);
+            let not_there = [
+                (self.friction.is_some(), "friction does not act at Gauss points"),
+                (self.adhesion.is_some(), "adhesion does not act at Gauss points"),
+                (self.memory.is_some(), "memory does not act at Gauss points"),
+                (nodal, "this contact law does not act at Gauss points"),
+            ];
+            let help = "use \"nodal\", or leave the key out";
+            let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
+            faults.extend(not_there.map(|(_, message)| LawFault::at_value("quadrature", message, help)));
+        }
+        faults
+    }
+}

@@ -1,0 +1,42 @@
+//! Tresca friction: a bound on the friction traction that is given.
+
+use super::FrictionBound;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Tresca friction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tresca {
+    /// Largest friction traction.
+    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 2.0)]
+    pub bound: f64,
+}
+
+impl FrictionBound for Tresca {
+    fn coefficient(&self, _speed: f64) -> f64 {
+        0.0
+    }
+
+    fn bound(&self, _speed: f64, _pressure: f64) -> f64 {
+        self.bound
+    }
+
+    fn follows_pressure(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_is_the_given_one_whatever_the_pressure() {
+        let law = Tresca { bound: 3.0 };
+        assert_eq!(FrictionBound::bound(&law, 7.0, -1.0), 3.0);
+        assert_eq!(law.potential(2.0, -1.0), 6.0);
+        let slides = law.resolve(7.0, 2.0, -1.0);
+        assert_eq!((slides.speed, slides.traction, slides.coefficient), (2.0, 3.0, 0.0));
+    }
+}
