@@ -15,10 +15,8 @@
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
 //! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
 
-use super::{ContactTable, LawFault, NormalLaw};
+use super::{ContactTable, Deserialize, JsonSchema, LawFault, NormalLaw, Serialize};
 use crate::tensor::{Vector, add_scaled, dot, norm};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Adhesive bonds on a contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

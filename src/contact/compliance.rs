@@ -4,10 +4,8 @@
 //! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
 //! constant is 0.
 
-use super::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
 use crate::{error::Result, expression::Scalar};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -82,7 +80,6 @@ impl Compliance {
 
 impl NormalParameters for Compliance {
     type Response = Self;
-    const HAS_GAP: bool = true;
 
     fn response(&self) -> Result<Self> {
         Ok(self.clone())
@@ -114,10 +111,6 @@ impl Response for Compliance {
 
     fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
         node.step_length * self.stiffness_at(node.penetration_at(velocity))
-    }
-
-    fn branch(&self, velocity: f64, node: NodeContext) -> usize {
-        usize::from(node.penetration_at(velocity) > 0.0)
     }
 
     fn depends_on_displacement(&self) -> bool {

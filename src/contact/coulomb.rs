@@ -1,8 +1,6 @@
 //! Coulomb friction: the bound is `coefficient p` with the positive part `p` of the contact pressure.
 
-use super::FrictionBound;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
 
 /// Coulomb friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

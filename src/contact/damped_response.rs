@@ -4,10 +4,8 @@
 //! on. For `v < 0` it is mirrored: `even` as in (72), `odd` (dissipative in both directions), or zero (`one_sided`: the
 //! foundation does not pull).
 
-use super::{LawFault, NormalParameters, Polyline};
+use super::{Deserialize, JsonSchema, LawFault, NormalParameters, Polyline, Serialize};
 use crate::error::{Error, Result};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Pressure as a continuous piecewise linear function of the normal velocity, zero at rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -42,11 +42,6 @@ pub trait FrictionBound {
         0.0
     }
 
-    /// The potential in W/m² at a sliding velocity, zero at rest: the integral of the bound.
-    fn potential(&self, speed: f64, pressure: f64) -> f64 {
-        self.bound(speed, pressure) * speed
-    }
-
     /// Whether the bound follows the contact pressure.
     fn follows_pressure(&self) -> bool {
         true
@@ -133,7 +128,6 @@ macro_rules! friction_laws {
                 coefficient(speed: f64) -> f64;
                 bound(speed: f64, pressure: f64) -> f64;
                 slope(speed: f64, pressure: f64) -> f64;
-                potential(speed: f64, pressure: f64) -> f64;
                 follows_pressure() -> bool;
                 steepest_fall() -> f64;
                 corner_velocity() -> f64;
@@ -184,9 +178,6 @@ mod tests {
             let h = 1e-6;
             let by_value = (law.bound(speed + h, pressure) - law.bound(speed - h, pressure)) / (2.0 * h);
             prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_fall()));
-            let by_potential = (law.potential(speed + h, pressure) - law.potential(speed - h, pressure)) / (2.0 * h);
-            prop_assert!((by_potential - law.bound(speed, pressure)).abs() < 1e-6 * (1.0 + law.steepest_fall()));
-            prop_assert_eq!(law.potential(0.0, pressure), 0.0);
             let rise = (law.bound(speed, pressure) - law.bound(other, pressure)) * (speed - other);
             let fall = law.steepest_fall() * pressure.max(0.0);
             prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);

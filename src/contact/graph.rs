@@ -1,9 +1,7 @@
 //! Any polyline of pressure over normal velocity.
 
-use super::{LawFault, NormalParameters, Polyline};
+use super::{Deserialize, JsonSchema, LawFault, NormalParameters, Polyline, Serialize};
 use crate::error::Result;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Pressure over normal velocity as a polyline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -29,7 +29,7 @@ pub use graph::Graph;
 pub use laws::LawFault;
 pub use memory::Memory;
 pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
-pub use obstacle::Gap;
+pub use obstacle::{Gap, Plane, Sphere};
 pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use polyline::Polyline;
 pub use slip_weakening::SlipWeakening;

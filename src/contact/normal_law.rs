@@ -2,7 +2,7 @@
 //!
 //! A law is what a job says ([`NormalParameters`]) and what evaluates it at a point ([`Response`]), often the same type.
 
-use super::{LawFault, NormalLaw, laws::key};
+use super::{LawFault, NormalLaw};
 use crate::{error::Result, expression::Scalar};
 
 /// What a step brings to a point of the contact boundary.
@@ -76,9 +76,6 @@ pub trait NormalParameters {
     /// What evaluates it.
     type Response: Response;
 
-    /// Whether it is felt beyond a gap, and has the key `gap` for that.
-    const HAS_GAP: bool = false;
-
     /// What evaluates the law; refuses parameters that make no law.
     fn response(&self) -> Result<Self::Response>;
 
@@ -92,7 +89,7 @@ pub trait NormalParameters {
         Vec::new()
     }
 
-    /// Why these parameters of a law with a gap go with no obstacle, and what to do.
+    /// Why these parameters of a law that may have a gap go with no obstacle, and what to do.
     fn against_obstacle(&self) -> Option<[&'static str; 2]> {
         None
     }
@@ -230,9 +227,6 @@ macro_rules! normal_laws {
         }
 
         impl NormalLaw {
-            /// The types of all laws, and whether they have the key `gap`.
-            const ALL: &[(&str, bool)] = &[$((stringify!($law), <$law as NormalParameters>::HAS_GAP),)*];
-
             laws::calls! { each_normal_law, NormalParameters:
                 gap() -> Option<&Scalar>;
                 against_obstacle() -> Option<[&'static str; 2]>;
@@ -246,11 +240,11 @@ macro_rules! normal_laws {
                 })
             }
 
-            /// The name of its type, and whether it has the key `gap`.
-            fn kind(&self) -> (&'static str, bool) {
-                match self {
-                    $(Self::$law(_) => (stringify!($law), <$law as NormalParameters>::HAS_GAP),)*
-                }
+            /// Its name in the job.
+            pub fn name(&self) -> String {
+                laws::key(match self {
+                    $(Self::$law(_) => stringify!($law),)*
+                })
             }
         }
     };
@@ -260,7 +254,7 @@ pub(super) use normal_laws;
 impl NormalLaw {
     /// Its table in the job, from that of the contact.
     pub fn table(&self) -> String {
-        format!("normal.{}", key(self.kind().0))
+        format!("normal.{}", self.name())
     }
 
     /// The key of its gap, if that is given, from the table of the contact.
@@ -286,15 +280,13 @@ impl NormalLaw {
         if !obstacle {
             return faults;
         }
-        let (kind, has_gap) = self.kind();
-        if !has_gap {
-            let others = Self::ALL.iter().filter(|(_, has_gap)| *has_gap);
-            let others: Vec<String> = others.map(|(kind, _)| format!("`{}`", key(kind))).collect();
-            let message = format!("`{}` acts at any distance: it has no obstacle", key(kind));
-            let help = format!("delete the obstacle, or use {}", others.join(" or "));
-            faults.push(LawFault::at_key("obstacle", message, help));
-        }
-        faults.extend(self.against_obstacle().map(|[why, help]| LawFault::at_key("obstacle", why, help)));
+        let against = self.against_obstacle().map(|[message, help]| [message.to_owned(), help.to_owned()]);
+        let against = against.or_else(|| {
+            let message = format!("`{}` acts at any distance: it has no obstacle", self.name());
+            let help = "delete the obstacle, or use `compliance` or `unilateral`".to_owned();
+            (!self.response().ok()?.depends_on_displacement()).then_some([message, help])
+        });
+        faults.extend(against.map(|[message, help]| LawFault::at_key("obstacle", message, help)));
         let help = "give one of them: the obstacle says how far it is";
         faults
             .extend(self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help)));

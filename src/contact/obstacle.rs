@@ -13,6 +13,7 @@
 //! negative where the point is inside the obstacle, infinite where the ray along the normal does not meet it: there is no
 //! contact then.
 
+use super::{Deserialize, JsonSchema, Serialize};
 use crate::{
     error::{Error, Result},
     expression::Scalar,
@@ -22,33 +23,70 @@ use crate::{
 /// Cosine between boundary and plane below which the ray counts as parallel to the plane.
 const PARALLEL: f64 = 1e-6;
 
-/// What the gap is measured to.
-#[derive(Debug, Clone, PartialEq)]
+/// A rigid obstacle that may move; friction acts on the velocity relative to it, over a step the mean one. The gap is measured from the place where a point of the boundary was at first along its
+/// normal there (deformations are small); where that ray does not meet the obstacle there is no contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Obstacle")]
 pub enum Gap {
-    /// The distance itself in m, at a time, of the point that was at a place at first.
+    /// No obstacle: the distance itself in m, at a time, of the point that was at a place at first.
+    #[serde(skip)]
     Distance(Scalar),
-    /// All beyond a plane.
-    Plane {
-        /// A point of the plane in m, one component an axis.
-        point: Vec<Scalar>,
-        /// Its normal of any length, out of the obstacle toward the body.
-        normal: Vec<Scalar>,
-        /// Velocity in rad/s at which it turns in itself about its normal through the point, in space.
-        rotation: Scalar,
-    },
+    /// All that lies beyond a plane, in 2D a line.
+    Plane(Plane),
     /// A sphere, in 2D a disc.
-    Sphere {
-        /// Its centre in m, one component an axis.
-        centre: Vec<Scalar>,
-        /// Its radius in m.
-        radius: f64,
-        /// Whether the obstacle is all outside of it.
-        hollow: bool,
-        /// Velocity in rad/s at which it turns about its centre.
-        rotation: Scalar,
-        /// What it turns about in space, of any length; nothing in the plane.
-        axis: Vec<f64>,
-    },
+    Sphere(Sphere),
+}
+
+/// A plane that bounds an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// A point of the plane, one component an axis: numbers, or expressions in t. Motion along the plane is that of a belt.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
+    pub point: Vec<Scalar>,
+    /// The plane's normal, out of the obstacle toward the body, of any length: numbers, or expressions in t.
+    #[schemars(example = [0.0, 1.0])]
+    pub normal: Vec<Scalar>,
+    /// Angular velocity at which the plane turns in itself about its normal through `point`, counterclockwise seen from the
+    /// body, in 3D: a number, or an expression in t. Only friction feels it. Absent: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "rad/s"), example = 10.0)]
+    pub rotation: Option<Scalar>,
+}
+
+/// A sphere as an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Its centre, one component an axis: numbers, or expressions in t.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
+    pub centre: Vec<Scalar>,
+    /// Its radius.
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1.0)]
+    pub radius: f64,
+    /// Whether the obstacle is all outside of the sphere, with the body inside.
+    #[serde(default)]
+    pub hollow: bool,
+    /// Angular velocity at which the sphere turns about its centre, counterclockwise, in 3D seen from where `axis` points: a
+    /// number, or an expression in t. Only friction feels it. Absent: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
+    pub rotation: Option<Scalar>,
+    /// What the sphere turns about in 3D, a vector of any length; absent in 2D.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = [0.0, 1.0, 0.0])]
+    pub axis: Option<Vec<f64>>,
+}
+
+impl Sphere {
+    /// What it turns about; in the plane there is but one axis.
+    pub(super) fn axis(&self) -> Vector<3> {
+        match self.axis.as_deref() {
+            None | Some([]) => [0.0, 0.0, 1.0],
+            Some(axis) => std::array::from_fn(|i| axis.get(i).copied().unwrap_or(0.0)),
+        }
+    }
 }
 
 impl Default for Gap {
@@ -67,12 +105,10 @@ impl Gap {
         }
         let cause = match self {
             Self::Distance(_) => "correct the expression of the gap in the job",
-            Self::Plane { .. } => {
+            Self::Plane(_) => {
                 "the plane's normal vanishes or a component is not finite: correct [contact.obstacle.plane]"
             }
-            Self::Sphere { .. } => {
-                "a component of the centre is not finite: correct [contact.obstacle.sphere]"
-            }
+            Self::Sphere(_) => "a component of the centre is not finite: correct [contact.obstacle.sphere]",
         };
         Err(Error::Failed(format!(
             "contact: the gap is {gap} at t = {time} s, position {place:?} m; {cause}"
@@ -83,8 +119,8 @@ impl Gap {
     pub fn expressions(&self) -> Vec<&[Scalar]> {
         match self {
             Self::Distance(gap) => vec![std::slice::from_ref(gap)],
-            Self::Plane { point, normal, rotation } => vec![point, normal, std::slice::from_ref(rotation)],
-            Self::Sphere { centre, rotation, .. } => vec![centre, std::slice::from_ref(rotation)],
+            Self::Plane(Plane { point, normal, rotation }) => vec![point, normal, rotation.as_slice()],
+            Self::Sphere(Sphere { centre, rotation, .. }) => vec![centre, rotation.as_slice()],
         }
     }
 
@@ -92,11 +128,11 @@ impl Gap {
     pub fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> Option<f64> {
         match self {
             Self::Distance(_) => None,
-            Self::Plane { point, normal, .. } => {
+            Self::Plane(Plane { point, normal, .. }) => {
                 let (point, facing) = (vector::<D>(point, time), vector::<D>(normal, time));
                 Some(dot(&add_scaled(&point, -1.0, place), &facing) / norm(&facing))
             }
-            Self::Sphere { centre, radius, hollow, .. } => {
+            Self::Sphere(Sphere { centre, radius, hollow, .. }) => {
                 let away = norm(&add_scaled(place, -1.0, &vector::<D>(centre, time)));
                 Some(if *hollow { away - radius } else { radius - away })
             }
@@ -107,14 +143,14 @@ impl Gap {
     fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         match self {
             Self::Distance(gap) => gap.evaluate(time, place),
-            Self::Plane { point, normal: facing, .. } => {
+            Self::Plane(Plane { point, normal: facing, .. }) => {
                 let (point, facing) = (vector::<D>(point, time), vector::<D>(facing, time));
                 let length = norm(&facing);
                 let toward: Vector<D> = std::array::from_fn(|i| point[i] - place[i]);
                 let (height, cosine) = (dot(&toward, &facing) / length, dot(normal, &facing) / length);
                 if height.is_finite() && cosine >= -PARALLEL { f64::INFINITY } else { height / cosine }
             }
-            Self::Sphere { centre, radius, hollow, .. } => {
+            Self::Sphere(Sphere { centre, radius, hollow, .. }) => {
                 let centre = vector::<D>(centre, time);
                 let offset: Vector<D> = std::array::from_fn(|i| place[i] - centre[i]);
                 to_sphere(&offset, normal, *radius, *hollow)
@@ -158,11 +194,11 @@ pub(super) mod tests {
     }
 
     fn plane(point: Vec<Scalar>, normal: Vec<Scalar>) -> Gap {
-        Gap::Plane { point, normal, rotation: Scalar::default() }
+        Gap::Plane(Plane { point, normal, rotation: None })
     }
 
     fn sphere(centre: Vec<Scalar>, radius: f64, hollow: bool) -> Gap {
-        Gap::Sphere { centre, radius, hollow, rotation: Scalar::default(), axis: vec![] }
+        Gap::Sphere(Sphere { centre, radius, hollow, rotation: None, axis: None })
     }
 
     fn floor(height: f64) -> Gap {

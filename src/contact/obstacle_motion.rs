@@ -12,7 +12,7 @@
 //! that does. `x'` and `m'` are the rates by which a step changes displacements: what sticks in a step of implicit Euler moves
 //! as far as the obstacle does, `x' = (x_n - x_{n-1}) / k`. Everything else is taken at the end of the step, as the gap is.
 
-use super::{Gap, obstacle::vector};
+use super::{Gap, Plane, Sphere, obstacle::vector};
 use crate::{
     error::{Error, Result},
     expression::Scalar,
@@ -73,12 +73,13 @@ impl Gap {
     /// Whether the obstacle's material may move in any other way than that which the gap knows.
     pub fn may_drag(&self) -> bool {
         let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
+        let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());
         match self {
             Self::Distance(_) => false,
-            Self::Plane { point, normal, rotation } => {
-                moves(point) || moves(normal) || *rotation != Scalar::default()
+            Self::Plane(Plane { point, normal, rotation }) => {
+                moves(point) || moves(normal) || turns(rotation)
             }
-            Self::Sphere { centre, rotation, .. } => moves(centre) || *rotation != Scalar::default(),
+            Self::Sphere(Sphere { centre, rotation, .. }) => moves(centre) || turns(rotation),
         }
     }
 
@@ -102,16 +103,17 @@ impl Gap {
     /// The motion of the obstacle at the end of a step; at rest without one.
     pub fn motion<const D: usize>(&self, rate: Rate) -> Result<ObstacleMotion<D>> {
         let time = rate.time;
+        let spinning = |rotation: &Option<Scalar>| rotation.as_ref().map_or(0.0, |r| r.evaluate(time, &[]));
         let motion = match self {
             Self::Distance(_) => {
                 return Ok(ObstacleMotion { velocity: [0.0; D], centre: [0.0; D], spin: [0.0; 3] });
             }
-            Self::Plane { point, normal, rotation } => {
+            Self::Plane(Plane { point, normal, rotation }) => {
                 let unit = |time| {
                     let normal = in_space(&vector::<D>(normal, time));
                     normal.map(|x| x / norm(&normal))
                 };
-                let (facing, rotation) = (unit(time), rotation.evaluate(time, &[]));
+                let (facing, rotation) = (unit(time), spinning(rotation));
                 let tilt = cross(&facing, &rate.of(unit));
                 ObstacleMotion {
                     velocity: rate.of(|time| vector(point, time)),
@@ -119,14 +121,8 @@ impl Gap {
                     spin: add_scaled(&tilt, rotation, &facing),
                 }
             }
-            Self::Sphere { centre, rotation, axis, .. } => {
-                // In the plane there is but one.
-                let axis = if axis.is_empty() {
-                    [0.0, 0.0, 1.0]
-                } else {
-                    std::array::from_fn(|i| axis.get(i).copied().unwrap_or(0.0))
-                };
-                let rotation = rotation.evaluate(time, &[]);
+            Self::Sphere(sphere) => {
+                let (centre, axis, rotation) = (&sphere.centre, sphere.axis(), spinning(&sphere.rotation));
                 let spin = if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
                 ObstacleMotion {
                     velocity: rate.of(|time| vector(centre, time)),
@@ -176,7 +172,7 @@ mod tests {
     #[test]
     fn a_belt_moves_along_itself_and_so_do_all_its_places() {
         let point = vec![expression("2*t"), Scalar::Number(-1.0)];
-        let belt = Gap::Plane { point, normal: numbers(&[0.0, 3.0]), rotation: Scalar::default() };
+        let belt = Gap::Plane(Plane { point, normal: numbers(&[0.0, 3.0]), rotation: None });
         let motion = belt.motion::<2>(STEP).unwrap();
         assert!(belt.may_drag() && motion.is_translation());
         assert_eq!([motion.at(&[0.0, -1.0]), motion.at(&[9.0, -1.0])], [[2.0, 0.0]; 2]);
@@ -185,11 +181,11 @@ mod tests {
     #[test]
     fn a_line_that_tilts_lifts_its_places_square_to_itself() {
         // Unit normal (-sin t, cos t): the line turns to the left by 1 rad/s about its point.
-        let tilting = Gap::Plane {
+        let tilting = Gap::Plane(Plane {
             point: numbers(&[1.0, 2.0]),
             normal: vec![expression("-sin(t)"), expression("cos(t)")],
-            rotation: Scalar::default(),
-        };
+            rotation: None,
+        });
         let fine = Rate::euler(0.5, 1e-6);
         let along = [0.5f64.cos(), 0.5f64.sin()];
         let found = tilting.motion::<2>(fine).unwrap().at(&[1.0 + 3.0 * along[0], 2.0 + 3.0 * along[1]]);
@@ -201,11 +197,11 @@ mod tests {
 
     #[test]
     fn a_disc_turns_to_the_left_about_its_normal_through_its_point() {
-        let disc = Gap::Plane {
+        let disc = Gap::Plane(Plane {
             point: numbers(&[1.0, 1.0, 0.0]),
             normal: numbers(&[0.0, 0.0, 5.0]),
-            rotation: expression("6*t"),
-        };
+            rotation: Some(expression("6*t")),
+        });
         let motion = disc.motion::<3>(STEP).unwrap();
         assert!(disc.may_drag() && !motion.is_translation());
         assert_eq!(motion.at(&[1.5, 1.0, 0.0]), [0.0, 1.5, 0.0]);
@@ -215,12 +211,14 @@ mod tests {
     #[test]
     fn a_roller_that_rolls_rests_where_it_touches() {
         // To the right on a floor below, and so clockwise.
-        let roller = |axis: &[f64], centre: Vec<Scalar>| Gap::Sphere {
-            centre,
-            radius: 0.5,
-            hollow: false,
-            rotation: Scalar::Number(-4.0),
-            axis: axis.to_vec(),
+        let roller = |axis: &[f64], centre: Vec<Scalar>| {
+            Gap::Sphere(Sphere {
+                centre,
+                radius: 0.5,
+                hollow: false,
+                rotation: Some(Scalar::Number(-4.0)),
+                axis: Some(axis.to_vec()),
+            })
         };
         let flat = roller(&[], vec![expression("2*t"), Scalar::Number(0.5)]).motion::<2>(STEP).unwrap();
         assert_eq!([flat.at(&[1.0, 0.0]), flat.at(&[1.0, 1.0])], [[0.0, 0.0], [4.0, 0.0]]);
@@ -232,21 +230,18 @@ mod tests {
 
     #[test]
     fn what_rests_drags_nothing_and_what_has_no_velocity_is_refused() {
-        let floor = Gap::Plane {
-            point: numbers(&[0.0, 0.0]),
-            normal: numbers(&[0.0, 1.0]),
-            rotation: Scalar::default(),
-        };
+        let floor =
+            Gap::Plane(Plane { point: numbers(&[0.0, 0.0]), normal: numbers(&[0.0, 1.0]), rotation: None });
         assert!(!floor.may_drag() && !Gap::Distance(expression("0.1*t")).may_drag());
         assert_eq!(floor.motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
         assert_eq!(Gap::Distance(expression("0.1*t")).motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
-        let bad = Gap::Sphere {
+        let bad = Gap::Sphere(Sphere {
             centre: numbers(&[0.0, 0.0]),
             radius: 1.0,
             hollow: false,
-            rotation: expression("1/(t - 0.5)"),
-            axis: vec![],
-        };
+            rotation: Some(expression("1/(t - 0.5)")),
+            axis: None,
+        });
         let words = bad.motion::<2>(STEP).unwrap_err().to_string();
         assert!(words.contains("t = 0.5 s") && words.contains("[contact.obstacle]"), "{words}");
     }

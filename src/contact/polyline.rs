@@ -76,22 +76,6 @@ impl Polyline {
         self.points.iter().take_while(|p| p[0] <= velocity).count()
     }
 
-    /// The potential `j` in W/m², zero at rest.
-    pub fn potential(&self, velocity: f64) -> f64 {
-        self.area_from_first(velocity) - self.area_from_first(0.0)
-    }
-
-    /// Signed area below the graph between its first point and `velocity`.
-    fn area_from_first(&self, velocity: f64) -> f64 {
-        let branch = self.branch(velocity);
-        let mut area = 0.0;
-        for pair in self.points.windows(2).take(branch.saturating_sub(1)) {
-            area += 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]);
-        }
-        let [v, p] = self.points[branch.saturating_sub(1)];
-        area + 0.5 * (p + self.pressure(velocity)) * (velocity - v)
-    }
-
     /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
     /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
     fn growth(&self) -> [f64; 2] {
@@ -257,15 +241,6 @@ mod tests {
     }
 
     #[test]
-    fn potential_vanishes_at_rest_and_adds_up_areas() {
-        let g = valley();
-        assert_eq!(g.potential(0.0), 0.0);
-        assert_eq!(g.potential(1.0), 1.5);
-        assert_eq!(g.potential(2.0), 4.0);
-        assert_eq!(g.potential(-1.0), -1.0);
-    }
-
-    #[test]
     fn the_greatest_pressure_is_that_of_a_corner_or_there_is_none() {
         let bounded = Polyline::new(vec![[-1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 3.0, -0.5).unwrap();
         assert_eq!(bounded.greatest_pressure(), 2.0);
@@ -323,7 +298,6 @@ mod tests {
         let up = Polyline::new(vec![[0.0, -1.0], [0.0, 1.0]], 0.0, 0.0).unwrap();
         assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
         assert_eq!(up.monotonicity_constant(), 0.0);
-        assert_eq!([up.potential(-2.0), up.potential(0.0), up.potential(3.0)], [2.0, 0.0, 3.0]);
         assert_eq!(up.distance(0.0, 0.3, NODE, [1.0, 0.0]), 0.0);
         assert_eq!(up.distance(0.0, 1.5, NODE, [1.0, 0.0]), 0.5);
     }
@@ -384,8 +358,6 @@ mod tests {
                 let by_value = (g.pressure(v + h) - g.pressure(v - h)) / (2.0 * h);
                 prop_assert!((by_value - g.slope(v, NODE)).abs() < 1e-6 * (1.0 + g.slope(v, NODE).abs()));
             }
-            let by_potential = (g.potential(v + h) - g.potential(v - h)) / (2.0 * h);
-            prop_assert!((by_potential - g.pressure(v)).abs() < 1e-4 * (1.0 + g.slope(v, NODE).abs()));
             let size = v.abs() + g.pressure(v).abs() / g.reach[1];
             let range = [v.abs(), g.pressure(v).abs()];
             prop_assert!(g.distance(v, g.pressure(v), NODE, range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));

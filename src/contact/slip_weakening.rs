@@ -3,9 +3,7 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact
 //! pressure; it falls by at most `(static - dynamic) / decay_velocity p`.
 
-use super::{FrictionBound, LawFault};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::{Deserialize, FrictionBound, JsonSchema, LawFault, Serialize};
 
 /// Friction whose coefficient falls from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -30,12 +28,6 @@ impl FrictionBound for SlipWeakening {
 
     fn slope(&self, speed: f64, pressure: f64) -> f64 {
         -self.steepest_fall() * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
-    }
-
-    fn potential(&self, speed: f64, pressure: f64) -> f64 {
-        let fallen = -(-speed / self.decay_velocity).exp_m1();
-        (self.dynamic * speed + (self.at_rest - self.dynamic) * self.decay_velocity * fallen)
-            * pressure.max(0.0)
     }
 
     fn steepest_fall(&self) -> f64 {

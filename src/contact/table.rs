@@ -1,8 +1,6 @@
 //! What the laws of one `[[contact]]` table say of their parameters and of each other.
 
-use super::{Adhesion, FrictionLaw, LawFault, Memory, NormalLaw};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::{Adhesion, Deserialize, FrictionLaw, JsonSchema, LawFault, Memory, NormalLaw, Serialize};
 
 /// Where on a facet the contact laws hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

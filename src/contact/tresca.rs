@@ -1,8 +1,6 @@
 //! Tresca friction: a bound on the friction traction that is given.
 
-use super::FrictionBound;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
 
 /// Tresca friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,7 +33,6 @@ mod tests {
     fn the_bound_is_the_given_one_whatever_the_pressure() {
         let law = Tresca { bound: 3.0 };
         assert_eq!(FrictionBound::bound(&law, 7.0, -1.0), 3.0);
-        assert_eq!(law.potential(2.0, -1.0), 6.0);
         let slides = law.resolve(7.0, 2.0, -1.0);
         assert_eq!((slides.speed, slides.traction, slides.coefficient), (2.0, 3.0, 0.0));
     }

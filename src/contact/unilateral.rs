@@ -3,10 +3,10 @@
 //! Within a step both are the graph of a wall over the normal velocity, zero and then vertical: at the velocity that closes the
 //! gap by the end of the step, or at rest.
 
-use super::{Branch, LawFault, NodeContext, NormalParameters, Resolved, Response};
+use super::{
+    Branch, Deserialize, JsonSchema, LawFault, NodeContext, NormalParameters, Resolved, Response, Serialize,
+};
 use crate::{error::Result, expression::Scalar, tensor::larger};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Unilateral constraint: normal displacement <= gap, or normal velocity <= 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,7 +35,6 @@ pub enum Bound {
 
 impl NormalParameters for Unilateral {
     type Response = Self;
-    const HAS_GAP: bool = true;
 
     fn response(&self) -> Result<Self> {
         Ok(self.clone())

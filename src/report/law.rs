@@ -97,13 +97,13 @@ impl Law {
 mod tests {
     use super::*;
     use crate::{
-        contact::{Bound, Compliance, DampedResponse, NormalLaw, Symmetry, Unilateral},
-        job::{Obstacle, Plane, Quadrature, Scalar, Sphere},
+        contact::{Bound, Compliance, DampedResponse, NormalLaw, Plane, Sphere, Symmetry, Unilateral},
+        job::{Quadrature, Scalar},
     };
 
     const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
 
-    fn against(normal: NormalLaw, obstacle: Option<Obstacle>) -> Law {
+    fn against(normal: NormalLaw, obstacle: Option<Gap>) -> Law {
         let on = vec!["bottom".into()];
         let quadrature = Quadrature::Nodal;
         let contact =
@@ -169,7 +169,7 @@ mod tests {
         let numbers = |values: [f64; 2]| values.map(Scalar::Number).to_vec();
         let plane = Plane { point: numbers([0.0, -0.5]), normal: numbers([0.0, 1.0]), rotation: None };
         let spring = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
-        let law = against(NormalLaw::Compliance(spring), Some(Obstacle::Plane(plane)));
+        let law = against(NormalLaw::Compliance(spring), Some(Gap::Plane(plane)));
         assert!(law.needs_normals());
         assert!((law.abscissa(0.0, (&[3.0, 0.0, 0.0], &DOWN), 0.6, 0.0) - 0.1).abs() < 1e-15);
         assert_eq!(law.obstacle_velocity(1.0, 0.1, (&[3.0, 0.0, 0.0], &DOWN)), [0.0; 3]);
@@ -186,7 +186,7 @@ mod tests {
         };
         let law = against(
             NormalLaw::Compliance(Compliance { stiffness: 100.0, exponent: 1.0, gap: None }),
-            Some(Obstacle::Sphere(disc)),
+            Some(Gap::Sphere(disc)),
         );
         // To the left on top, however far the node is above.
         let found = law.obstacle_velocity(1.0, 0.1, (&[0.0, 0.5, 0.0], &DOWN));

@@ -1,6 +1,6 @@
 //! From the job's tables to a body: a table that is absent leaves nothing behind.
 
-use super::{obstacles, steps};
+use super::steps;
 use crate::{
     body::Body,
     contact::{Gap, NormalResponse},
@@ -202,12 +202,11 @@ fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
 /// The law of a contact, and the gap it is felt beyond.
 pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     let law = contact.normal.response()?;
-    let gap = if law.depends_on_displacement() {
-        obstacles::gap(contact.obstacle.as_ref(), contact.normal.gap())
-    } else {
-        Gap::default()
-    };
-    Ok((law, gap))
+    if !law.depends_on_displacement() {
+        return Ok((law, Gap::default()));
+    }
+    let distance = || Gap::Distance(contact.normal.gap().cloned().unwrap_or_default());
+    Ok((law, contact.obstacle.clone().unwrap_or_else(distance)))
 }
 
 fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {

@@ -4,7 +4,7 @@ use crate::{
     body::Body,
     contact::Gap,
     error::Result,
-    job::{Job, Obstacle, Scalar},
+    job::Job,
     session::Session,
     state::State,
     tensor::{Vector, larger},
@@ -12,25 +12,6 @@ use crate::{
 
 /// Share of the body's size beyond which it starts too deep in an obstacle.
 const TOO_DEEP: f64 = 0.01;
-
-/// What the gap of a contact is measured to.
-pub(super) fn gap(obstacle: Option<&Obstacle>, given: Option<&Scalar>) -> Gap {
-    match obstacle {
-        None => Gap::Distance(given.cloned().unwrap_or_default()),
-        Some(Obstacle::Plane(p)) => Gap::Plane {
-            point: p.point.clone(),
-            normal: p.normal.clone(),
-            rotation: p.rotation.clone().unwrap_or_default(),
-        },
-        Some(Obstacle::Sphere(s)) => Gap::Sphere {
-            centre: s.centre.clone(),
-            radius: s.radius,
-            hollow: s.hollow,
-            rotation: s.rotation.clone().unwrap_or_default(),
-            axis: s.axis.clone().unwrap_or_default(),
-        },
-    }
-}
 
 /// Warnings of contacts that can touch nothing because the body lies behind the obstacle, and of bodies that start inside of
 /// one. Collective, with the same words on all ranks.
@@ -58,9 +39,7 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         }
         if deepest == f64::NEG_INFINITY && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
             let remedy = match contact.gap {
-                Gap::Sphere { .. } => {
-                    "see whether the body or the obstacle is inside of the sphere: `hollow`"
-                }
+                Gap::Sphere(_) => "see whether the body or the obstacle is inside of the sphere: `hollow`",
                 _ => "turn the plane's `normal` round: it points out of the obstacle toward the body",
             };
             out.push(format!(

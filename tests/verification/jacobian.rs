@@ -5,7 +5,7 @@ use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     contact::{
         Bound, Compliance, Coulomb, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, NormalResponse,
-        SlipWeakening, Symmetry, Tresca, Unilateral,
+        Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
     },
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     job::{Expression, Scalar},
@@ -55,7 +55,7 @@ fn belt<const D: usize>() -> Gap {
     point[0] = expression("3*t");
     let mut normal = vec![Scalar::default(); D];
     normal[D - 1] = Scalar::Number(1.0);
-    Gap::Plane { point, normal, rotation: Scalar::Number(if D == 3 { 2.0 } else { 0.0 }) }
+    Gap::Plane(Plane { point, normal, rotation: (D == 3).then_some(Scalar::Number(2.0)) })
 }
 
 fn differences<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>) {

@@ -13,7 +13,7 @@ mod time;
 
 pub use crate::contact::Quadrature;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
-pub use contact::{Contact, Obstacle, Plane, Sphere};
+pub use contact::Contact;
 pub use damage::Damage;
 pub use material::{
     DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
