@@ -88,6 +88,10 @@ impl NormalParameters for Compliance {
     fn gap(&self) -> Option<&Scalar> {
         self.gap.as_ref()
     }
+
+    fn against_obstacle(&self, _name: &str) -> Option<[String; 2]> {
+        None
+    }
 }
 
 impl Response for Compliance {

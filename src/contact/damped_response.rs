@@ -92,6 +92,8 @@ mod tests {
     use super::*;
     use crate::contact::{NodeContext, Response};
 
+    const NODE: NodeContext = NodeContext::AT_THE_GAP;
+
     fn paper(symmetry: Symmetry) -> Polyline {
         let law =
             DampedResponse { breakpoints: vec![0.003, 0.005], slopes: vec![10.0, -10.0, 10.0], symmetry };
@@ -116,7 +118,7 @@ mod tests {
         let graph = paper(Symmetry::Even);
         for i in -100..=100 {
             let v = f64::from(i) * 1.3e-4;
-            assert!((graph.pressure(v) - printed(v)).abs() < 1e-15, "{v}");
+            assert!((graph.pressure(v, NODE) - printed(v)).abs() < 1e-15, "{v}");
         }
         assert_eq!(graph.monotonicity_constant(), 10.0);
     }
@@ -125,12 +127,12 @@ mod tests {
     fn odd_symmetry_resists_both_ways_and_one_sided_never_pulls() {
         let (odd, one) = (paper(Symmetry::Odd), paper(Symmetry::OneSided));
         for v in [0.001, 0.004, 0.01] {
-            assert!((odd.pressure(-v) + printed(v)).abs() < 1e-15);
-            assert!((odd.pressure(v) - printed(v)).abs() < 1e-15);
-            assert_eq!(one.pressure(-v), 0.0);
-            assert!((one.pressure(v) - printed(v)).abs() < 1e-15);
+            assert!((odd.pressure(-v, NODE) + printed(v)).abs() < 1e-15);
+            assert!((odd.pressure(v, NODE) - printed(v)).abs() < 1e-15);
+            assert_eq!(one.pressure(-v, NODE), 0.0);
+            assert!((one.pressure(v, NODE) - printed(v)).abs() < 1e-15);
         }
-        assert_eq!(odd.slope(0.0, NodeContext::AT_THE_GAP), 10.0);
+        assert_eq!(odd.slope(0.0, NODE), 10.0);
     }
 
     #[test]
@@ -138,8 +140,8 @@ mod tests {
         for (symmetry, back) in [(Symmetry::Even, 3.0), (Symmetry::Odd, -3.0), (Symmetry::OneSided, 0.0)] {
             let graph =
                 DampedResponse { breakpoints: vec![], slopes: vec![3.0], symmetry }.response().unwrap();
-            assert_eq!(graph.pressure(1.0), 3.0);
-            assert_eq!(graph.pressure(-1.0), back);
+            assert_eq!(graph.pressure(1.0, NODE), 3.0);
+            assert_eq!(graph.pressure(-1.0, NODE), back);
         }
     }
 }

@@ -6,7 +6,7 @@
 //! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
 //! radial, so that `s` as a vector has the direction of both velocity and traction.
 
-use super::{FrictionLaw, LawFault};
+use super::LawFault;
 
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,25 +106,24 @@ fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f
 
 /// The choice of friction laws, from the list of them: the enum that the job holds, and calls of the law that it is.
 macro_rules! friction_laws {
-    ($($(#[$about:meta])* $law:ident,)*) => {
+    ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The friction law.
         #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(rename_all = "snake_case")]
         #[schemars(rename = "Friction")]
         pub enum FrictionLaw {
-            $($(#[$about])* $law($law),)*
+            $($(#[$about])* #[serde(rename = $name)] $law($law),)*
         }
 
         macro_rules! each_friction_law {
-            ($chosen:expr, $bound:ident => $what:expr) => {
+            ($family:ident, $chosen:expr, $bound:ident => $what:expr) => {
                 match $chosen {
-                    $(FrictionLaw::$law($bound) => $what,)*
+                    $($family::$law($bound) => $what,)*
                 }
             };
         }
 
         impl FrictionLaw {
-            laws::calls! { each_friction_law, FrictionBound:
+            laws::calls! { each_friction_law FrictionLaw FrictionBound:
                 coefficient(speed: f64) -> f64;
                 bound(speed: f64, pressure: f64) -> f64;
                 slope(speed: f64, pressure: f64) -> f64;
@@ -136,9 +135,9 @@ macro_rules! friction_laws {
             }
 
             /// Its table in the job, from that of the contact.
-            pub fn table(&self) -> String {
+            pub fn table(&self) -> &'static str {
                 match self {
-                    $(Self::$law(_) => format!("friction.{}", laws::key(stringify!($law))),)*
+                    $(Self::$law(_) => concat!("friction.", $name),)*
                 }
             }
         }
@@ -146,18 +145,9 @@ macro_rules! friction_laws {
 }
 pub(super) use friction_laws;
 
-impl FrictionLaw {
-    /// What is wrong with its parameters; keys are those of the contact's table.
-    pub fn faults(&self) -> Vec<LawFault> {
-        let table = self.table();
-        self.own_faults().into_iter().map(|fault| fault.within(&table)).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::contact::{Coulomb, SlipWeakening, Tresca};
+    use crate::contact::{Coulomb, FrictionLaw, SlipWeakening, Tresca};
     use proptest::prelude::*;
 
     fn any_law() -> impl Strategy<Value = FrictionLaw> {

@@ -1,4 +1,4 @@
-//! What all families of laws share: keys, faults, calls of the law that was chosen.
+//! What all families of laws share: faults, and calls of the law that was chosen.
 
 /// What is wrong with a key of a law.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,38 +30,16 @@ impl LawFault {
     }
 }
 
-/// The key in the job file of the law whose type has this name: `SlipWeakening` is `slip_weakening`.
-pub(super) fn key(name: &str) -> String {
-    let mut key = String::new();
-    for letter in name.chars() {
-        if letter.is_uppercase() && !key.is_empty() {
-            key.push('_');
-        }
-        key.extend(letter.to_lowercase());
-    }
-    key
-}
-
 /// Methods of an enum of laws that call the same ones of the chosen law, by a `match` that the macro `$each` makes.
 macro_rules! calls {
-    ($each:ident, $contract:ident: $($method:ident($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
+    ($each:ident $family:ident $contract:ident: $($method:ident($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
         $(
             #[doc = concat!("See [`", stringify!($contract), "::", stringify!($method), "`].")]
             #[inline]
             pub fn $method(&self $(, $argument: $kind)*) -> $out {
-                $each!(self, law => $contract::$method(law $(, $argument)*))
+                $each!($family, self, law => $contract::$method(law $(, $argument)*))
             }
         )*
     };
 }
 pub(super) use calls;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn keys_are_names_in_small_letters() {
-        assert_eq!(["Graph", "SlipWeakening"].map(key), ["graph", "slip_weakening"]);
-    }
-}

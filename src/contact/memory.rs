@@ -49,7 +49,7 @@ impl Memory {
         }
         if let Some(friction) = table.friction.as_ref().filter(|law| law.follows_pressure()) {
             let message = "this friction follows the pressure of the normal law, which memory is not part of";
-            refuse(friction.table(), message, ", or use tresca");
+            refuse(friction.table().into(), message, ", or use tresca");
         }
         faults
     }

@@ -43,20 +43,20 @@ use serde::{Deserialize, Serialize};
 
 normal_law::normal_laws! {
     /// A piecewise linear function of the normal velocity that may fall, equation (72).
-    DampedResponse,
+    DampedResponse = "damped_response",
     /// Any polyline of pressure over normal velocity, with upward jumps.
-    Graph,
+    Graph = "graph",
     /// A spring that is felt beyond the gap.
-    Compliance,
+    Compliance = "compliance",
     /// A rigid obstacle: the normal displacement never exceeds the gap.
-    Unilateral,
+    Unilateral = "unilateral",
 }
 
 friction_law::friction_laws! {
     /// A given bound on the friction traction.
-    Tresca,
+    Tresca = "tresca",
     /// A bound proportional to the contact pressure.
-    Coulomb,
+    Coulomb = "coulomb",
     /// A coefficient that falls with the sliding velocity.
-    SlipWeakening,
+    SlipWeakening = "slip_weakening",
 }

@@ -89,9 +89,10 @@ pub trait NormalParameters {
         Vec::new()
     }
 
-    /// Why these parameters of a law that may have a gap go with no obstacle, and what to do.
-    fn against_obstacle(&self) -> Option<[&'static str; 2]> {
-        None
+    /// Why no obstacle can stand beside the law of this name, and what to do.
+    fn against_obstacle(&self, name: &str) -> Option<[String; 2]> {
+        let help = "delete the obstacle, or use `compliance` or `unilateral`";
+        Some([format!("`{name}` acts at any distance: it has no obstacle"), help.into()])
     }
 }
 
@@ -137,7 +138,7 @@ pub trait Response {
 
     /// Whether there is no pressure at any velocity.
     fn is_zero(&self) -> bool {
-        false
+        self.growth_constants() == Ok([0.0; 2])
     }
 
     /// The largest normal velocity in m/s that it allows, if to bound the velocity is all it does.
@@ -175,12 +176,11 @@ pub trait Response {
 /// The choice of normal laws, from the list of them: the enum that the job holds, the enum that a step asks, and calls of the
 /// law that it is.
 macro_rules! normal_laws {
-    ($($(#[$about:meta])* $law:ident,)*) => {
+    ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The normal law.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(rename_all = "snake_case")]
         pub enum NormalLaw {
-            $($(#[$about])* $law($law),)*
+            $($(#[$about])* #[serde(rename = $name)] $law($law),)*
         }
 
         /// What evaluates the normal law that was chosen.
@@ -189,16 +189,16 @@ macro_rules! normal_laws {
             $($(#[$about])* $law(<$law as NormalParameters>::Response),)*
         }
 
-        macro_rules! each_response {
-            ($chosen:expr, $bound:ident => $what:expr) => {
+        macro_rules! each_normal_law {
+            ($family:ident, $chosen:expr, $bound:ident => $what:expr) => {
                 match $chosen {
-                    $(NormalResponse::$law($bound) => $what,)*
+                    $($family::$law($bound) => $what,)*
                 }
             };
         }
 
         impl NormalResponse {
-            laws::calls! { each_response, Response:
+            laws::calls! { each_normal_law NormalResponse Response:
                 resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
                 pressure(velocity: f64, node: NodeContext) -> f64;
                 slope(velocity: f64, node: NodeContext) -> f64;
@@ -218,18 +218,10 @@ macro_rules! normal_laws {
             }
         }
 
-        macro_rules! each_normal_law {
-            ($chosen:expr, $bound:ident => $what:expr) => {
-                match $chosen {
-                    $(NormalLaw::$law($bound) => $what,)*
-                }
-            };
-        }
-
         impl NormalLaw {
-            laws::calls! { each_normal_law, NormalParameters:
+            laws::calls! { each_normal_law NormalLaw NormalParameters:
                 gap() -> Option<&Scalar>;
-                against_obstacle() -> Option<[&'static str; 2]>;
+                against_obstacle(name: &str) -> Option<[String; 2]>;
                 own_faults() -> Vec<LawFault>;
             }
 
@@ -241,10 +233,10 @@ macro_rules! normal_laws {
             }
 
             /// Its name in the job.
-            pub fn name(&self) -> String {
-                laws::key(match self {
-                    $(Self::$law(_) => stringify!($law),)*
-                })
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$law(_) => $name,)*
+                }
             }
         }
     };
@@ -272,25 +264,13 @@ impl NormalLaw {
         self.response().is_ok_and(|law| law.has_vertical_parts() || law.depends_on_displacement())
     }
 
-    /// What is wrong with its parameters, alone and beside an obstacle; keys are those of the contact's table.
-    pub fn faults(&self, obstacle: bool) -> Vec<LawFault> {
-        let table = self.table();
-        let mut faults: Vec<LawFault> =
-            self.own_faults().into_iter().map(|fault| fault.within(&table)).collect();
-        if !obstacle {
-            return faults;
-        }
-        let against = self.against_obstacle().map(|[message, help]| [message.to_owned(), help.to_owned()]);
-        let against = against.or_else(|| {
-            let message = format!("`{}` acts at any distance: it has no obstacle", self.name());
-            let help = "delete the obstacle, or use `compliance` or `unilateral`".to_owned();
-            (!self.response().ok()?.depends_on_displacement()).then_some([message, help])
-        });
-        faults.extend(against.map(|[message, help]| LawFault::at_key("obstacle", message, help)));
+    /// What is wrong with it beside an obstacle; keys are those of the contact's table.
+    pub fn faults_beside_obstacle(&self) -> Vec<LawFault> {
+        let against =
+            self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));
         let help = "give one of them: the obstacle says how far it is";
-        faults
-            .extend(self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help)));
-        faults
+        let gap = self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help));
+        against.into_iter().chain(gap).collect()
     }
 }
 

@@ -51,7 +51,7 @@ impl Polyline {
         Ok(Self { points, slopes, reach })
     }
 
-    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Self::branch).
+    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Response::branch).
     fn branch_of(&self, s: f64, c: f64) -> usize {
         self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
     }
@@ -59,34 +59,6 @@ impl Polyline {
     /// Whether this branch is vertical.
     fn is_vertical(&self, branch: usize) -> bool {
         self.slopes[branch] == f64::INFINITY
-    }
-
-    /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; at a jump its upper end. For graphs without a vertical
-    /// ray.
-    #[inline]
-    pub fn pressure(&self, velocity: f64) -> f64 {
-        let branch = self.branch(velocity);
-        let [v, p] = self.points[branch.saturating_sub(1)];
-        p + self.slopes[branch] * (velocity - v)
-    }
-
-    /// Which linear branch holds a velocity: 0 before the first point, `n` after the last of `n`.
-    #[inline]
-    pub fn branch(&self, velocity: f64) -> usize {
-        self.points.iter().take_while(|p| p[0] <= velocity).count()
-    }
-
-    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
-    /// `c1` and the least `c0` that goes with it. Infinite where the graph ends in a vertical ray; jumps do no harm.
-    fn growth(&self) -> [f64; 2] {
-        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
-        if slope == f64::INFINITY {
-            return [f64::INFINITY; 2];
-        }
-        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
-        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
-        let corners = self.points.iter().map(|point| excess(*point));
-        [corners.fold(self.pressure(0.0).abs(), f64::max), slope]
     }
 
     /// Distance of a pair (velocity, pressure) to the graph, scaled by this velocity and this pressure.
@@ -125,16 +97,24 @@ impl Response for Polyline {
         Resolved { velocity: v + advance, pressure: p + slope * advance, derivative, branch }
     }
 
-    fn pressure(&self, velocity: f64, _node: NodeContext) -> f64 {
-        self.pressure(velocity)
+    /// At a jump its upper end.
+    #[inline]
+    fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
+        let branch = self.branch(velocity, node);
+        let [v, p] = self.points[branch.saturating_sub(1)];
+        p + self.slopes[branch] * (velocity - v)
     }
 
-    fn slope(&self, velocity: f64, _node: NodeContext) -> f64 {
-        self.slopes[self.branch(velocity)]
+    /// At a kink that of the branch after it.
+    #[inline]
+    fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
+        self.slopes[self.branch(velocity, node)]
     }
 
+    /// 0 before the first point, `n` after the last of `n`.
+    #[inline]
     fn branch(&self, velocity: f64, _node: NodeContext) -> usize {
-        self.branch(velocity)
+        self.points.iter().take_while(|p| p[0] <= velocity).count()
     }
 
     fn distance(&self, velocity: f64, pressure: f64, _node: NodeContext, range: [f64; 2]) -> f64 {
@@ -143,10 +123,6 @@ impl Response for Polyline {
 
     fn has_vertical_parts(&self) -> bool {
         self.slopes.contains(&f64::INFINITY)
-    }
-
-    fn is_zero(&self) -> bool {
-        self.reach[1] == 0.0 && self.slopes.iter().all(|slope| *slope == 0.0)
     }
 
     fn velocity_bound(&self, _node: NodeContext) -> Option<f64> {
@@ -160,10 +136,16 @@ impl Response for Polyline {
         self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
     }
 
+    /// Jumps do no harm.
     fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
-        let constants = self.growth();
-        let why = "the growth constant is infinite because a contact law ends in a vertical ray";
-        if constants[1].is_finite() { Ok(constants) } else { Err(why) }
+        let slope = f64::max(self.slopes[0].abs(), self.slopes[self.points.len()].abs());
+        if slope == f64::INFINITY {
+            return Err("the growth constant is infinite because a contact law ends in a vertical ray");
+        }
+        // Between corners and rest, `|p| - c1 |v|` is convex, and beyond them it doesn't grow.
+        let excess = |[v, p]: [f64; 2]| p.abs() - slope * v.abs();
+        let at_rest = self.pressure(0.0, NodeContext::AT_THE_GAP).abs();
+        Ok([self.points.iter().map(|point| excess(*point)).fold(at_rest, f64::max), slope])
     }
 
     fn greatest_pressure(&self) -> f64 {
@@ -198,7 +180,11 @@ impl Response for Polyline {
     fn outline(&self, [left, right]: [f64; 2], [bottom, top]: [f64; 2]) -> Vec<[f64; 2]> {
         let last = self.points.len();
         let end = |branch: usize, v: f64, p: f64, corner: [f64; 2]| {
-            if self.is_vertical(branch) { [corner[0], p] } else { [v, self.pressure(v)] }
+            if self.is_vertical(branch) {
+                [corner[0], p]
+            } else {
+                [v, self.pressure(v, NodeContext::AT_THE_GAP)]
+            }
         };
         let mut line = vec![end(0, left, bottom, self.points[0])];
         line.extend_from_slice(&self.points);
@@ -235,7 +221,10 @@ mod tests {
     #[test]
     fn pressure_and_slope_by_hand() {
         let g = valley();
-        assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|v| g.pressure(v)), [0.0, 1.0, 2.0, 1.5, 1.0, 4.0]);
+        assert_eq!(
+            [-5.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|v| g.pressure(v, NODE)),
+            [0.0, 1.0, 2.0, 1.5, 1.0, 4.0]
+        );
         assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0].map(|v| g.slope(v, NODE)), [0.0, 2.0, -1.0, -1.0, 3.0]);
         assert_eq!(g.monotonicity_constant(), 1.0);
     }
@@ -250,17 +239,21 @@ mod tests {
 
     #[test]
     fn growth_constants_by_hand() {
-        assert_eq!(valley().growth(), [2.0, 3.0], "2 Pa at rest, a slope of 3 at last");
-        let growth = |points, before, after| Polyline::new(points, before, after).unwrap().growth();
+        assert_eq!(valley().growth_constants(), Ok([2.0, 3.0]), "2 Pa at rest, a slope of 3 at last");
+        let growth = |points, before, after| Polyline::new(points, before, after).unwrap().growth_constants();
         // The corner at 2 m/s is 7 - 2 * 0.5 = 6 Pa above the cone; the line through it has 3 Pa at rest.
-        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), [6.0, 0.5]);
+        assert_eq!(growth(vec![[-2.0, -1.0], [2.0, 7.0]], 0.5, 0.0), Ok([6.0, 0.5]));
         // A jump at rest counts with both ends, one beside it with what is left beyond the cone.
-        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), [4.0, 1.0]);
-        assert_eq!(growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0), [3.0, 2.0], "a law that falls for good");
+        assert_eq!(growth(vec![[0.0, -4.0], [0.0, 3.0]], 1.0, 1.0), Ok([4.0, 1.0]));
+        assert_eq!(
+            growth(vec![[1.0, 0.0], [1.0, 5.0]], 0.0, -2.0),
+            Ok([3.0, 2.0]),
+            "a law that falls for good"
+        );
         // The line 2 v + 1 is 1 Pa above the cone 2 |v| from rest on, its corner 1 Pa below.
-        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), [1.0, 2.0]);
-        assert_eq!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY), [f64::INFINITY; 2], "a wall");
-        assert_eq!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0), [f64::INFINITY; 2]);
+        assert_eq!(growth(vec![[-1.0, -1.0]], 2.0, 2.0), Ok([1.0, 2.0]));
+        assert!(growth(vec![[0.0, 0.0]], 0.0, f64::INFINITY).is_err(), "a wall");
+        assert!(growth(vec![[0.0, 0.0]], f64::INFINITY, 0.0).is_err());
     }
 
     #[test]
@@ -355,16 +348,16 @@ mod tests {
             let h = 1e-6;
             let corner = g.corners().iter().any(|p| (p[0] - v).abs() < 2.0 * h);
             if !corner {
-                let by_value = (g.pressure(v + h) - g.pressure(v - h)) / (2.0 * h);
+                let by_value = (g.pressure(v + h, NODE) - g.pressure(v - h, NODE)) / (2.0 * h);
                 prop_assert!((by_value - g.slope(v, NODE)).abs() < 1e-6 * (1.0 + g.slope(v, NODE).abs()));
             }
-            let size = v.abs() + g.pressure(v).abs() / g.reach[1];
-            let range = [v.abs(), g.pressure(v).abs()];
-            prop_assert!(g.distance(v, g.pressure(v), NODE, range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
-            let [at_rest, slope] = g.growth();
-            prop_assert!(g.pressure(v).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
+            let size = v.abs() + g.pressure(v, NODE).abs() / g.reach[1];
+            let range = [v.abs(), g.pressure(v, NODE).abs()];
+            prop_assert!(g.distance(v, g.pressure(v, NODE), NODE, range) < 1e-13 * (1.0 + size) * (1.0 + 2.0 / g.reach[1]));
+            let [at_rest, slope] = g.growth_constants().unwrap();
+            prop_assert!(g.pressure(v, NODE).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
             for w in [v - 1.0, v + 0.3] {
-                let rise = (g.pressure(v) - g.pressure(w)) * (v - w);
+                let rise = (g.pressure(v, NODE) - g.pressure(w, NODE)) * (v - w);
                 prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);
             }
         }

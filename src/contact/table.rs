@@ -36,8 +36,13 @@ impl ContactTable {
     /// What is wrong with its laws, each alone and all together; keys are those of the table.
     pub fn faults(&self) -> Vec<LawFault> {
         let mut faults = Vec::new();
-        faults.extend(self.normal.iter().flat_map(|law| law.faults(self.has_obstacle)));
-        faults.extend(self.friction.iter().flat_map(FrictionLaw::faults));
+        if let Some(law) = &self.normal {
+            faults.extend(law.own_faults().into_iter().map(|fault| fault.within(&law.table())));
+            faults.extend(self.has_obstacle.then(|| law.faults_beside_obstacle()).into_iter().flatten());
+        }
+        if let Some(law) = &self.friction {
+            faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
+        }
         faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(self)));
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(self)));
         if self.quadrature == Quadrature::Gauss {

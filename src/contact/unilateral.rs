@@ -52,10 +52,10 @@ impl NormalParameters for Unilateral {
         vec![LawFault::at_value("gap", "a bound on the velocity has no gap", help)]
     }
 
-    fn against_obstacle(&self) -> Option<[&'static str; 2]> {
+    fn against_obstacle(&self, _name: &str) -> Option<[String; 2]> {
         let words =
             ["a bound on the velocity has no obstacle", "delete the obstacle, or bound the displacement"];
-        (self.bound == Bound::Velocity).then_some(words)
+        (self.bound == Bound::Velocity).then(|| words.map(String::from))
     }
 }
 
