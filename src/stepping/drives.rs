@@ -53,7 +53,7 @@ impl<const D: usize> Drives<D> {
             add("a body force", &force.value, true);
         }
         for contact in &body.contacts {
-            contact.gap().expressions().into_iter().for_each(|values| add("an obstacle", values, false));
+            contact.gap.expressions().into_iter().for_each(|values| add("an obstacle", values, false));
         }
         Self { all }
     }

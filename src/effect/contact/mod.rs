@@ -99,11 +99,6 @@ impl<const D: usize> Contact<D> {
         Ok(Self { law, gap, scale, reference, facets: facets.to_vec(), points, friction: None, needs_ghosts })
     }
 
-    /// What the distance to the obstacle is measured to.
-    pub fn gap(&self) -> &Gap {
-        &self.gap
-    }
-
     /// Whether velocities of ghost nodes are read and forces on them written.
     pub fn needs_ghosts(&self) -> bool {
         self.needs_ghosts
