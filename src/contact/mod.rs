@@ -7,6 +7,7 @@ mod adhesion;
 mod compliance;
 mod coulomb;
 mod damped_response;
+mod exponential_damper;
 mod friction_law;
 mod graph;
 mod laws;
@@ -24,6 +25,7 @@ pub use adhesion::Adhesion;
 pub use compliance::Compliance;
 pub use coulomb::Coulomb;
 pub use damped_response::{DampedResponse, Symmetry};
+pub use exponential_damper::ExponentialDamper;
 pub use friction_law::{FrictionBound, Slip};
 pub use graph::Graph;
 pub use laws::LawFault;
@@ -44,6 +46,8 @@ use serde::{Deserialize, Serialize};
 normal_law::normal_laws! {
     /// A piecewise linear function of the normal velocity that may fall, equation (72).
     DampedResponse = "damped_response",
+    /// A damper whose pressure rises with the normal velocity toward a limit.
+    ExponentialDamper = "exponential_damper",
     /// Any polyline of pressure over normal velocity, with upward jumps.
     Graph = "graph",
     /// A spring that is felt beyond the gap.

@@ -108,11 +108,15 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
             let symmetry = draw.one_of(&["even", "odd", "one_sided"]);
             // Mirrored, a rise falls.
             let rise = if symmetry == "even" { -fall } else { draw.between(0.1, 3.0) };
-            format!(
-                "[contact.normal.damped_response]\nbreakpoints = [{first}, {}]\nslopes = [{rise}, {fall}, {rise}]\n\
-                 symmetry = \"{symmetry}\"\n",
-                2.0 * first
-            )
+            if symmetry == "one_sided" && high < 0.3 {
+                format!("[contact.normal.exponential_damper]\nlimit = {high}\nvelocity = {first}\n")
+            } else {
+                format!(
+                    "[contact.normal.damped_response]\nbreakpoints = [{first}, {}]\nslopes = [{rise}, {fall}, {rise}]\n\
+                     symmetry = \"{symmetry}\"\n",
+                    2.0 * first
+                )
+            }
         }
         "graph" | "gauss" => format!(
             "[contact.normal.graph]\npoints = [[-{first}, 0], [{first}, {high}], [{}, {}]]\nslope_after = 1\n",

@@ -4,8 +4,8 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     contact::{
-        Bound, Compliance, Coulomb, DampedResponse, FrictionLaw, Gap, Graph, NormalLaw, NormalResponse,
-        Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
+        Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph, NormalLaw,
+        NormalResponse, Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
     },
     effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     job::{Expression, Scalar},
@@ -30,6 +30,7 @@ fn laws() -> Vec<NormalResponse> {
         damped(Symmetry::OneSided),
         graph(vec![[-0.4, -3.0], [0.0, -3.0], [0.3, 9.0]], 12.0, -8.0),
         graph(vec![[-0.4, -3.0], [-0.4, 20.0], [0.1, 2.0], [0.1, 40.0]], 12.0, f64::INFINITY),
+        NormalLaw::ExponentialDamper(ExponentialDamper { limit: 30.0, velocity: 0.2 }),
         springs(300.0, 1.0),
         springs(4000.0, 2.0),
         NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap: None }),
