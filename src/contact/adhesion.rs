@@ -48,9 +48,14 @@ impl Adhesion {
         self.tangential_stiffness.unwrap_or(0.0)
     }
 
+    /// The length in m beyond which the traction grows no more; infinite if it always grows.
+    pub fn limit(&self) -> f64 {
+        self.length.unwrap_or(f64::INFINITY)
+    }
+
     /// A length in m, cut where the traction grows no more.
     fn cut(&self, length: f64) -> f64 {
-        self.length.map_or(length, |most| length.min(most))
+        length.min(self.limit())
     }
 
     /// What can't stand beside bonds, which are between what touches at first; keys are those of the contact's table.
@@ -107,14 +112,14 @@ impl Adhesion {
     /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
     pub fn tangent<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> [Vector<D>; D] {
         let (opening, sliding) = Self::stretch(displacement, normal);
-        let along = if opening > 0.0 && opening < self.length { self.stiffness } else { 0.0 };
+        let along = if opening > 0.0 && opening < self.limit() { self.stiffness } else { 0.0 };
         let size = norm(&sliding);
         // Beyond the bond's length only the direction of the traction changes.
-        let (across, radial) = if size > self.length {
-            let across = self.tangential_stiffness * self.length / size;
+        let (across, radial) = if size > self.limit() {
+            let across = self.tangential_stiffness() * self.limit() / size;
             (across, across / (size * size))
         } else {
-            (self.tangential_stiffness, 0.0)
+            (self.tangential_stiffness(), 0.0)
         };
         std::array::from_fn(|i| {
             std::array::from_fn(|j| {
@@ -127,8 +132,8 @@ impl Adhesion {
     /// The derivative of [`Adhesion::drive`] by the displacement, in J/m^3.
     pub fn drive_gradient<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
         let (opening, sliding) = Self::stretch(displacement, normal);
-        let along = if opening < self.length { -2.0 * self.stiffness * opening } else { 0.0 };
-        let across = if norm(&sliding) > self.length { 0.0 } else { 2.0 * self.tangential_stiffness };
+        let along = if opening < self.limit() { -2.0 * self.stiffness * opening } else { 0.0 };
+        let across = if norm(&sliding) > self.limit() { 0.0 } else { 2.0 * self.tangential_stiffness() };
         add_scaled(&normal.map(|n| along * n), across, &sliding)
     }
 
@@ -234,7 +239,7 @@ mod tests {
         fn tangent_and_gradient_of_the_drive_are_derivatives(u in proptest::array::uniform3(-0.5f64..0.5)) {
             let normal = [0.6, 0.0, -0.8];
             let (opening, sliding) = Adhesion::stretch(&u, &normal);
-            let corners = [opening, opening - GLUE.length, norm(&sliding) - GLUE.length];
+            let corners = [opening, opening - GLUE.limit(), norm(&sliding) - GLUE.limit()];
             prop_assume!(corners.iter().all(|corner| corner.abs() > 1e-4) || opening == 0.0 && corners[2].abs() > 1e-4);
             prop_assume!(dot(&u, &normal).abs() > 1e-4);
             let (tangent, gradient) = (GLUE.tangent(&u, &normal), GLUE.drive_gradient(&u, &normal));

@@ -176,7 +176,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
                         std::array::from_fn(|i| add_scaled(&tangent[i], point.weight * square, &own[i]));
                     gradient =
                         add_scaled(&gradient, point.weight, &law.drive_gradient(&displacement, normal));
-                    truncated |= law.length < f64::INFINITY;
+                    truncated |= law.length.is_some();
                 }
             }
             let Some((_, point)) = group.first() else { continue };
