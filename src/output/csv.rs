@@ -110,7 +110,7 @@ mod tests {
     fn a_resumed_table_keeps_whole_rows_up_to_the_step() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("history.csv");
-        std::fs::write(&path, "step,time\n1,0.5\n2,1\n3,1.5\n4,").unwrap();
+        std::fs::write(&path, "step,time\n1,0.5\n2,1\n2\n3,1.5\n4,").unwrap();
         let mut table = CsvFile::resume(&path, "step,time", 2.0).unwrap();
         table.row(format_args!("3,9")).unwrap();
         table.flush().unwrap();

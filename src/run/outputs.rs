@@ -220,13 +220,17 @@ fn length(path: &Path) -> u64 {
 
 /// Whether the fields of this state are to be written: of the initial one always, where fields are wanted along the way.
 fn due(every: Option<Every>, state: &State) -> bool {
+    every.is_some_and(|every| has_come(every, state.step, [state.time - state.step_length, state.time]))
+}
+
+/// Whether this is the number of a step, or the times in s before and after it, at which something is written.
+fn has_come(every: Every, step: u64, [before, after]: [f64; 2]) -> bool {
     match every {
-        None => false,
-        Some(_) if state.step == 0 => true,
-        Some(Every::Every(steps)) => state.step.is_multiple_of(steps),
-        Some(Every::Interval(interval)) => {
+        _ if step == 0 => true,
+        Every::Every(steps) => step.is_multiple_of(steps),
+        Every::Interval(interval) => {
             let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
-            count(state.time) > count(state.time - state.step_length)
+            count(after) > count(before)
         }
     }
 }
@@ -262,4 +266,18 @@ fn profiles<const D: usize, const S: usize>(
         .map(|p| (p.on.clone(), job.contact.iter().position(|c| c.on.contains(&p.on))))
         .collect();
     Profiles::new(session, body, &along)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn multiples_of_an_interval_that_rounding_misses_have_come() {
+        let tenths = |times| has_come(Every::Interval(0.1), 5, times);
+        assert!(0.3 / 0.1 < 3.0 && tenths([0.2, 0.3]), "0.3 is a multiple of 0.1");
+        assert!(!tenths([0.3, 0.35]) && tenths([0.35, 0.45]) && tenths([0.2, 0.75]));
+        assert!(has_come(Every::Interval(0.1), 0, [0.0; 2]) && has_come(Every::Every(3), 0, [0.0; 2]));
+        assert!(has_come(Every::Every(3), 6, [0.0; 2]) && !has_come(Every::Every(3), 7, [0.0; 2]));
+    }
 }

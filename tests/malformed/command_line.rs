@@ -83,6 +83,7 @@ fn a_question_asked_on_several_ranks_is_answered_once() {
 fn a_check_says_what_a_run_would_be_and_writes_nothing() {
     let folder = tempfile::tempdir().expect("folder");
     let output = format!("output.folder={}", folder.path().join("out").display());
+    let mut programs = Vec::new();
     for ranks in [1, 3] {
         let text = run(ranks, &["check", &paper(), "--set", &output, "--json"]).expect(0).stdout;
         let report: serde_json::Value = serde_json::from_str(&text).expect("one JSON object");
@@ -115,7 +116,9 @@ fn a_check_says_what_a_run_would_be_and_writes_nothing() {
             parts.abs_diff(2 * whole + memory["whole_mesh_at_start"].as_u64().expect("bytes")) < 10,
             "{text}"
         );
+        programs.push(memory["program"].as_u64().expect("bytes"));
     }
+    assert!(programs[0] > 0 && programs[1] == 3 * programs[0], "each rank has one: {programs:?}");
     run(2, &["check", &paper(), "--set", &output]).expect(0).says("the job can be run");
     let wide = [
         "check",
