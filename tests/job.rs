@@ -224,6 +224,10 @@ fn only_what_changes_the_answer_counts_as_physics() {
         ["contact.0.normal.damped_response.slopes", "initial.velocity", "material.density", "time.step"]
     );
     assert_eq!(original["material.elasticity.youngs_modulus"], "1000.0");
+    let more = physics(&["contact.0.friction.tresca.bound=1"]);
+    for pair in [[&original, &more], [&more, &original]] {
+        assert_eq!(differing_keys(pair[0], pair[1]), ["contact.0.friction.tresca.bound"], "one has it alone");
+    }
 }
 
 #[test]

@@ -31,6 +31,7 @@
 
 mod ascent;
 mod cells;
+mod coverage;
 mod forms;
 mod small_eigen;
 mod verdict;
@@ -47,6 +48,7 @@ use crate::{
     stepping::Stepper,
 };
 use ascent::{Quotient, climb};
+use coverage::not_covered;
 use serde::{Deserialize, Serialize};
 
 /// Relative changes at which a supremum counts as found: of the explicit step, and of contact.
@@ -141,12 +143,7 @@ impl Certificates {
                 if known.steps_are_unique() { (1.0 - Self::MARGIN) / find(Kind::SlipPressure)? } else { 0.0 };
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
-        known.not_covered = not_covered(&body.contacts, known.theta_step, known.slip_pressure_bound);
-        if scheme_is_implicit && known.theta_step.is_some() {
-            known.not_covered.extend(body.softening().map(|name| {
-                format!("{name} at the end of a step may soften the body: theta of a step does not cover it")
-            }));
-        }
+        known.not_covered = not_covered(body, known.theta_step, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_step_bound();
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
@@ -204,42 +201,6 @@ fn growth<const D: usize>(contacts: &[Contact<D>]) -> std::result::Result<Option
         all = Some([rest.max(most), slope.max(steepest)]);
     }
     Ok(all)
-}
-
-/// What depends on contact pressures that are part of the solution.
-fn not_covered<const D: usize>(
-    contacts: &[Contact<D>],
-    theta_step: Option<f64>,
-    slip_pressure_bound: Option<f64>,
-) -> Vec<String> {
-    let mut words = Vec::new();
-    if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
-        words.push(
-            "friction bounds follow the contact pressure: theta holds for given pressures; that they change with the \
-             solution is not covered, and beyond some coefficient there may be several solutions"
-                .into(),
-        );
-    }
-    for fall in contacts.iter().filter_map(Contact::unknown_fall) {
-        let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
-            // Where nothing else falls, theta is proportional to the pressure.
-            let each = match theta_step {
-                Some(0.0) => {
-                    let each = (1.0 - Certificates::MARGIN) / bound;
-                    format!("theta of a step is {each:.4e} for each Pa, so that ")
-                }
-                _ => String::new(),
-            };
-            format!(
-                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against"
-            )
-        });
-        words.push(format!(
-            "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
-             bound: theta does not cover it{covered}"
-        ));
-    }
-    words
 }
 
 fn find<const D: usize, const S: usize>(
