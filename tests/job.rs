@@ -231,6 +231,11 @@ fn only_what_changes_the_answer_counts_as_physics() {
 }
 
 #[test]
+fn a_run_may_land_on_its_end() {
+    assert_eq!(load(SQUARE, &["time.end=1", "time.land_on=[0.5, 1.0]"]).job.time.land_on, [0.5, 1.0]);
+}
+
+#[test]
 fn a_mesh_file_is_held_against_the_job_once_it_is_read() {
     let names = ["a", "b", "c", "d", "e"];
     let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[] };

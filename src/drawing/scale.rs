@@ -170,6 +170,10 @@ mod tests {
             assert!(scale.low < scale.high && !scale.ticks.is_empty(), "{scale:?}");
         }
         assert!(!Scale::linear(std::iter::empty(), true).ticks.is_empty());
+        for value in [1.0, 100.0, 3e-5] {
+            let scale = Scale::logarithmic([value, value].into_iter());
+            assert!(scale.low < scale.high && scale.ticks.len() > 1, "{scale:?}");
+        }
     }
 
     #[test]

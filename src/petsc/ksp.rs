@@ -213,3 +213,17 @@ impl Ksp {
         Ok(LinearOutcome { reason, iterations: usize::try_from(iterations).unwrap_or(0), residual })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_solves_count_the_iterations_of_both_and_end_as_the_second() {
+        let [first, second] = [(2, 5, 1e-3), (-3, 4, 1e-9)]
+            .map(|(reason, iterations, residual)| LinearOutcome { reason, iterations, residual });
+        let both = first.followed_by(second);
+        assert_eq!(both, LinearOutcome { iterations: 9, ..second });
+        assert!(first.converged() && !both.converged());
+    }
+}

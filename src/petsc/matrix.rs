@@ -204,6 +204,21 @@ mod tests {
     }
 
     #[test]
+    fn rows_have_ascending_columns_of_the_matrix_and_a_block_for_each() {
+        let rows = |columns: &[u32]| BlockRows {
+            offsets: vec![0, columns.len()],
+            columns: columns.to_vec(),
+            values: vec![1.0; columns.len() * 4],
+        };
+        assert!(rows(&[0, 2, 3]).check(2, 4).is_ok());
+        for wrong in [[0, 2, 2], [0, 3, 2], [0, 2, 4]] {
+            assert!(rows(&wrong).check(2, 4).is_err(), "{wrong:?}");
+        }
+        assert!(BlockRows { values: vec![1.0; 11], ..rows(&[0, 2, 3]) }.check(2, 4).is_err());
+        assert!(BlockRows { offsets: vec![1, 3], ..rows(&[0, 2, 3]) }.check(2, 4).is_err());
+    }
+
+    #[test]
     fn a_product_reads_entries_indices_and_vectors() {
         // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
         let index = size_of::<sys::PetscInt>() as u64;

@@ -94,6 +94,14 @@ mod tests {
     }
 
     #[test]
+    fn nodes_that_all_rest_stick() {
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
+        let drawn = picture("bottom", 0.5, &law, &[node(0.0, 1.0, 10.0), node(0.0, 0.0, 3.0)]);
+        let caption = drawn.expect("drawn").expect("a picture").caption;
+        assert!(caption.contains("stick: 2 nodes") && !caption.contains("slip:"), "{caption}");
+    }
+
+    #[test]
     fn given_bounds_are_drawn_in_their_own_unit_and_a_boundary_in_the_air_not_at_all() {
         let given = FrictionLaw::Tresca(Tresca { bound: 2.0 });
         let drawn = picture("left", 0.0, &given, &[node(0.1, 2.0, 0.0)]).expect("drawn").expect("a picture");

@@ -227,3 +227,27 @@ fn column(folder: &Path, probe: &ProbeError) -> Result<Vec<(f64, f64)>> {
     let rows = lines.filter(|row| row.get(name).is_some_and(|word| *word == probe.name));
     Ok(rows.filter_map(|row| Some((number(&row, time)?, number(&row, value)?))).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_at_a_probe_are_measured_over_time_beside_the_size_of_the_reference() {
+        let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        for (folder, values) in folders.iter().zip([[1.0, 4.0], [2.0, 6.0]]) {
+            let rows =
+                format!("step,time,probe,velocity_y\n1,0.5,tip,{}\n2,0.75,tip,{}\n", values[0], values[1]);
+            std::fs::write(folder.path().join("probes.csv"), rows).unwrap();
+        }
+        let measured = |over| {
+            let probe = ProbeError { name: "tip".into(), value: "velocity_y".into(), over };
+            let target = Target::Run(folders[1].path(), false);
+            probe_error(folders[0].path(), target, &probe, &[]).map(|m| [m.error, m.size]).unwrap()
+        };
+        assert_eq!(measured(Over::Max), [2.0, 6.0]);
+        assert_eq!(measured(Over::End), [2.0, 6.0]);
+        // 0.5 s and 0.25 s: 0.5 x 1 + 0.25 x 4 and 0.5 x 4 + 0.25 x 36.
+        assert_eq!(measured(Over::Sum), [1.5f64.sqrt(), 11f64.sqrt()]);
+    }
+}
