@@ -29,7 +29,7 @@ pub use contact::{
 pub use contact_memory::ContactMemory;
 pub use damage::Damage;
 pub use elasticity::{ElasticLaw, Elasticity};
-pub use energy::Energy;
+pub use energy::{Energy, Role};
 pub use inertia::Inertia;
 pub use load::{BodyForce, Load, Traction};
 pub use peaks::{PeakSquares, Peaks};

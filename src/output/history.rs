@@ -2,46 +2,38 @@
 
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
-    effect::Energy,
+    effect::{Energy, Role},
     error::Result,
     stepping::{Pace, StepOutcome},
     tensor::larger,
 };
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::{cmp::Ordering, path::Path};
 
-const HEADER: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
-kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\
-energy_imbalance,numerical_dissipation,contact_energy,damage_dissipation,adhesion_energy,adhesion_dissipation";
+const STEP_COLUMNS: &str =
+    "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual";
+
+/// So many energies stand before the column of their imbalance.
+const BEFORE_IMBALANCE: usize = 6;
+
+/// Energies in the order of the file.
+fn in_columns<T: Copy>(energies: [T; Energy::COUNT], imbalance: T) -> [T; Energy::COUNT + 1] {
+    std::array::from_fn(|at| match at.cmp(&BEFORE_IMBALANCE) {
+        Ordering::Less => energies[at],
+        Ordering::Equal => imbalance,
+        Ordering::Greater => energies[at - 1],
+    })
+}
 
 /// What adds up over the steps of a run; saved in checkpoints.
 ///
-/// Dissipations and work are totals since time 0 in J (J/m in the plane).
+/// Energies are in J (J/m in the plane).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Totals {
-    /// Kinetic energy now.
-    pub kinetic_energy: f64,
-    /// Elastic energy now.
-    pub elastic_energy: f64,
-    /// Energy stored in contact now.
-    pub contact_energy: f64,
-    /// Dissipated by viscosity.
-    pub viscous_dissipation: f64,
-    /// Dissipated by viscoplastic flow.
-    pub viscoplastic_dissipation: f64,
-    /// Dissipated by contact.
-    pub contact_dissipation: f64,
-    /// Dissipated by damage.
-    pub damage_dissipation: f64,
-    /// Energy stored in adhesive bonds now.
-    pub adhesion_energy: f64,
-    /// Dissipated by adhesive bonds that gave way.
-    pub adhesion_dissipation: f64,
-    /// Work of loads and of obstacles that move.
-    pub external_work: f64,
-    /// Dissipated by the scheme: what the exact terms of its time discretisation took out.
-    pub numerical_dissipation: f64,
+    /// What is stored now, and the sums of the others since time 0; of the scheme's own terms minus their sum.
+    #[serde(flatten)]
+    pub energy: Energy,
     /// Energy that was there at first or came in since, without signs: work of loads and of obstacles, and what foundations
     /// that remember gave back.
     pub supplied: f64,
@@ -77,58 +69,38 @@ pub struct Totals {
 impl Totals {
     /// At time 0, with the energy of the initial state.
     pub fn at_start(energy: Energy) -> Self {
-        let (kinetic_energy, elastic_energy) = (energy.kinetic, energy.elastic);
-        let contact_energy = energy.stored_in_contact;
-        let adhesion_energy = energy.stored_in_bonds;
-        let turnover = kinetic_energy + elastic_energy + contact_energy + adhesion_energy;
-        let supplied = turnover;
-        Self {
-            kinetic_energy,
-            elastic_energy,
-            contact_energy,
-            adhesion_energy,
-            supplied,
-            turnover,
-            ..Self::default()
+        let mut stored = energy.to_array();
+        for (energy, role) in stored.iter_mut().zip(Energy::ROLES) {
+            *energy = if role == Role::Stored { *energy } else { 0.0 };
         }
+        let turnover = stored.iter().sum();
+        Self { energy: Energy::from_array(stored), supplied: turnover, turnover, ..Self::default() }
     }
 
     /// Takes a step in.
     pub fn add(&mut self, outcome: &StepOutcome) {
         let energy = &outcome.energy;
-        let stored = energy.kinetic - self.kinetic_energy + energy.elastic - self.elastic_energy
-            + energy.stored_in_contact
-            - self.contact_energy
-            + energy.stored_in_bonds
-            - self.adhesion_energy;
-        let released =
-            energy.viscous + energy.viscoplastic + energy.contact + energy.damage + energy.debonding;
-        let open = stored + released - energy.work - energy.numerical;
-        self.kinetic_energy = energy.kinetic;
-        self.elastic_energy = energy.elastic;
-        self.contact_energy = energy.stored_in_contact;
-        self.adhesion_energy = energy.stored_in_bonds;
-        self.viscous_dissipation += energy.viscous;
-        self.viscoplastic_dissipation += energy.viscoplastic;
-        self.contact_dissipation += energy.contact;
-        self.damage_dissipation += energy.damage;
-        self.adhesion_dissipation += energy.debonding;
-        self.external_work += energy.work;
-        self.numerical_dissipation -= energy.numerical;
-        self.supplied += energy.work.abs() + larger(-energy.contact, 0.0);
-        let sizes = [
-            self.kinetic_energy,
-            self.elastic_energy,
-            self.contact_energy,
-            self.viscous_dissipation,
-            self.viscoplastic_dissipation,
-            self.contact_dissipation,
-            self.damage_dissipation,
-            self.adhesion_energy,
-            self.adhesion_dissipation,
-            self.external_work,
-        ];
-        self.turnover = sizes.iter().fold(self.turnover, |most, size| larger(most, size.abs()));
+        let mut sides = [0.0; 4];
+        let mut totals = self.energy.to_array();
+        for ((total, now), role) in totals.iter_mut().zip(energy.to_array()).zip(Energy::ROLES) {
+            let side = &mut sides[role as usize];
+            *side += now;
+            match role {
+                Role::Stored => {
+                    *side -= *total;
+                    *total = now;
+                }
+                Role::Dissipated | Role::Work => *total += now,
+                Role::Numerical => *total -= now,
+            }
+            if role != Role::Numerical {
+                self.turnover = larger(self.turnover, total.abs());
+            }
+        }
+        self.energy = Energy::from_array(totals);
+        let [stored, dissipated, work, numerical] = sides;
+        let open = stored + dissipated - work - numerical;
+        self.supplied += work.abs() + larger(-energy.contact, 0.0);
         self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
@@ -157,7 +129,7 @@ impl Totals {
 
     /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
     pub fn made_by_scheme(&self) -> f64 {
-        let made = larger(-self.numerical_dissipation, 0.0);
+        let made = larger(-self.energy.numerical, 0.0);
         if made == 0.0 { 0.0 } else { made / self.supplied }
     }
 }
@@ -170,9 +142,11 @@ impl History {
     /// Starts the file, or goes on with it behind this step.
     pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
         let path = folder.join("history.csv");
+        let energies = in_columns(Energy::COLUMNS, "energy_imbalance").join(",");
+        let header = format!("{STEP_COLUMNS},{energies}");
         Ok(Self(match goes_on_after {
-            Some(step) => CsvFile::resume(&path, HEADER, step as f64)?,
-            None => CsvFile::create(&path, HEADER)?,
+            Some(step) => CsvFile::resume(&path, &header, step as f64)?,
+            None => CsvFile::create(&path, &header)?,
         }))
     }
 
@@ -193,20 +167,7 @@ impl History {
             outcome.linear_iterations,
             outcome.active_changes,
             Number(outcome.inclusion_residual),
-            Numbers(&[
-                totals.kinetic_energy,
-                totals.elastic_energy,
-                totals.viscous_dissipation,
-                totals.viscoplastic_dissipation,
-                totals.contact_dissipation,
-                totals.external_work,
-                totals.energy_imbalance,
-                totals.numerical_dissipation,
-                totals.contact_energy,
-                totals.damage_dissipation,
-                totals.adhesion_energy,
-                totals.adhesion_dissipation,
-            ])
+            Numbers(&in_columns(totals.energy.to_array(), totals.energy_imbalance))
         ))
     }
 
@@ -237,6 +198,27 @@ mod tests {
         let mut wrong = Totals::default();
         wrong.add(&StepOutcome { energy: Energy { work: -6.5, ..energy }, ..StepOutcome::default() });
         assert_eq!(wrong.energy_imbalance, 2.0);
+    }
+
+    #[test]
+    fn totals_are_kept_by_column_and_those_of_older_checkpoints_are_read() {
+        let energy = Energy::from_array(std::array::from_fn(|at| 0.5 + at as f64));
+        let totals = Totals { energy, turnover: 20.0, newton_iterations: 3, ..Totals::default() };
+        let mut kept = serde_json::to_value(totals).expect("an object");
+        for (column, value) in Energy::COLUMNS.into_iter().zip(energy.to_array()) {
+            assert_eq!(kept[column], value, "{column}");
+        }
+        assert_eq!(serde_json::from_value::<Totals>(kept.clone()).ok(), Some(totals));
+        kept["heat"] = 1.0.into();
+        let refused = serde_json::from_value::<Totals>(kept).expect_err("a key that is not there");
+        assert!(refused.to_string().contains("heat"), "{refused}");
+        let older = r#"{ "kinetic_energy": 1.0, "elastic_energy": 2.0, "contact_energy": 3.0, "viscous_dissipation": 4.0,
+            "viscoplastic_dissipation": 5.0, "contact_dissipation": 6.0, "external_work": 7.0, "numerical_dissipation": 8.0,
+            "turnover": 9.0, "newton_iterations": 10, "pace": null }"#;
+        let read: Totals = serde_json::from_str(older).expect("totals without damage and adhesion");
+        let expected = [1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 3.0, 0.0, 0.0, 0.0];
+        assert_eq!(read.energy.to_array()[..expected.len()], expected);
+        assert_eq!((read.turnover, read.newton_iterations), (9.0, 10));
     }
 
     #[test]

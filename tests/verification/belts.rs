@@ -64,7 +64,7 @@ fn moved<const D: usize, const S: usize>(
         assert!(outcome.inclusion_residual <= 1e-7, "{:e}\n{job}", outcome.inclusion_residual);
         found.push(run.state.velocity.owned().expect("velocity").to_vec());
     }
-    (found, run.totals.contact_dissipation)
+    (found, run.totals.energy.contact)
 }
 
 /// Who rides on a belt sees a floor at rest: all velocities differ by that of the belt, and friction takes the same energy.
@@ -137,8 +137,8 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
         }
         assert!(stuck > 4);
         // One half of the belt's work speeds the block up, the other goes into friction, but for the first order of the steps.
-        let (kinetic, work) = (run.totals.kinetic_energy, run.totals.external_work);
-        let dissipated = run.totals.contact_dissipation;
+        let (kinetic, work) = (run.totals.energy.kinetic, run.totals.energy.work);
+        let dissipated = run.totals.energy.contact;
         assert!(
             (work / kinetic - 2.0).abs() < 0.05 && (dissipated / kinetic - 1.0).abs() < 0.05,
             "{:?}",
@@ -242,7 +242,7 @@ fn rolled<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D
         };
         let [_, touching] = hold_against(session, &run, centre, surface);
         assert!(touching > 0.0, "it touches\n{job}");
-        assert!(run.totals.contact_dissipation > 0.0 && run.totals.external_work > 0.0, "{:?}", run.totals);
+        assert!(run.totals.energy.contact > 0.0 && run.totals.energy.work > 0.0, "{:?}", run.totals);
     }
 }
 

@@ -51,7 +51,7 @@ fn falling<const D: usize, const S: usize>(
         }
     }
     assert_eq!(run.state.step, 30);
-    assert!(run.totals.viscoplastic_dissipation < 1e-18, "no stress, no flow");
+    assert!(run.totals.energy.viscoplastic < 1e-18, "no stress, no flow");
 }
 
 /// A square of two triangles that can move along x on its right side only: two unknowns, whose modes are known.

@@ -315,13 +315,13 @@ pub fn random_jobs(session: &Session) {
         let (totals, job) = run(number, "lagged_euler");
         jobs.push(job);
         let present = [
-            totals.elastic_energy,
-            totals.viscous_dissipation,
-            totals.viscoplastic_dissipation,
-            totals.contact_dissipation,
-            totals.external_work,
-            totals.damage_dissipation,
-            totals.adhesion_dissipation,
+            totals.energy.elastic,
+            totals.energy.viscous,
+            totals.energy.viscoplastic,
+            totals.energy.contact,
+            totals.energy.work,
+            totals.energy.damage,
+            totals.energy.debonding,
         ];
         active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
     }

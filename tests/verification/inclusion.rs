@@ -78,7 +78,7 @@ pub fn at_rest(session: &Session) {
         let mut run = simulation::<2, 4>(session, &text, &mesh);
         while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
         assert_eq!(run.state.step, 80, "{text}");
-        assert!(run.totals.max_inclusion_residual <= 1e-6 && run.totals.elastic_energy > 0.05, "{text}");
+        assert!(run.totals.max_inclusion_residual <= 1e-6 && run.totals.energy.elastic > 0.05, "{text}");
     }
 }
 

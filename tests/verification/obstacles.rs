@@ -80,8 +80,8 @@ fn balanced<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
                 touched > 10 && open > 0 && open < points,
                 "{name}: {touched} steps, {open} open\n{text}"
             );
-            let given = run.totals.external_work;
-            assert!(given != 0.0 && run.totals.elastic_energy > 0.0, "{name} does no work\n{text}");
+            let given = run.totals.energy.work;
+            assert!(given != 0.0 && run.totals.energy.elastic > 0.0, "{name} does no work\n{text}");
         }
     }
 }
@@ -224,7 +224,7 @@ fn mixed_laws<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMe
     let [corner] = session.sum([corner as f64]);
     assert!(corner > 0.0, "both laws act at once somewhere on the edge\n{text}");
     let totals = &run.totals;
-    [totals.elastic_energy, totals.contact_dissipation, totals.viscous_dissipation, totals.external_work]
+    [totals.energy.elastic, totals.energy.contact, totals.energy.viscous, totals.energy.work]
 }
 
 /// An elastic bar of 1 m with waves of 10 m/s flies at 0.1 m/s into a wall 1 cm away: it touches from 0.1 s to 0.3 s under

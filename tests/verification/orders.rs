@@ -31,37 +31,37 @@ pub const EFFECTS: [Acting; 6] = [
         name: "linear flow",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5 }",
         contact: "",
-        sign: |totals| totals.viscoplastic_dissipation,
+        sign: |totals| totals.energy.viscoplastic,
     },
     Acting {
         name: "flow by a power, with hardening",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5, exponent = 2.0, hardening_modulus = 1.5 }",
         contact: "",
-        sign: |totals| totals.viscoplastic_dissipation,
+        sign: |totals| totals.energy.viscoplastic,
     },
     Acting {
         name: "flow on a cone",
         material: "viscoplasticity.drucker_prager = { relaxation = 2.0, friction_coefficient = 0.3, cohesion = 0.4 }",
         contact: "",
-        sign: |totals| totals.viscoplastic_dissipation,
+        sign: |totals| totals.energy.viscoplastic,
     },
     Acting {
         name: "damage",
         material: "damage = { threshold = 0.1, viscosity = 5.0 }",
         contact: "",
-        sign: |totals| totals.damage_dissipation,
+        sign: |totals| totals.energy.damage,
     },
     Acting {
         name: "adhesion",
         material: "",
         contact: "[contact.adhesion]\nstiffness = 3.0\nenergy = 0.1\nviscosity = 2.0\n",
-        sign: |totals| totals.adhesion_dissipation,
+        sign: |totals| totals.energy.debonding,
     },
     Acting {
         name: "memory",
         material: "",
         contact: "[contact.memory]\nstiffness_rate = 4.0\ndecay_time = 0.5\n",
-        sign: |totals| totals.contact_dissipation.abs(),
+        sign: |totals| totals.energy.contact.abs(),
     },
 ];
 
