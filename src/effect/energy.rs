@@ -85,6 +85,13 @@ energies! {
     Dissipated debonding = "adhesion_dissipation";
 }
 
+impl Energy {
+    /// The unit of all of them.
+    pub fn unit(dimension: usize) -> &'static str {
+        if dimension == 2 { "J/m" } else { "J" }
+    }
+}
+
 impl AddAssign for Energy {
     fn add_assign(&mut self, other: Self) {
         let (mut a, b) = (self.to_array(), other.to_array());

@@ -7,7 +7,10 @@ use super::{
     scale::{extent, number},
     table::Table,
 };
-use crate::error::Result;
+use crate::{
+    effect::{Energy, Role},
+    error::Result,
+};
 
 const TIME: Axis = Axis { quantity: "t", unit: "s" };
 /// Probes in one chart beyond which lines are not told apart.
@@ -48,30 +51,15 @@ pub fn probes(table: &Table) -> Result<Vec<Picture>> {
 
 /// Energies, dissipations with work, and what is missing in their balance. `unit` is that of energies.
 pub fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
-    let stored = ["kinetic_energy", "elastic_energy", "contact_energy"];
-    let spent = [
-        "external_work",
-        "viscous_dissipation",
-        "viscoplastic_dissipation",
-        "contact_dissipation",
-        "numerical_dissipation",
-    ];
-    let more: Vec<&str> = table
-        .header()
-        .iter()
-        .map(String::as_str)
-        .filter(|name| {
-            (name.ends_with("_energy") || name.ends_with("_dissipation"))
-                && !stored.contains(name)
-                && !spent.contains(name)
-        })
-        .collect();
-    let (more_stored, more_spent): (Vec<&str>, Vec<&str>) =
-        more.iter().partition(|name| name.ends_with("_energy"));
+    let columns = |roles: &[Role]| -> Vec<&str> {
+        let all = Energy::COLUMNS.into_iter().zip(Energy::ROLES);
+        all.filter(|(_, role)| roles.contains(role)).map(|(column, _)| column).collect()
+    };
+    let spent = [columns(&[Role::Work]), columns(&[Role::Dissipated, Role::Numerical])].concat();
     let mut out = Vec::new();
     for (name, quantity, columns) in [
-        ("energies", "energy", [&stored[..], &more_stored].concat()),
-        ("dissipation", "work and dissipation since t = 0", [&spent[..], &more_spent].concat()),
+        ("energies", "energy", columns(&[Role::Stored])),
+        ("dissipation", "work and dissipation since t = 0", spent),
     ] {
         out.extend(sums(table, name, quantity, unit, &columns)?);
     }

@@ -13,6 +13,7 @@ mod table;
 
 use crate::{
     drawing::{body, chart, colour, markup, picture, scale, view},
+    effect::Energy,
     error::{Error, Result},
     run::VERSION,
 };
@@ -186,7 +187,7 @@ fn time_sections(page: &mut Page, found: &Found) -> Result<()> {
         page.section("Energy", &paragraph("history.csv holds no steps yet."), vec![]);
         return Ok(());
     }
-    let unit = if found.dimension() == Some(2) { "J/m" } else { "J" };
+    let unit = Energy::unit(found.dimension().unwrap_or(3));
     page.section("Energy", "", history::energies(history, unit)?);
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
     page.section("Steps", "", history::steps(history, tolerance)?);

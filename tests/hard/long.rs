@@ -1,7 +1,10 @@
 //! Very many steps: no drift of the balance, no memory that grows, sums that keep their digits.
 
 use crate::{assert_close, case::Case, results::Results, thorough};
-use clarke::tensor::larger;
+use clarke::{
+    effect::{Energy, Role},
+    tensor::larger,
+};
 
 /// A million steps, or a sample.
 fn steps() -> usize {
@@ -11,15 +14,8 @@ fn steps() -> usize {
 /// What is in the body and what left it, less what was put in, over what was put in.
 fn missing(results: &Results) -> f64 {
     let history = results.table("history.csv");
-    let kept = [
-        "kinetic_energy",
-        "elastic_energy",
-        "viscous_dissipation",
-        "viscoplastic_dissipation",
-        "contact_dissipation",
-        "numerical_dissipation",
-    ];
-    let kept: f64 = kept.iter().map(|column| history.last(column)).sum();
+    let energies = Energy::COLUMNS.into_iter().zip(Energy::ROLES).filter(|(_, role)| *role != Role::Work);
+    let kept: f64 = energies.map(|(column, _)| history.last(column)).sum();
     (kept - history.last("external_work")).abs()
         / history.numbers("viscous_dissipation").last().expect("a step")
 }
