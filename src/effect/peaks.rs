@@ -5,13 +5,17 @@ use crate::{
     tensor::{dot, larger, von_mises_square},
 };
 use multiversion::multiversion;
+use serde::{Deserialize, Serialize};
 
-/// The largest stress and strain of a body after a step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// The largest stress and strain of a body after a step, or after any step of a run, as files name them.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Peaks {
     /// Largest von Mises norm of the total stress in Pa.
+    #[serde(rename = "max_von_mises")]
     pub von_mises: f64,
     /// Largest norm of the strain of the displacement, in plane stress of its part in the plane.
+    #[serde(rename = "max_strain")]
     pub strain: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
-    effect::{Energy, Role},
+    effect::{Energy, Peaks, Role},
     error::Result,
     stepping::{Pace, StepOutcome},
     tensor::larger,
@@ -45,10 +45,9 @@ pub struct Totals {
     pub max_energy_imbalance: f64,
     /// Largest inclusion residual of any step.
     pub max_inclusion_residual: f64,
-    /// Largest von Mises norm of the stress after any step, in Pa.
-    pub max_von_mises: f64,
-    /// Largest norm of the strain after any step.
-    pub max_strain: f64,
+    /// Largest stress and strain after any step.
+    #[serde(flatten)]
+    pub peaks: Peaks,
     /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
     pub max_slip_pressure: Option<f64>,
     /// Newton iterations.
@@ -104,8 +103,8 @@ impl Totals {
         self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
-        self.max_von_mises = larger(self.max_von_mises, outcome.peaks.von_mises);
-        self.max_strain = larger(self.max_strain, outcome.peaks.strain);
+        self.peaks.von_mises = larger(self.peaks.von_mises, outcome.peaks.von_mises);
+        self.peaks.strain = larger(self.peaks.strain, outcome.peaks.strain);
         self.newton_iterations += outcome.newton_iterations as u64;
         self.linear_iterations += outcome.linear_iterations as u64;
         self.guessed_steps += u64::from(outcome.solutions > 0);
@@ -121,8 +120,8 @@ impl Totals {
             self.turnover,
             self.max_energy_imbalance,
             self.max_inclusion_residual,
-            self.max_von_mises,
-            self.max_strain,
+            self.peaks.von_mises,
+            self.peaks.strain,
         ];
         most.iter().all(|most| most.is_finite())
     }
@@ -180,7 +179,6 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::Peaks;
 
     #[test]
     fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {

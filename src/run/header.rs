@@ -72,7 +72,7 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}, at the end {:.6}",
         summary.max_inclusion_residual,
         summary.max_energy_imbalance,
-        summary.max_von_mises,
+        summary.peaks.von_mises,
         summary.final_von_mises
     ));
     if let (Some(total), Some(share)) = (summary.error_indicator, summary.relative_error_indicator) {

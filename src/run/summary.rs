@@ -3,6 +3,7 @@
 use super::{Inventory, VERSION};
 use crate::{
     certificate::Certificates,
+    effect::Peaks,
     error::{Error, Result},
     output::whole_file::write_whole,
 };
@@ -62,10 +63,9 @@ pub struct Summary {
     pub restarted_from: Option<String>,
     /// Largest von Mises norm of sigma at the end, in Pa.
     pub final_von_mises: f64,
-    /// Largest von Mises norm of sigma after any step, in Pa.
-    pub max_von_mises: f64,
-    /// Largest norm of the strain after any step, in plane stress of its part in the plane.
-    pub max_strain: f64,
+    /// Largest stress and strain after any step.
+    #[serde(flatten)]
+    pub peaks: Peaks,
     /// Error indicator of the stress at the end, in J^(1/2), in two dimensions (J/m)^(1/2); absent unless asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_indicator: Option<f64>,
@@ -133,11 +133,11 @@ impl Summary {
                  known to have one solution; a smaller [time] step raises that bound"
             )
         });
-        let strain = (self.max_strain > LARGEST_STRAIN).then(|| {
+        let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {
             format!(
                 "the strain reached {:.3}, beyond {LARGEST_STRAIN}: the equations are those of small strains and take no account \
                  of the change of shape",
-                self.max_strain
+                self.peaks.strain
             )
         });
         slip.into_iter().chain(strain)
