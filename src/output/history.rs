@@ -199,6 +199,18 @@ mod tests {
     }
 
     #[test]
+    fn imbalances_are_relative_to_the_most_energy_turned_over_so_far() {
+        let step = |kinetic, work| StepOutcome {
+            energy: Energy { kinetic, work, ..Energy::default() },
+            ..StepOutcome::default()
+        };
+        let mut totals = Totals::default();
+        totals.add(&step(8.0, 8.0));
+        totals.add(&step(0.0, -7.0));
+        assert_eq!((totals.turnover, totals.energy_imbalance), (8.0, 0.125), "1 of 8 J lost");
+    }
+
+    #[test]
     fn totals_are_kept_by_column_and_those_of_older_checkpoints_are_read() {
         let energy = Energy::from_array(std::array::from_fn(|at| 0.5 + at as f64));
         let totals = Totals { energy, turnover: 20.0, newton_iterations: 3, ..Totals::default() };
