@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clarke::job::{
-    Job, Loaded, Mesh, MeshNames, Metric, Quadrature, Scheme, describe, describe_json, differing_keys,
+    Job, Loaded, Mesh, MeshNames, Quadrature, Scheme, describe, describe_json, differing_keys,
 };
+use clarke::material::Metric;
 use proptest::prelude::*;
 
 const SQUARE: &str = include_str!("../jobs/papers/wang_cheng_2022.toml");

@@ -123,7 +123,8 @@ mod tests {
         let field = 4 * 2 * 8;
         let (geometry, mesh) = square();
         let elasticity = Elasticity { youngs_modulus: 10.0, poisson_ratio: 0.3 };
-        let law = Viscoplasticity::Maxwell(Maxwell::new(elasticity, Hypothesis::PlaneStress, 0.5, None));
+        let law = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None };
+        let law = Viscoplasticity::Maxwell(law).prepare(&elasticity, Hypothesis::PlaneStress);
         let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry.runs, false);
         let with_history = body(vec![Box::new(history)], geometry.clone(), mesh.clone());
         let passes = with_history.pass_bytes();

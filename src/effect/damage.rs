@@ -4,7 +4,7 @@ use super::{
 };
 use crate::{
     lanes::{LANES, Pack},
-    material::{self, ByMaterial},
+    material::{self, ByMaterial, Elastic},
     space::{Batch, CellRun, Needs},
     tensor::{Mandel, add_scaled},
 };
@@ -20,7 +20,7 @@ use crate::{
 /// `(d_n - d_{n-1}) (Y_{n-1} + Y_n) / 2`.
 #[derive(Debug)]
 pub struct Damage {
-    laws: ByMaterial<material::Damage>,
+    laws: ByMaterial<Elastic<material::Damage>>,
     damage: CellHistory<1>,
     /// How a step advances the damage, if it is an implicit one.
     evolution: Option<Evolution>,
@@ -28,7 +28,7 @@ pub struct Damage {
 
 impl Damage {
     /// Sound cells, for the runs whose material has a law; damaged by the stress before a step or, in implicit steps, at its end.
-    pub fn new(laws: ByMaterial<material::Damage>, runs: &[CellRun], is_implicit: bool) -> Self {
+    pub fn new(laws: ByMaterial<Elastic<material::Damage>>, runs: &[CellRun], is_implicit: bool) -> Self {
         let damage = CellHistory::new("damage", runs, |material| laws.get(material).is_some());
         let evolution = is_implicit.then_some(Evolution { blend: Blend::euler(0.0), length: 0.0 });
         Self { laws, damage, evolution }
@@ -38,7 +38,7 @@ impl Damage {
 /// Writes the change of the derivative of a cell's stress by its strain rate, beyond `k' E`, where the cell bears `1 - damage` of the
 /// sound stress: `(1 - d) C - dd/dY S (x) C^T E^-1 S` with the derivative `C` of the sound stress `S`.
 fn weaken_tangent<const S: usize>(
-    law: &material::Damage,
+    law: &Elastic<material::Damage>,
     (damage, slope, length): (f64, f64, f64),
     sound: &Mandel<S>,
     beyond: &mut [f64],

@@ -1,6 +1,6 @@
 use super::{Effect, Energy, Form, Phases, Step, isotropic};
 use crate::{
-    material::{ByMaterial, Viscosity},
+    material::{ByMaterial, Isotropic},
     space::{Batch, CellMatrix, Integrity, Needs, Simplex},
 };
 
@@ -8,7 +8,7 @@ use crate::{
 #[derive(Debug)]
 pub struct ViscousStress {
     /// The viscosity tensor `A` in Pa s.
-    pub tensor: ByMaterial<Viscosity>,
+    pub tensor: ByMaterial<Isotropic>,
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
@@ -41,7 +41,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         Some(Form::Viscosity)
     }
 
-    fn tensor(&self, material: usize) -> Option<Viscosity> {
+    fn tensor(&self, material: usize) -> Option<Isotropic> {
         self.tensor.get(material).copied()
     }
 
@@ -52,7 +52,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
     }
 
     fn viscosity_modulus(&self) -> Option<f64> {
-        let smallest = self.tensor.laws().map(Viscosity::smallest_modulus::<S>).reduce(f64::min);
+        let smallest = self.tensor.laws().map(Isotropic::smallest_modulus::<S>).reduce(f64::min);
         if self.tensor.is_everywhere() { smallest } else { smallest.map(|modulus| modulus.min(0.0)) }
     }
 

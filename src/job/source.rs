@@ -115,6 +115,12 @@ impl Node {
         T::deserialize(self.find(path)?.plain()).ok()
     }
 
+    /// The choice of this name under `path` as a `T`, whatever stands beside it.
+    pub fn read_choice<T: DeserializeOwned>(&self, path: &str, name: &str) -> Option<T> {
+        let chosen = self.find(path)?.child(name)?.plain();
+        T::deserialize(toml::Value::Table([(name.to_owned(), chosen)].into_iter().collect())).ok()
+    }
+
     /// The value without its places.
     pub fn plain(&self) -> toml::Value {
         match &self.value {

@@ -13,25 +13,46 @@
 //! Problems with Adhesion or Damage, 2006. Without the gradient only the rate spreads damage: the slower the load, the
 //! thinner the band of cells in which it gathers.
 
-use super::Isotropic;
+use super::{Elastic, Elasticity, Hypothesis};
 use crate::tensor::Mandel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// A damage law at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Isotropic damage with a rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Damage {
-    /// Energy per volume in Pa above which damage grows.
+    /// Elastic energy per volume Y above which damage grows; stress squared over twice Young's modulus in tension.
+    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 50.0)]
     pub threshold: f64,
-    /// What slows it, in Pa s, positive.
+    /// What slows damage: Y at twice the threshold takes about viscosity/threshold to break a cell.
+    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 10.0)]
     pub viscosity: f64,
-    /// Power of what is left.
+    /// Power of what is left, 1 - d; 0 is Frémond and Nedjar's law.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 10), example = 1.0)]
     pub exponent: f64,
-    /// Damage that is never exceeded, below 1.
+    /// Damage that no cell exceeds; what then is left keeps broken cells from moving freely.
+    #[serde(default = "nearly_all")]
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1), example = 0.99)]
     pub largest: f64,
-    /// The elastic tensor `E`.
-    pub elasticity: Isotropic,
+}
+
+fn nearly_all() -> f64 {
+    0.99
 }
 
 impl Damage {
+    /// Why it needs elasticity.
+    pub const WITHOUT_ELASTICITY: &'static str = "damage without elasticity has nothing to weaken";
+
+    /// The law in a material of this elasticity.
+    pub fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Elastic<Self> {
+        Elastic { parameters: *self, elasticity: elasticity.tensor(hypothesis) }
+    }
+}
+
+impl Elastic<Damage> {
     /// `Y` in Pa at an elastic stress in Pa.
     #[inline(always)]
     pub fn release_rate<const S: usize>(&self, stress: &Mandel<S>) -> f64 {
@@ -41,32 +62,30 @@ impl Damage {
     /// The damage after a step of this length in s at this release rate.
     #[inline(always)]
     pub fn advance(&self, damage: f64, release_rate: f64, length: f64) -> f64 {
-        let excess = release_rate - self.threshold;
+        let Damage { threshold, viscosity, exponent, largest } = self.parameters;
+        let excess = release_rate - threshold;
         if excess <= 0.0 {
             return damage;
         }
-        let left = if self.exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(self.exponent) };
-        (damage + length * left * excess / self.viscosity).min(self.largest).max(damage)
+        let left = if exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(exponent) };
+        (damage + length * left * excess / viscosity).min(largest).max(damage)
     }
 
     /// Damage after a step of implicit Euler of this length in s from `start`, with `Y` in Pa at its end, and its derivative by `Y`
     /// in 1/Pa.
     pub fn relax(&self, start: f64, release_rate: f64, length: f64) -> [f64; 2] {
-        let growth = length * (release_rate - self.threshold) / self.viscosity;
-        if growth <= 0.0 || start >= self.largest {
-            return [start.min(self.largest), 0.0];
+        let Damage { threshold, viscosity, exponent, largest } = self.parameters;
+        let growth = length * (release_rate - threshold) / viscosity;
+        if growth <= 0.0 || start >= largest {
+            return [start.min(largest), 0.0];
         }
-        let left = |damage: f64| if self.exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(self.exponent) };
+        let left = |damage: f64| if exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(exponent) };
         // The root lies between these: what is left falls with damage. Newton's method, halving where it leaves them.
-        let (mut low, mut high) = (start, (start + growth * left(start)).min(self.largest));
+        let (mut low, mut high) = (start, (start + growth * left(start)).min(largest));
         if high - start <= growth * left(high) {
-            return if high < self.largest {
-                [high, length / self.viscosity * left(high)]
-            } else {
-                [self.largest, 0.0]
-            };
+            return if high < largest { [high, length / viscosity * left(high)] } else { [largest, 0.0] };
         }
-        let slope = |damage: f64| 1.0 + growth * self.exponent * (1.0 - damage).powf(self.exponent - 1.0);
+        let slope = |damage: f64| 1.0 + growth * exponent * (1.0 - damage).powf(exponent - 1.0);
         let mut damage = high;
         for _ in 0..100 {
             let excess = damage - start - growth * left(damage);
@@ -82,27 +101,26 @@ impl Damage {
             }
             damage = next;
         }
-        [damage, length / self.viscosity * left(damage) / slope(damage)]
+        [damage, length / viscosity * left(damage) / slope(damage)]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Elasticity, Hypothesis};
     use proptest::prelude::*;
 
     const GLASS: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.25 };
 
-    fn law(exponent: f64) -> Damage {
-        let elasticity = GLASS.tensor(Hypothesis::PlaneStress);
-        Damage { threshold: 0.5, viscosity: 10.0, exponent, largest: 0.9, elasticity }
+    fn law(exponent: f64) -> Elastic<Damage> {
+        let damage = Damage { threshold: 0.5, viscosity: 10.0, exponent, largest: 0.9 };
+        damage.prepare(&GLASS, Hypothesis::PlaneStress)
     }
 
     #[test]
     fn uniaxial_stress_releases_its_square_over_twice_youngs_modulus() {
         assert!((law(0.0).release_rate(&[40.0, 0.0, 0.0]) - 0.8).abs() < 1e-14);
-        let space = Damage { elasticity: GLASS.tensor(Hypothesis::Space), ..law(0.0) };
+        let space = Elastic { elasticity: GLASS.tensor(Hypothesis::Space), ..law(0.0) };
         assert!((space.release_rate(&[40.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - 0.8).abs() < 1e-14);
     }
 
@@ -138,14 +156,14 @@ mod tests {
         ) {
             let law = law(exponent);
             let [found, slope] = law.relax(start, release, length);
-            let growth = (length * (release - law.threshold) / law.viscosity).max(0.0);
+            let growth = (length * (release - law.parameters.threshold) / law.parameters.viscosity).max(0.0);
             let residual = found - start - growth * (1.0 - found).powf(exponent);
-            prop_assert!(start <= found && found <= law.largest);
-            prop_assert!(residual.abs() < 1e-12 * (1.0 + growth) || (found == law.largest && residual < 0.0), "{}", residual);
+            prop_assert!(start <= found && found <= law.parameters.largest);
+            prop_assert!(residual.abs() < 1e-12 * (1.0 + growth) || (found == law.parameters.largest && residual < 0.0), "{}", residual);
             let h = 1e-6 * (1.0 + release);
             let [[more, _], [less, _]] = [h, -h].map(|h| law.relax(start, release + h, length));
             let quotient = (more - less) / (2.0 * h);
-            let smooth = (release - law.threshold).abs() > 2.0 * h && more < law.largest;
+            let smooth = (release - law.parameters.threshold).abs() > 2.0 * h && more < law.parameters.largest;
             prop_assert!(!smooth || (quotient - slope).abs() <= 1e-5 * (slope + 1e-4), "{} {}", quotient, slope);
         }
 
@@ -159,7 +177,7 @@ mod tests {
             let next = law.advance(damage, release, length);
             prop_assert!(damage <= next && next <= 0.9);
             prop_assert!(release >= 0.0 && release * (next - damage) >= 0.0);
-            prop_assert!(release > law.threshold || next == damage);
+            prop_assert!(release > law.parameters.threshold || next == damage);
         }
 
         #[test]

@@ -1,24 +1,29 @@
-//! Material laws: pure functions at a point.
+//! Material laws: pure functions at a point, with their keys in the job file.
+//!
+//! A law is a file here: its parameters, as the job file has them, with units and ranges; its formula and source; what it can't be
+//! combined with. Viscoplastic laws are listed in `viscoplasticity.rs`.
 
 mod by_material;
 mod damage;
-mod drucker_prager;
-#[cfg(test)]
-mod fastest_rates;
-mod hardening;
+mod elasticity;
 mod isotropic;
-mod maxwell;
-mod perzyna;
-mod plane_projection;
-mod return_mapping;
 mod viscoplasticity;
+mod viscosity;
 
 pub use by_material::ByMaterial;
 pub use damage::Damage;
-pub use drucker_prager::DruckerPrager;
-pub use hardening::Hardening;
-pub use isotropic::{Elasticity, Hypothesis, Isotropic, Viscosity};
-pub use maxwell::Maxwell;
-pub use perzyna::{Metric, Perzyna};
-pub use return_mapping::{Extrapolated, Returned, Tangent};
-pub use viscoplasticity::Viscoplasticity;
+pub use elasticity::{Elastic, Elasticity, Hypothesis};
+pub use isotropic::Isotropic;
+pub use viscoplasticity::*;
+pub use viscosity::Viscosity;
+
+/// What is wrong with a key of a law that is in its range.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LawFault {
+    /// The key in the law's table.
+    pub key: &'static str,
+    /// What is wrong.
+    pub message: String,
+    /// What to do about it.
+    pub help: String,
+}

@@ -11,10 +11,7 @@ use crate::{
     },
     error::{Error, Result},
     job::{self, Fix, Job, Material, Named},
-    material::{
-        self, ByMaterial, DruckerPrager, Elasticity, Hardening, Hypothesis, Isotropic, Maxwell, Metric,
-        Perzyna, Viscoplasticity,
-    },
+    material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     mesh::Mesh,
     session::Session,
     space::{Geometry, surface_points},
@@ -93,15 +90,15 @@ fn effects<const D: usize, const S: usize>(
     if let Some(law) = by_material(materials, elastic_law::<S>) {
         effects.push(Box::new(effect::Elasticity::new(law, scheme.is_implicit())));
     }
-    let viscosity = |v: &job::Viscosity| Isotropic { volumetric: v.volumetric, shear: v.shear };
-    if let Some(tensor) = by_material(materials, |m| m.viscosity.as_ref().map(viscosity)) {
+    if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
         effects.push(Box::new(ViscousStress { tensor }));
     }
     let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
         effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs, scheme.is_implicit())));
     }
-    if let Some(laws) = by_material(materials, damage_law::<S>) {
+    let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
+    if let Some(laws) = by_material(materials, damage) {
         effects.push(Box::new(Damage::new(laws, &geometry.runs, scheme.is_implicit())));
     }
     Ok(effects)
@@ -134,69 +131,21 @@ fn surface_effects<const D: usize>(
     Ok(effects)
 }
 
-fn damage_law<const S: usize>(material: &Material) -> Option<material::Damage> {
-    let (damage, elastic) = (material.damage.as_ref()?, material.elasticity.as_ref()?);
-    Some(material::Damage {
-        threshold: damage.threshold,
-        viscosity: damage.viscosity,
-        exponent: damage.exponent,
-        largest: damage.largest,
-        elasticity: elasticity(elastic).tensor(Hypothesis::of(S)),
-    })
-}
-
 fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
     ByMaterial::new(materials.iter().map(|m| law(m)).collect())
 }
 
-fn elasticity(e: &job::Elasticity) -> Elasticity {
-    Elasticity { youngs_modulus: e.youngs_modulus, poisson_ratio: e.poisson_ratio }
-}
-
 fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
-    let tensor = elasticity(material.elasticity.as_ref()?).tensor(Hypothesis::of(S));
+    let tensor = material.elasticity?.tensor(Hypothesis::of(S));
     Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
 }
 
-fn flow_law<const S: usize>(material: &Material) -> Result<Option<Viscoplasticity>> {
-    let Some(viscoplasticity) = &material.viscoplasticity else { return Ok(None) };
-    let Some(elasticity) = material.elasticity.as_ref().map(elasticity) else {
-        return Err(Error::Refused("viscoplasticity needs elasticity in the same material".into()));
+fn flow_law<const S: usize>(material: &Material) -> Result<Option<FlowLaw>> {
+    let Some(law) = &material.viscoplasticity else { return Ok(None) };
+    let Some(elasticity) = &material.elasticity else {
+        return Err(Error::Refused(Viscoplasticity::WITHOUT_ELASTICITY.into()));
     };
-    let tensor = elasticity.tensor(Hypothesis::of(S));
-    Ok(Some(match viscoplasticity {
-        job::Viscoplasticity::Perzyna(p) => perzyna(p, tensor),
-        job::Viscoplasticity::Maxwell(m) => {
-            let volumetric = m.volumetric_relaxation_time;
-            let law = Maxwell::new(elasticity, Hypothesis::of(S), m.relaxation_time, volumetric);
-            Viscoplasticity::Maxwell(law)
-        }
-        job::Viscoplasticity::DruckerPrager(d) => Viscoplasticity::DruckerPrager(DruckerPrager {
-            relaxation: d.relaxation,
-            friction_coefficient: d.friction_coefficient,
-            cohesion: d.cohesion,
-            elasticity: tensor,
-        }),
-    }))
-}
-
-fn perzyna(p: &job::Perzyna, elasticity: Isotropic) -> Viscoplasticity {
-    let metric = match p.metric {
-        job::Metric::Elasticity => Metric::Elasticity,
-        job::Metric::Compliance => Metric::Compliance,
-        job::Metric::Frobenius => Metric::Frobenius,
-    };
-    let law = Perzyna {
-        relaxation: p.relaxation,
-        yield_stress: p.yield_stress,
-        exponent: p.exponent,
-        elasticity,
-        metric,
-    };
-    match p.hardening_modulus {
-        Some(modulus) => Viscoplasticity::Hardening(Hardening { perzyna: law, modulus }),
-        None => Viscoplasticity::Perzyna(law),
-    }
+    Ok(Some(law.prepare(elasticity, Hypothesis::of(S))))
 }
 
 /// The law of a contact, and the gap it is felt beyond.

@@ -30,7 +30,8 @@ pub use summary::Summary;
 use crate::{
     agreement::Agreed,
     error::{Exit, Result},
-    job::{self, Loaded},
+    job::Loaded,
+    material::Hypothesis,
     session::Session,
 };
 use std::{
@@ -77,7 +78,7 @@ macro_rules! on_the_mesh {
     ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{
         let mut loaded = $loaded;
         match (Scene::of($session, &mut loaded)?, loaded.job.material.hypothesis) {
-            (Scene::Two(mesh), Some(job::Hypothesis::PlaneStrain)) => {
+            (Scene::Two(mesh), Some(Hypothesis::PlaneStrain)) => {
                 $module::$function::<2, 4>($session, &loaded, mesh $(, $more)*)
             }
             (Scene::Two(mesh), _) => $module::$function::<2, 3>($session, &loaded, mesh $(, $more)*),

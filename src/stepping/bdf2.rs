@@ -8,7 +8,7 @@
 //!
 //! for velocity, displacement and, where it flows, history: a step of implicit Euler of length `k'` from the blend `x~`. The
 //! first step, and the first one in which a cell flows, is one of implicit Euler; where a cell stops to yield its flow ends
-//! (`material/return_mapping/extrapolated.rs`). A-stable for equal steps; steps may grow by up to `1 + √2` from one to the next
+//! (`return_mapping/extrapolated.rs` of the laws). A-stable for equal steps; steps may grow by up to `1 + √2` from one to the next
 //! for good. (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, chapter III.5.)
 
 use crate::effect::{Blend, Step};

@@ -5,7 +5,8 @@
 
 use allocation_counter::measure;
 use clarke::{
-    job::{Hypothesis, Job, Loaded},
+    job::{Job, Loaded},
+    material::Hypothesis,
     mesh::Mesh,
     run::{Clock, Scene, Simulation, Start, run},
     session::Session,

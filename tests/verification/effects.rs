@@ -9,7 +9,7 @@ use clarke::{
     },
     job::Job,
     lanes::LANES,
-    material::{self, ByMaterial, Isotropic, Metric, Perzyna, Viscoplasticity},
+    material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
     run::{Inventory, Simulation},
     session::Session,
     space::{Batch, CellMatrix, Geometry, Simplex},
@@ -164,14 +164,14 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     assert_eq!(seen.gathered["explicit"], ["strain"], "viscosity has no part in the explicit pass");
     assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"]);
 
-    let law = Perzyna {
+    let parameters = Perzyna {
         relaxation: 1.0,
         yield_stress: 1.0,
         exponent: 1.0,
-        elasticity: tensor,
+        hardening_modulus: None,
         metric: Metric::Elasticity,
     };
-    let laws = || ByMaterial::uniform(Viscoplasticity::Perzyna(law));
+    let laws = || ByMaterial::uniform(FlowLaw::Perzyna(Elastic { parameters, elasticity: tensor }));
     let runs = Geometry::new(&part(session, whole)).runs;
     let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
@@ -187,8 +187,8 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     assert_eq!(seen.gathered["explicit"], ["strain", "strain_rate"]);
 
     let elastic = || Elasticity::new(ByMaterial::uniform(ElasticLaw { tensor, with_history: false }), false);
-    let law =
-        material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9, elasticity: tensor };
+    let parameters = material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9 };
+    let law = Elastic { parameters, elasticity: tensor };
     let damage = || Damage::new(ByMaterial::uniform(law), &runs, false);
     let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]

@@ -6,6 +6,7 @@ use crate::scenes::{any_mesh, simulation};
 use clarke::{
     effect::{Form, Step},
     job::Job,
+    material::{Elasticity, Hypothesis, Metric, Parameters, Perzyna},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
@@ -131,20 +132,15 @@ fn creep<const D: usize, const S: usize>(
     let mut run = simulation::<D, S>(session, &under(scheme, &job), mesh);
     let mut stress = [0.0; S];
     stress[0] = pull;
-    let rate = clarke::material::Perzyna {
+    let law = Perzyna {
         relaxation,
         yield_stress,
         exponent: 1.0,
-        elasticity: clarke::material::Elasticity { youngs_modulus: modulus, poisson_ratio: 0.3 }.tensor(
-            if D == 2 {
-                clarke::material::Hypothesis::PlaneStress
-            } else {
-                clarke::material::Hypothesis::Space
-            },
-        ),
-        metric: clarke::material::Metric::Compliance,
-    }
-    .strain_rate(&stress)[0];
+        hardening_modulus: None,
+        metric: Metric::Compliance,
+    };
+    let elasticity = Elasticity { youngs_modulus: modulus, poisson_ratio: 0.3 };
+    let rate = law.prepare(&elasticity, Hypothesis::of(S)).strain_rate(&stress)[0];
     if D == 3 {
         assert!((rate - 2.0 / 3.0 * (pull - yield_stress) / (2.0 * relaxation)).abs() < 1e-14);
     }

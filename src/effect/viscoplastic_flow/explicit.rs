@@ -6,41 +6,50 @@ use super::ViscoplasticFlow;
 use crate::{
     effect::{Energy, Step},
     lanes::{LANES, Pack, sum},
-    material::{Isotropic, Viscoplasticity},
+    material::{Flow, FlowLaw},
     space::{Batch, Integrity, SimplexPack},
-    tensor::{Mandel, add_scaled, dot},
+    tensor::{add_scaled, dot},
 };
 use multiversion::multiversion;
 
 /// What advances the history of a batch.
 struct Advance<'a, const D: usize, const S: usize> {
-    elasticity: Isotropic,
+    law: &'a FlowLaw,
     step: Step,
     cells: &'a SimplexPack<D>,
     strain: &'a Pack<S>,
     rate: &'a Pack<S>,
     integrity: &'a Integrity,
+    /// Accumulated viscoplastic strain, and its growth, of laws that harden.
+    accumulated: &'a [f64; LANES],
+    growths: &'a mut [f64; LANES],
 }
 
-/// Advances the history and adds it to the stress. `flow` gives the strain rates of the cells from their stresses, or nothing if
-/// none flows. Gives the energies that the flow takes up and that the scheme adds.
+/// Advances the history and adds it to the stress. Gives the energies that the flow takes up and that the scheme adds, and the
+/// largest overstress under power laws.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn advance<const D: usize, const S: usize>(
     given: Advance<'_, D, S>,
     (converged, trial): (&Pack<S>, &mut Pack<S>),
     stress: &mut Pack<S>,
-    flow: impl FnOnce(&Pack<S>) -> Option<Pack<S>>,
-) -> [f64; 2] {
-    let Advance { elasticity, step, cells, strain, rate, integrity } = given;
+) -> [f64; 3] {
+    let Advance { law, step, cells, strain, rate, integrity, accumulated, growths } = given;
+    let elasticity = *law.elasticity();
     let lagged = Pack::from_lanes(|lane| {
         let strain = add_scaled(&strain.lane(lane), -step.previous_length, &rate.lane(lane));
         add_scaled(&elasticity.apply(&strain), 1.0, &converged.lane(lane))
     });
     let share = integrity.shares();
-    let Some(flow) = flow(&lagged) else {
+    let mut overstress = 0.0f64;
+    if law.is_power_law() {
+        for lane in 0..LANES {
+            overstress = overstress.max(law.overstress(&lagged.lane(lane), accumulated[lane]));
+        }
+    }
+    let Some(flow) = law.rates(&lagged, accumulated, growths) else {
         *trial = *converged;
         *stress = Pack::from_lanes(|lane| add_scaled(&stress.lane(lane), share[lane], &converged.lane(lane)));
-        return [0.0; 2];
+        return [0.0, 0.0, overstress];
     };
     let [mut dissipated, mut numerical] = [[0.0; LANES]; 2];
     for lane in 0..LANES {
@@ -55,16 +64,7 @@ fn advance<const D: usize, const S: usize>(
         numerical[lane] =
             weight * (0.5 * step.length * dot(&release, &flow) - step.previous_length * dot(&lag, &flow));
     }
-    [sum(&dissipated), sum(&numerical)]
-}
-
-/// Strain rates of a law that knows one cell at a time.
-#[inline(always)]
-fn one_by_one<const S: usize>(
-    stresses: &Pack<S>,
-    mut rate: impl FnMut(usize, &Mandel<S>) -> Mandel<S>,
-) -> Option<Pack<S>> {
-    Some(Pack::from_lanes(|lane| rate(lane, &stresses.lane(lane))))
+    [sum(&dissipated), sum(&numerical), overstress]
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {
@@ -78,47 +78,24 @@ impl<const S: usize> ViscoplasticFlow<S> {
     ) -> f64 {
         let Some(law) = self.laws.get(batch.material) else { return 0.0 };
         let Some(histories) = self.stress.both(batch.number) else { return 0.0 };
+        let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both(batch.number));
+        let mut growths = [0.0; LANES];
         let given = Advance {
-            elasticity: *law.elasticity(),
+            law,
             step,
             cells: batch.cells,
             strain: &batch.strain,
             rate: &batch.strain_rate,
             integrity: &batch.integrity,
+            accumulated: accumulated.as_ref().map_or(&[0.0; LANES], |(Pack([before]), _)| before),
+            growths: &mut growths,
         };
-        let stress = &mut batch.stress;
-        let mut overstress = 0.0f64;
-        let [dissipated, numerical] = match law {
-            Viscoplasticity::Perzyna(law) if law.exponent == 1.0 => {
-                advance(given, histories, stress, |all: &_| law.strain_rates(all))
+        let [dissipated, numerical, overstress] = advance(given, histories, &mut batch.stress);
+        if let Some((Pack([before]), Pack([after]))) = &mut accumulated {
+            for lane in 0..LANES {
+                after[lane] = before[lane] + step.length * growths[lane];
             }
-            Viscoplasticity::Perzyna(law) => advance(given, histories, stress, |all: &Pack<S>| {
-                for lane in 0..LANES {
-                    overstress = overstress.max(law.overstress(&all.lane(lane)));
-                }
-                law.strain_rates(all)
-            }),
-            Viscoplasticity::Maxwell(law) => {
-                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
-            }
-            Viscoplasticity::DruckerPrager(law) => {
-                advance(given, histories, stress, |all: &_| one_by_one(all, |_, s| law.strain_rate(s)))
-            }
-            Viscoplasticity::Hardening(law) => {
-                let accumulated = self.accumulated.as_mut().and_then(|a| a.both(batch.number));
-                let Some((Pack([before]), Pack([after]))) = accumulated else { return 0.0 };
-                advance(given, histories, stress, |all: &_| {
-                    one_by_one(all, |lane, s| {
-                        if law.perzyna.exponent != 1.0 {
-                            overstress = overstress.max(law.overstress(s, before[lane]));
-                        }
-                        let (rate, growth) = law.strain_rate(s, before[lane]);
-                        after[lane] = before[lane] + step.length * growth;
-                        rate
-                    })
-                })
-            }
-        };
+        }
         energy.viscoplastic += dissipated;
         energy.numerical += numerical;
         if overstress > 0.0 { law.fastest_rate::<S>(overstress) } else { 0.0 }
@@ -130,7 +107,7 @@ mod tests {
     use super::*;
     use crate::{
         effect::Effect,
-        material::{ByMaterial, Elasticity, Hardening, Hypothesis, Maxwell, Metric, Perzyna},
+        material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Metric, Perzyna, Viscoplasticity},
         space::{
             Geometry, Needs, Nodal,
             samples::{number, row},
@@ -143,20 +120,10 @@ mod tests {
     ];
     const ELASTICITY: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
 
-    /// The flow of a law in a cell, and the growth of the accumulated strain.
-    fn flow<const S: usize>(law: &Viscoplasticity, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
-        match law {
-            Viscoplasticity::Perzyna(law) => (law.strain_rate(s), 0.0),
-            Viscoplasticity::Maxwell(law) => (law.strain_rate(s), 0.0),
-            Viscoplasticity::DruckerPrager(law) => (law.strain_rate(s), 0.0),
-            Viscoplasticity::Hardening(law) => law.strain_rate(s, accumulated),
-        }
-    }
-
     /// What two steps leave, of cells whose runs are cut as `material` has it: forces, histories, energies, cells that flow.
     /// Each history has the bits of a cell that is alone.
     fn two_steps<const D: usize, const S: usize>(
-        law: Viscoplasticity,
+        law: FlowLaw,
         material: fn(usize) -> usize,
     ) -> (Vec<f64>, Vec<f64>, [f64; 2], usize) {
         let mesh = row::<D>();
@@ -186,7 +153,7 @@ mod tests {
                     let stress = add_scaled(&law.elasticity().apply(&strain), 1.0, &start);
                     let before = effect.accumulated.as_ref().and_then(|a| a.converged(batch.number));
                     let before = before.map_or(0.0, |before| before.0[0][lane]);
-                    let (rate, growth) = flow(&law, &stress, before);
+                    let (rate, growth) = law.rate(&stress, before);
                     flowing += usize::from(rate != [0.0; S]);
                     let expected = add_scaled(&start, -step.length, &law.elasticity().apply(&rate));
                     let (_, trial) = effect.stress.both(batch.number).expect("a history");
@@ -205,24 +172,23 @@ mod tests {
     }
 
     fn check<const D: usize, const S: usize>(hypothesis: Hypothesis) {
-        let elasticity = ELASTICITY.tensor(hypothesis);
         let perzyna = Perzyna {
             relaxation: 100.0,
             yield_stress: 3.0,
             exponent: 1.0,
-            elasticity,
+            hardening_modulus: None,
             metric: Metric::Elasticity,
         };
         let laws = [
             Viscoplasticity::Perzyna(perzyna),
             Viscoplasticity::Perzyna(Perzyna { exponent: 2.5, ..perzyna }),
-            Viscoplasticity::Hardening(Hardening { perzyna, modulus: 50.0 }),
-            Viscoplasticity::Maxwell(Maxwell::new(ELASTICITY, hypothesis, 0.5, None)),
+            Viscoplasticity::Perzyna(Perzyna { hardening_modulus: Some(50.0), ..perzyna }),
+            Viscoplasticity::Maxwell(Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None }),
         ];
-        for law in laws {
+        for law in laws.map(|law| law.prepare(&ELASTICITY, hypothesis)) {
             let (forces, histories, energies, flowing) = two_steps::<D, S>(law, |_| 0);
             let cells = 2 * row::<D>().cell_regions.len();
-            let all = matches!(law, Viscoplasticity::Maxwell(_));
+            let all = law.equivalent_stress(&[0.0; S]).is_none();
             assert!(flowing > cells / 4 && (flowing < cells) != all, "{flowing} of {cells}");
             let cut = two_steps::<D, S>(law, |region| region);
             assert_eq!((forces, histories, flowing), (cut.0, cut.1, cut.3), "other packs, the same bits");

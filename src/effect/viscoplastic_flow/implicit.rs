@@ -1,6 +1,6 @@
 //! Flow at the end of a step: `H_n = H~ + k' G(s_n)` with `s_n = E e(u_n) + H_n`, solved in each cell by the law's return mapping.
 //!
-//! Of the flow `H_{n-1} - H~` that a two-step formula extrapolates a cell takes the share that [`Viscoplasticity::continue_flow`]
+//! Of the flow `H_{n-1} - H~` that a two-step formula extrapolates a cell takes the share that [`FlowLaw::continue_flow`]
 //! finds: what does not yield keeps `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run
 //! does.
 
@@ -8,7 +8,7 @@ use super::ViscoplasticFlow;
 use crate::{
     effect::{Blend, Energy, Step, Tangents},
     lanes::Pack,
-    material::{Extrapolated, Tangent, Viscoplasticity},
+    material::{Extrapolated, Flow, FlowLaw, Tangent},
     space::Batch,
     tensor::{Mandel, add_scaled, dot},
 };
@@ -69,7 +69,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         batch: &Batch<D, S>,
         energy: &mut Energy,
     ) {
-        let Some(elasticity) = self.laws.get(batch.material).map(Viscoplasticity::elasticity) else { return };
+        let Some(elasticity) = self.laws.get(batch.material).map(FlowLaw::elasticity) else { return };
         let Some((converged, trial)) = self.stress.both(batch.number) else { return };
         let (share, two_steps) = (batch.integrity.shares(), blend.earlier != 0.0);
         for lane in 0..batch.count {
@@ -102,7 +102,7 @@ fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, factor: f64, adde
 }
 
 /// `(T - I) k' E`: what flow takes from the derivative of the stress by the strain rate.
-fn loss<const S: usize>(law: &Viscoplasticity, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
+fn loss<const S: usize>(law: &FlowLaw, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
     // E is symmetric, so that it may be applied to the rows.
     std::array::from_fn(|i| {
         let mut row = tangent[i];

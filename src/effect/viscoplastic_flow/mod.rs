@@ -6,7 +6,7 @@ use super::{
     cell_history::CellHistory, isotropic,
 };
 use crate::{
-    material::{ByMaterial, Viscoplasticity},
+    material::{ByMaterial, Flow, FlowLaw},
     space::{Batch, CellRun, Integrity, Needs},
 };
 
@@ -14,7 +14,7 @@ use crate::{
 /// viscoplastic strain that hardening cells accumulate.
 #[derive(Debug)]
 pub struct ViscoplasticFlow<const S: usize> {
-    laws: ByMaterial<Viscoplasticity>,
+    laws: ByMaterial<FlowLaw>,
     stress: CellHistory<S>,
     accumulated: Option<CellHistory<1>>,
     update: Update,
@@ -31,18 +31,18 @@ enum Update {
 
 impl<const S: usize> ViscoplasticFlow<S> {
     /// No history yet, for the cells of these runs whose material has a law, which flow at the end of steps or at their start.
-    pub fn new(laws: ByMaterial<Viscoplasticity>, runs: &[CellRun], is_implicit: bool) -> Self {
+    pub fn new(laws: ByMaterial<FlowLaw>, runs: &[CellRun], is_implicit: bool) -> Self {
         let flows = |material: usize| laws.get(material).is_some();
-        let hardens = |material: usize| laws.get(material).is_some_and(Viscoplasticity::hardens);
+        let hardens = |material: usize| laws.get(material).is_some_and(FlowLaw::hardens);
         let stress = CellHistory::new("viscoplastic_history", runs, flows);
         let accumulated = laws
             .laws()
-            .any(Viscoplasticity::hardens)
+            .any(FlowLaw::hardens)
             .then(|| CellHistory::new("equivalent_viscoplastic_strain", runs, hardens));
         let update = if is_implicit {
             Update::Implicit { blend: Blend::euler(0.0), length: 0.0 }
         } else {
-            Update::Explicit { fastest: laws.laws().any(Viscoplasticity::is_power_law).then_some(0.0) }
+            Update::Explicit { fastest: laws.laws().any(FlowLaw::is_power_law).then_some(0.0) }
         };
         Self { laws, stress, accumulated, update }
     }
@@ -103,7 +103,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
     }
 
     fn has_symmetric_tangent(&self) -> bool {
-        self.laws.laws().all(Viscoplasticity::has_symmetric_tangent::<S>)
+        self.laws.laws().all(FlowLaw::has_symmetric_tangent::<S>)
     }
 
     fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {

@@ -1,11 +1,11 @@
-//! The job as plain structs: the single source of every key's name, meaning, unit, range and default.
+//! The job as plain structs: the single source of every key's name, meaning, unit, range and default. Those of material laws stand
+//! with the laws.
 //!
 //! Doc comments become the text of `solver describe`; the `schemars` attributes become the ranges that
 //! `validate` checks before these structs are filled.
 
 mod boundary;
 mod contact;
-mod damage;
 mod material;
 mod mesh;
 mod output;
@@ -14,11 +14,7 @@ mod time;
 pub use crate::contact::Quadrature;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
 pub use contact::Contact;
-pub use damage::Damage;
-pub use material::{
-    DruckerPrager, Elasticity, Hypothesis, Material, Maxwell, Metric, Perzyna, Region, Viscoplasticity,
-    Viscosity,
-};
+pub use material::{Material, Region};
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{

@@ -1,7 +1,8 @@
 //! Materials: effects that need each other, and what depends on the dimension.
 
 use super::{Findings, MeshNames, items};
-use crate::job::document::{Diagonal, Elasticity, Hypothesis, Perzyna, Viscoplasticity, Viscosity};
+use crate::job::document::Diagonal;
+use crate::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
 
 /// Poisson's ratio above which P1 elements lock.
 const LOCKING: f64 = 0.45;
@@ -9,16 +10,6 @@ const LOCKING: f64 = 0.45;
 fn materials(findings: &Findings<'_>) -> Vec<String> {
     let regions = items(findings.root, "region").into_iter().map(|region| format!("{region}.material"));
     std::iter::once("material".to_owned()).chain(regions).collect()
-}
-
-/// Whether a material flows without a change of its volume.
-fn keeps_volume(findings: &Findings<'_>, path: &str) -> bool {
-    match findings.root.read(&format!("{path}.viscoplasticity")) {
-        None => false,
-        Some(Viscoplasticity::Perzyna(_)) => true,
-        Some(Viscoplasticity::Maxwell(law)) => law.volumetric_relaxation_time.is_none(),
-        Some(Viscoplasticity::DruckerPrager(law)) => law.friction_coefficient == 0.0,
-    }
 }
 
 /// Whatever the dimension.
@@ -33,22 +24,19 @@ pub fn check(findings: &mut Findings<'_>) {
                 format!("[{path}] resists nothing: it has neither density, elasticity nor viscosity");
             findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
         }
-        if present("viscoplasticity") && !present("elasticity") {
-            let message = "viscoplasticity without elasticity has no stress to relax";
-            findings.fault(&format!("{path}.viscoplasticity"), message, format!("add [{path}.elasticity]"));
-        }
-        if present("damage") && !present("elasticity") {
-            let message = "damage without elasticity has nothing to weaken";
-            findings.fault(&format!("{path}.damage"), message, format!("add [{path}.elasticity]"));
-        }
-        if let Some(Perzyna { yield_stress, exponent, .. }) =
-            root.read(&format!("{path}.viscoplasticity.perzyna"))
-            && yield_stress == 0.0
-            && exponent != 1.0
+        for (key, message) in
+            [("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY), ("damage", Damage::WITHOUT_ELASTICITY)]
         {
-            let message = "a power of the overstress over the yield stress needs a positive yield stress";
-            let help = "give a positive yield_stress, or leave exponent out";
-            findings.fault(&format!("{path}.viscoplasticity.perzyna.exponent"), message, help);
+            if present(key) && !present("elasticity") {
+                findings.fault(&format!("{path}.{key}"), message, format!("add [{path}.elasticity]"));
+            }
+        }
+        for (name, _) in Viscoplasticity::NAMES {
+            let law: Option<Viscoplasticity> = root.read_choice(&format!("{path}.viscoplasticity"), name);
+            if let Some(fault) = law.and_then(|law| law.fault()) {
+                let key = format!("{path}.viscoplasticity.{name}.{}", fault.key);
+                findings.fault(&key, fault.message, fault.help);
+            }
         }
         if path != "material" && present("hypothesis") {
             let message = "the hypothesis holds for the whole body";
@@ -97,22 +85,17 @@ pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         findings.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
     }
     for path in materials(findings) {
-        let cone = format!("{path}.viscoplasticity.drucker_prager");
-        if hypothesis == Some(Hypothesis::PlaneStress) && root.find(&cone).is_some() {
-            let message = "Drucker and Prager's law is not for plane stress";
-            findings.fault(&cone, message, "take hypothesis = \"plane_strain\", a 3D body or another law");
-        }
-        if let Some(Viscosity { volumetric, shear }) = root.read(&format!("{path}.viscosity")) {
-            let modulus = dimension as f64 * volumetric + shear;
-            if modulus <= 0.0 && shear > 0.0 {
-                let message =
-                    format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}");
-                let least = -shear / dimension as f64;
-                let help = format!("volumetric must be above {least}");
-                findings.fault(&format!("{path}.viscosity.volumetric"), message, help);
-            }
+        let viscosity: Option<Viscosity> = root.read(&format!("{path}.viscosity"));
+        if let Some(fault) = viscosity.and_then(|law| law.fault(dimension)) {
+            findings.fault(&format!("{path}.viscosity.{}", fault.key), fault.message, fault.help);
         }
         if hypothesis == Some(Hypothesis::PlaneStress) {
+            for (name, refusal) in Viscoplasticity::NAMES {
+                let law = format!("{path}.viscoplasticity.{name}");
+                if let Some([message, help]) = refusal.filter(|_| root.find(&law).is_some()) {
+                    findings.fault(&law, message, help);
+                }
+            }
             continue;
         }
         let remedy = if dimension == 2 {
@@ -129,7 +112,8 @@ pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
             ));
         }
         let crossed = root.read("mesh.rectangle.diagonal") == Some(Diagonal::Crossed);
-        if !crossed && keeps_volume(findings, &path) {
+        let law: Option<Viscoplasticity> = root.read(&format!("{path}.viscoplasticity"));
+        if !crossed && law.is_some_and(|law| law.keeps_volume()) {
             findings.warnings.push(format!(
                 "{path}.viscoplasticity keeps the volume: linear elements lock where all around them flows, whatever Poisson's \
                  ratio; expect bodies that carry too much, by 10 to 30 % on common meshes; {remedy}"

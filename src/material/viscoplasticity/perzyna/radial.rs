@@ -10,10 +10,16 @@
 //! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`. Else its logarithm is solved for that of
 //! `f`, so that neither large exponents nor overstresses far beyond the yield stress take many iterations or overflow.
 
-use super::{Tangent, add_product};
+use super::Perzyna;
 use crate::{
-    material::Hardening,
-    tensor::{Mandel, normal_components, trace},
+    material::{
+        Elastic, Tangent,
+        viscoplasticity::{
+            Flow,
+            return_mapping::{add_product, write_isotropic},
+        },
+    },
+    tensor::{Mandel, dot, normal_components, trace},
 };
 
 /// More than any law takes.
@@ -21,15 +27,16 @@ const ITERATIONS: usize = 100;
 
 /// Flow of the step, and growth of the accumulated strain. `start` holds `q*` and `Y*`.
 pub(super) fn flow<const S: usize>(
-    law: &Hardening,
+    law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
     length: f64,
     start: (f64, f64),
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
     let (norm, yield_stress) = start;
-    let (shear, hardening, power) = (law.perzyna.elasticity.shear, law.modulus, law.perzyna.exponent);
-    let rate = length / (3.0 * law.perzyna.relaxation);
+    let Perzyna { relaxation, exponent: power, .. } = law.parameters;
+    let (shear, hardening) = (law.elasticity.shear, law.hardening_modulus());
+    let rate = length / (3.0 * relaxation);
     let stiffness = 1.5 * shear + hardening;
     let excess = norm - yield_stress;
     let (growth, growing) = if power == 1.0 {
@@ -43,7 +50,8 @@ pub(super) fn flow<const S: usize>(
     deviator.iter_mut().take(normal_components::<S>()).for_each(|d| *d -= mean);
     if let Some(tangent) = tangent {
         let (scale, slope) = (1.0 - 1.5 * shear * growth / norm, 1.0 - 1.5 * shear * growing);
-        write_tangent(tangent, &deviator, scale, slope);
+        write_isotropic(tangent, 1.0, scale);
+        add_product(tangent, (slope - scale) / dot(&deviator, &deviator), &deviator, &deviator);
     }
     (deviator.map(|d| 1.5 * growth / norm * d), growth)
 }
@@ -87,17 +95,4 @@ fn softplus(x: f64) -> f64 {
 /// `e^x / (1 + e^x)`.
 fn share(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
-}
-
-/// The tangent of scaling the deviator by `scale`, its length growing by `slope`.
-fn write_tangent<const S: usize>(tangent: &mut Tangent<S>, deviator: &Mandel<S>, scale: f64, slope: f64) {
-    let normal = normal_components::<S>();
-    let square = crate::tensor::dot(deviator, deviator);
-    for i in 0..S {
-        for j in 0..S {
-            let volumetric = if i < normal && j < normal { (1.0 - scale) / 3.0 } else { 0.0 };
-            tangent[i][j] = volumetric + if i == j { scale } else { 0.0 };
-        }
-    }
-    add_product(tangent, (slope - scale) / square, deviator, deviator);
 }

@@ -1,23 +1,19 @@
 //! Implicit flow: the stress at the end of a step, `s = s* - k E X(s)`, from the stress `s*` that the step would end with
 //! if nothing flowed.
 //!
-//! Each law comes down to one scalar equation, or to none: radial laws in the overstress (`radial`), Perzyna's law in plane
-//! stress in the multiplier of its projection (`plane_stress`), Drucker-Prager and Maxwell in closed form. The tangent
-//! `ds/ds*` is that of the mapping itself (the algorithmic or consistent one), so that Newton's method on whole bodies keeps
-//! its order. As the relaxation tends to 0 the mappings tend to those of rate-independent plasticity.
+//! Each law comes down to one scalar equation, or to none ([`Flow::flow_to_end`]). The tangent `ds/ds*` is that of the mapping itself
+//! (the algorithmic or consistent one), so that Newton's method on whole bodies keeps its order. As the relaxation of laws with a yield
+//! surface tends to 0 their mappings tend to those of rate-independent plasticity.
 //!
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3; E. de Souza Neto, D. Peric, D. Owen,
 //! Computational Methods for Plasticity, 2008, chapters 7 to 11.)
 
 mod extrapolated;
-mod linear;
-mod plane_stress;
-mod radial;
 
 pub use extrapolated::Extrapolated;
 
-use super::{Hardening, Viscoplasticity};
-use crate::tensor::{Mandel, add_scaled};
+use super::{Flow, FlowLaw};
+use crate::tensor::{Mandel, add_scaled, normal_components};
 
 /// A square matrix over the components of a stress.
 pub type Tangent<const S: usize> = [[f64; S]; S];
@@ -33,7 +29,7 @@ pub struct Returned<const S: usize> {
     pub accumulated: f64,
 }
 
-impl Viscoplasticity {
+impl FlowLaw {
     /// Flows for `length` s from the stress `trial` that would be there without flow; `accumulated` is the viscoplastic
     /// strain of hardening before. `None` where nothing flows, the tangent being the identity. Where the caller wants it, the
     /// tangent `ds/ds*` is written.
@@ -44,52 +40,30 @@ impl Viscoplasticity {
         accumulated: f64,
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<Returned<S>> {
-        let flow = match self {
-            Self::Perzyna(law) => {
-                let law = Hardening { perzyna: *law, modulus: 0.0 };
-                overstress(&law, trial, length, accumulated, tangent)?
-            }
-            Self::Hardening(law) => overstress(law, trial, length, accumulated, tangent)?,
-            Self::Maxwell(law) => (linear::maxwell(law, trial, length, tangent), 0.0),
-            Self::DruckerPrager(law) => (linear::drucker_prager(law, trial, length, tangent)?, 0.0),
-        };
-        let (flow, growth) = flow;
+        let (flow, growth) = self.flow_to_end(trial, length, accumulated, tangent)?;
         let stress = add_scaled(trial, -1.0, &self.elasticity().apply(&flow));
         Some(Returned { stress, flow, accumulated: accumulated + growth })
     }
+}
 
-    /// Whether the tangent times `E` is symmetric, as it is where flow is associated.
-    pub fn has_symmetric_tangent<const S: usize>(&self) -> bool {
-        match self {
-            Self::Perzyna(_) | Self::Hardening(_) => S != 3,
-            Self::Maxwell(_) | Self::DruckerPrager(_) => true,
+/// Writes the tangent that is `along` on multiples of the identity and `across` on the rest.
+pub(super) fn write_isotropic<const S: usize>(tangent: &mut Tangent<S>, along: f64, across: f64) {
+    let normal = normal_components::<S>();
+    for i in 0..S {
+        for j in 0..S {
+            let shared = if i < normal && j < normal { (along - across) / normal as f64 } else { 0.0 };
+            tangent[i][j] = shared + if i == j { across } else { 0.0 };
         }
     }
 }
 
-/// Flow of the step and growth of the accumulated strain, outside the yield surface.
-fn overstress<const S: usize>(
-    law: &Hardening,
-    trial: &Mandel<S>,
-    length: f64,
-    accumulated: f64,
-    tangent: Option<&mut Tangent<S>>,
-) -> Option<(Mandel<S>, f64)> {
-    let yield_stress = law.perzyna.yield_stress + law.modulus * accumulated;
-    let norm = crate::tensor::von_mises(trial);
-    if norm <= yield_stress {
-        return None;
-    }
-    let start = (norm, yield_stress);
-    Some(if S == 3 {
-        plane_stress::flow(law, trial, length, start, tangent)
-    } else {
-        radial::flow(law, trial, length, start, tangent)
-    })
-}
-
 /// Adds `factor * a b^T`.
-fn add_product<const S: usize>(tangent: &mut Tangent<S>, factor: f64, a: &Mandel<S>, b: &Mandel<S>) {
+pub(super) fn add_product<const S: usize>(
+    tangent: &mut Tangent<S>,
+    factor: f64,
+    a: &Mandel<S>,
+    b: &Mandel<S>,
+) {
     for i in 0..S {
         for j in 0..S {
             tangent[i][j] += factor * a[i] * b[j];
@@ -99,7 +73,7 @@ fn add_product<const S: usize>(tangent: &mut Tangent<S>, factor: f64, a: &Mandel
 
 /// The root of an increasing function that is negative at `low` and not at `high`, by Newton's method kept inside a bracket.
 /// `function` gives value and derivative.
-fn increasing_root(
+pub(super) fn increasing_root(
     mut low: f64,
     mut high: f64,
     start: f64,

@@ -14,12 +14,8 @@
 //! does at the least. Nor does it feed energy, as `s*:m >= 0`. Of steady flow less than half is extrapolated, however long the
 //! steps are, `w / (1 + 2 w)` at the ratio `w` of two steps; so `phi` is 1 where flow is smooth, and the formula keeps its order.
 
-use super::{Returned, Tangent, add_product};
-use crate::{
-    material::Viscoplasticity,
-    tensor::{Mandel, add_scaled, dot, normal_components, trace, von_mises},
-};
-use std::f64::consts::FRAC_1_SQRT_2;
+use super::{Flow, FlowLaw, Returned, Tangent, add_product};
+use crate::tensor::{Mandel, add_scaled, dot};
 
 /// What a two-step formula extrapolates of the flow of the step before.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +32,7 @@ struct Share<const S: usize> {
     gradient: Option<Mandel<S>>,
 }
 
-impl Viscoplasticity {
+impl FlowLaw {
     /// Flows for `length` s, and on with what is extrapolated, from the stress `elastic` that would be there without flow;
     /// `accumulated` is the viscoplastic strain of hardening before. `None` where nothing flows. Where the caller wants it, the
     /// derivative of the stress by `elastic` is written. Tells also whether that is as symmetric as the law's own tangent.
@@ -118,42 +114,5 @@ impl Viscoplasticity {
             let missing = found.stress[i] - dot(&tangent[i], trial);
             by_strength * missing - dot(&tangent[i], release)
         })
-    }
-
-    /// `g(s)` and its derivative; none if any stress flows.
-    fn equivalent_stress<const S: usize>(&self, s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
-        let mean = trace(s) / 3.0;
-        let mut deviator = *s;
-        deviator.iter_mut().take(normal_components::<S>()).for_each(|d| *d -= mean);
-        match self {
-            Self::Perzyna(_) | Self::Hardening(_) => {
-                let norm = von_mises(s);
-                let factor = if norm > 0.0 { 1.5 / norm } else { 0.0 };
-                Some((norm, deviator.map(|d| factor * d)))
-            }
-            Self::DruckerPrager(law) => {
-                let size = dot(&deviator, &deviator).sqrt();
-                let factor = if size > 0.0 { FRAC_1_SQRT_2 / size } else { 0.0 };
-                let mut direction = deviator.map(|d| factor * d);
-                direction.iter_mut().take(3).for_each(|d| *d += law.friction_coefficient / 3.0);
-                Some((size * FRAC_1_SQRT_2 + law.friction_coefficient * mean, direction))
-            }
-            Self::Maxwell(_) => None,
-        }
-    }
-
-    /// `Y + h p`.
-    fn strength(&self, accumulated: f64) -> f64 {
-        match self {
-            Self::Perzyna(law) => law.yield_stress,
-            Self::Hardening(law) => law.perzyna.yield_stress + law.modulus * accumulated,
-            Self::DruckerPrager(law) => law.cohesion,
-            Self::Maxwell(_) => 0.0,
-        }
-    }
-
-    /// `h`.
-    fn hardening_modulus(&self) -> f64 {
-        if let Self::Hardening(law) = self { law.modulus } else { 0.0 }
     }
 }

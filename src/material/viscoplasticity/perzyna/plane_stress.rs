@@ -11,9 +11,12 @@
 //! equation for `m`, the projection's own with other factors. For `n = 1` `eta` is known; else it is the root of an increasing
 //! equation around that one.
 
-use super::{Tangent, increasing_root};
+use super::{NO_YIELD_STRESS, Perzyna};
 use crate::{
-    material::{Hardening, perzyna::NO_YIELD_STRESS},
+    material::{
+        Elastic, Tangent,
+        viscoplasticity::{Flow, return_mapping::increasing_root},
+    },
     tensor::Mandel,
 };
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -66,25 +69,25 @@ struct Values {
 
 /// Flow of the step, and growth of the accumulated strain. `start` holds the norm of `s*` and `Y*`.
 pub(super) fn flow<const S: usize>(
-    law: &Hardening,
+    law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
     length: f64,
     start: (f64, f64),
     tangent: Option<&mut Tangent<S>>,
 ) -> (Mandel<S>, f64) {
     let (norm, yield_stress) = start;
-    let [along, across] = law.perzyna.metric_and_elasticity();
+    let [along, across] = law.metric_and_elasticity();
     let step = Step {
         trial: turned(&[trial[0], trial[1], trial[2]]),
         compliance: [along.0, 3.0 * across.0, 3.0 * across.0],
         stiffness: [along.1, across.1, across.1],
         yield_stress,
-        hardening: law.modulus,
-        rate: 0.5 * length / law.perzyna.relaxation,
-        power: law.perzyna.exponent - 1.0,
+        hardening: law.hardening_modulus(),
+        rate: 0.5 * length / law.parameters.relaxation,
+        power: law.parameters.exponent - 1.0,
     };
     let without_yield_stress = yield_stress <= NO_YIELD_STRESS * norm && step.power == 0.0;
-    let (flow, growth, derivative) = if without_yield_stress && law.modulus == 0.0 {
+    let (flow, growth, derivative) = if without_yield_stress && law.hardening_modulus() == 0.0 {
         let share = step.stiffness.map(|e| 1.0 / (1.0 + step.rate * e));
         let flow = std::array::from_fn(|i| step.rate * share[i] * step.trial[i]);
         let diagonal = |i: usize| std::array::from_fn(|j| if i == j { share[i] } else { 0.0 });
