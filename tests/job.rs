@@ -106,6 +106,7 @@ fn flow_that_keeps_the_volume_is_warned_of_where_cells_lock() {
         ("{ maxwell = { relaxation_time = 1, volumetric_relaxation_time = 5 } }", false),
         ("{ drucker_prager = { relaxation = 100, friction_coefficient = 0.3, cohesion = 10 } }", false),
         ("{ drucker_prager = { relaxation = 100, friction_coefficient = 0, cohesion = 10 } }", true),
+        ("{ norton = { rate = 1, reference_stress = 10, exponent = 3 } }", true),
     ] {
         assert_eq!(warned(&[strain, &law(text)]), locks, "{text}");
     }

@@ -7,11 +7,13 @@ mod drucker_prager;
 #[cfg(test)]
 mod fastest_rates;
 mod maxwell;
+mod norton;
 mod perzyna;
 mod return_mapping;
 
 pub use drucker_prager::DruckerPrager;
 pub use maxwell::{Dashpots, Maxwell};
+pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
 pub use return_mapping::{Extrapolated, Returned, Tangent};
 
@@ -89,7 +91,8 @@ pub trait Flow {
         false
     }
 
-    /// Of power laws what the fastest rate grows with: the stress beyond the yield stress over it.
+    /// Of power laws what the fastest rate grows with: the stress beyond the yield stress over it, or without a yield surface the
+    /// stress over a stress of the law.
     fn overstress<const S: usize>(&self, _s: &Mandel<S>, _accumulated: f64) -> f64 {
         0.0
     }
@@ -194,6 +197,8 @@ laws! {
     Maxwell = "maxwell",
     /// Overstress law with a yield stress that grows with pressure; 3D and plane strain.
     DruckerPrager = "drucker_prager",
+    /// Creep under any stress, by a power of it, with or without strain hardening.
+    Norton = "norton",
 }
 
 impl Flow for FlowLaw {

@@ -42,15 +42,19 @@ fn viscoplasticity(draw: &mut Draw, plane_stress: bool) -> String {
             "perzyna = {{ relaxation = {relaxation}, yield_stress = {bound}, metric = \"{metric}\"{more} }}"
         )
     };
-    let laws = ["linear", "power", "hardening", "maxwell", "drucker_prager"];
+    let laws = ["linear", "power", "hardening", "maxwell", "creep", "drucker_prager"];
     // Those at the end most often: plane stress lacks the last one.
-    let last = if plane_stress { 3 } else { 4 };
+    let last = if plane_stress { 4 } else { 5 };
     match laws[(draw.0 as usize % 7).min(last)] {
         "power" => perzyna(bound + 0.2, ", exponent = 1.5"),
         "hardening" => perzyna(bound, &format!(", hardening_modulus = {}", draw.between(0.5, 10.0))),
         "maxwell" => format!(
             "maxwell = {{ relaxation_time = {}, volumetric_relaxation_time = 0.3 }}",
             draw.between(0.05, 1.0)
+        ),
+        "creep" => format!(
+            "norton = {{ rate = {}, reference_stress = 1, exponent = 2, hardening_strain = 0.1 }}",
+            draw.between(0.001, 0.01)
         ),
         "drucker_prager" => format!(
             "drucker_prager = {{ relaxation = {relaxation}, friction_coefficient = {}, cohesion = {bound} }}",
@@ -266,7 +270,7 @@ fn balanced<const D: usize, const S: usize>(
 }
 
 /// What each scheme must have met, as it stands in jobs.
-const MET: [&str; 23] = [
+const MET: [&str; 24] = [
     "plane_stress",
     "density",
     "viscosity",
@@ -276,6 +280,7 @@ const MET: [&str; 23] = [
     "exponent = 1.5 }",
     "hardening_modulus",
     "maxwell",
+    "norton",
     "drucker_prager",
     "damped_response",
     "[contact.normal.graph]",

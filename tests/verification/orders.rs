@@ -26,7 +26,7 @@ pub struct Acting {
     pub sign: fn(&Totals) -> f64,
 }
 
-pub const EFFECTS: [Acting; 6] = [
+pub const EFFECTS: [Acting; 7] = [
     Acting {
         name: "linear flow",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5 }",
@@ -44,6 +44,12 @@ pub const EFFECTS: [Acting; 6] = [
         material: "viscoplasticity.drucker_prager = { relaxation = 2.0, friction_coefficient = 0.3, cohesion = 0.4 }",
         contact: "",
         sign: |totals| totals.energy.viscoplastic,
+    },
+    Acting {
+        name: "creep that hardens",
+        material: "viscoplasticity.norton = { rate = 0.02, reference_stress = 1.0, exponent = 3.0, hardening_strain = 0.1 }",
+        contact: "",
+        sign: |totals| totals.viscoplastic_dissipation,
     },
     Acting {
         name: "damage",

@@ -1,10 +1,10 @@
 //! The fastest rates that laws state, which bound explicit steps, from both sides: against eigenvalues of the derivatives of the rates,
 //! by differences.
 
-use super::{DruckerPrager, Flow, FlowLaw, Maxwell, Metric, Perzyna, Viscoplasticity};
+use super::{DruckerPrager, Flow, FlowLaw, Maxwell, Metric, Norton, Perzyna, Viscoplasticity};
 use crate::{
     material::{Elasticity, Hypothesis},
-    tensor::{Mandel, von_mises},
+    tensor::{Mandel, larger, von_mises},
 };
 use std::array;
 
@@ -141,6 +141,44 @@ fn stress_beyond_the_apex_of_the_cone_relaxes_at_the_fastest_rate() {
     for ratio in [-0.9, -0.3, 0.0, 0.3, 0.45] {
         check_cone::<4>(ratio);
         check_cone::<6>(ratio);
+    }
+}
+
+/// The fastest of the rates at stresses of three times the reference stress over the bound, after this accumulated strain.
+fn share_of_creep<const S: usize>(law: &Norton, ratio: f64, accumulated: f64) -> f64 {
+    let prepared = prepared(&Viscoplasticity::Norton(*law), S, ratio);
+    let shares = directions::<S>(40).into_iter().map(|direction| {
+        let size = 3.0 * law.reference_stress / von_mises(&direction);
+        let s = direction.map(|x| size * x);
+        let state: Vec<f64> = s.into_iter().chain(law.hardening_strain.map(|_| accumulated)).collect();
+        let bound = prepared.fastest_rate::<S>(prepared.overstress(&s, accumulated));
+        spectral_radius(&|state: &[f64]| decay::<S>(&prepared, state), &state) / bound
+    });
+    shares.fold(0.0, larger)
+}
+
+#[test]
+fn creep_relaxes_up_to_the_fastest_rate_and_below_it_after_hardening() {
+    for ratio in [-0.9, 0.0, 0.4] {
+        for (exponent, hardening_strain) in [(1.0, None), (4.0, None), (1.0, Some(0.1)), (3.0, Some(0.1))] {
+            let law = Norton {
+                rate: 0.01,
+                reference_stress: 20.0,
+                exponent,
+                hardening_strain,
+                hardening_exponent: 1.5,
+            };
+            let shares = |accumulated: f64| {
+                [
+                    share_of_creep::<3>(&law, ratio, accumulated),
+                    share_of_creep::<4>(&law, ratio, accumulated),
+                    share_of_creep::<6>(&law, ratio, accumulated),
+                ]
+            };
+            let what = format!("n = {exponent}, {hardening_strain:?}, {ratio}");
+            assert_shares(shares(0.0), 0.999, &what);
+            assert!(shares(ACCUMULATED).iter().all(|share| *share <= 1.0 + 1e-5), "after flow, {what}");
+        }
     }
 }
 

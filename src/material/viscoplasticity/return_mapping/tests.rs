@@ -1,7 +1,8 @@
 use super::*;
 use crate::{
     material::{
-        DruckerPrager, Elastic, Elasticity, Hypothesis, Maxwell, Metric, Parameters, Perzyna, Viscoplasticity,
+        DruckerPrager, Elastic, Elasticity, Hypothesis, Maxwell, Metric, Norton, Parameters, Perzyna,
+        Viscoplasticity,
     },
     tensor::{dot, larger, von_mises},
 };
@@ -31,6 +32,17 @@ fn laws(hypothesis: Hypothesis) -> Vec<FlowLaw> {
     }
     let maxwell = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: Some(4.0) };
     laws.push(Viscoplasticity::Maxwell(maxwell));
+    for (exponent, hardening_strain, hardening_exponent) in
+        [(1.0, None, 0.0), (4.0, None, 0.0), (1.0, Some(0.05), 2.0), (3.0, Some(0.02), 1.0)]
+    {
+        laws.push(Viscoplasticity::Norton(Norton {
+            rate: 0.01,
+            reference_stress: 60.0,
+            exponent,
+            hardening_strain,
+            hardening_exponent,
+        }));
+    }
     if hypothesis != Hypothesis::PlaneStress {
         laws.push(Viscoplasticity::DruckerPrager(SOIL));
     }
