@@ -8,6 +8,7 @@ pub mod tensor;
 pub mod lanes;
 pub mod nearest;
 pub mod expression;
+pub mod law;
 pub mod contact;
 pub mod material;
 pub mod job;

@@ -15,7 +15,8 @@
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
 //! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
 
-use super::{ContactTable, Deserialize, JsonSchema, LawFault, NormalLaw, Serialize};
+use super::{ContactTable, Deserialize, JsonSchema, NormalLaw, Serialize};
+use crate::law::LawFault;
 use crate::tensor::{Vector, add_scaled, dot, norm};
 
 /// Adhesive bonds on a contact boundary.

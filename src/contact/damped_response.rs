@@ -4,8 +4,9 @@
 //! on. For `v < 0` it is mirrored: `even` as in (72), `odd` (dissipative in both directions), or zero (`one_sided`: the
 //! foundation does not pull).
 
-use super::{Deserialize, JsonSchema, LawFault, NormalParameters, Polyline, Serialize};
+use super::{Deserialize, JsonSchema, NormalParameters, Polyline, Serialize};
 use crate::error::{Error, Result};
+use crate::law::LawFault;
 
 /// Pressure as a continuous piecewise linear function of the normal velocity, zero at rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -6,7 +6,7 @@
 //! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
 //! radial, so that `s` as a vector has the direction of both velocity and traction.
 
-use super::LawFault;
+use crate::law::LawFault;
 
 /// The point of a friction graph with a given parameter `s = c v + q`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,14 +123,14 @@ macro_rules! friction_laws {
         }
 
         impl FrictionLaw {
-            laws::calls! { each_friction_law FrictionLaw FrictionBound:
+            crate::law::calls! { each_friction_law FrictionLaw FrictionBound:
                 coefficient(speed: f64) -> f64;
                 bound(speed: f64, pressure: f64) -> f64;
                 slope(speed: f64, pressure: f64) -> f64;
                 follows_pressure() -> bool;
                 steepest_fall() -> f64;
                 corner_velocity() -> f64;
-                own_faults() -> Vec<LawFault>;
+                own_faults() -> Vec<crate::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
             }
 

@@ -1,7 +1,8 @@
 //! Any polyline of pressure over normal velocity.
 
-use super::{Deserialize, JsonSchema, LawFault, NormalParameters, Polyline, Serialize};
+use super::{Deserialize, JsonSchema, NormalParameters, Polyline, Serialize};
 use crate::error::Result;
+use crate::law::LawFault;
 
 /// Pressure over normal velocity as a polyline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

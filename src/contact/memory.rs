@@ -12,7 +12,8 @@
 //! that swings: damping in the normal law or in the body has to take it up. (M. Sofonea, F. Pătrulescu, Analysis of a
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
-use super::{ContactTable, Deserialize, JsonSchema, LawFault, NormalLaw, Serialize};
+use super::{ContactTable, Deserialize, JsonSchema, NormalLaw, Serialize};
+use crate::law::LawFault;
 
 /// Memory of the foundation below a contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

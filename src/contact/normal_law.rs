@@ -2,7 +2,8 @@
 //!
 //! A law is what a job says ([`NormalParameters`]) and what evaluates it at a point ([`Response`]), often the same type.
 
-use super::{LawFault, NormalLaw};
+use super::NormalLaw;
+use crate::law::LawFault;
 use crate::{error::Result, expression::Scalar};
 
 /// What a step brings to a point of the contact boundary.
@@ -198,7 +199,7 @@ macro_rules! normal_laws {
         }
 
         impl NormalResponse {
-            laws::calls! { each_normal_law NormalResponse Response:
+            crate::law::calls! { each_normal_law NormalResponse Response:
                 resolve(s: f64, c: f64, node: NodeContext) -> Resolved;
                 pressure(velocity: f64, node: NodeContext) -> f64;
                 slope(velocity: f64, node: NodeContext) -> f64;
@@ -219,10 +220,10 @@ macro_rules! normal_laws {
         }
 
         impl NormalLaw {
-            laws::calls! { each_normal_law NormalLaw NormalParameters:
+            crate::law::calls! { each_normal_law NormalLaw NormalParameters:
                 gap() -> Option<&Scalar>;
                 against_obstacle(name: &str) -> Option<[String; 2]>;
-                own_faults() -> Vec<LawFault>;
+                own_faults() -> Vec<crate::law::LawFault>;
             }
 
             /// What evaluates the law; refuses parameters that make no law.

@@ -3,7 +3,8 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact
 //! pressure; it falls by at most `(static - dynamic) / decay_velocity p`.
 
-use super::{Deserialize, FrictionBound, JsonSchema, LawFault, Serialize};
+use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
+use crate::law::LawFault;
 
 /// Friction whose coefficient falls from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

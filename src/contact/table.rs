@@ -1,6 +1,7 @@
 //! What the laws of one `[[contact]]` table say of their parameters and of each other.
 
-use super::{Adhesion, Deserialize, FrictionLaw, JsonSchema, LawFault, Memory, NormalLaw, Serialize};
+use super::{Adhesion, Deserialize, FrictionLaw, JsonSchema, Memory, NormalLaw, Serialize};
+use crate::law::LawFault;
 
 /// Where on a facet the contact laws hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

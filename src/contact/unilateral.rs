@@ -3,9 +3,8 @@
 //! Within a step both are the graph of a wall over the normal velocity, zero and then vertical: at the velocity that closes the
 //! gap by the end of the step, or at rest.
 
-use super::{
-    Branch, Deserialize, JsonSchema, LawFault, NodeContext, NormalParameters, Resolved, Response, Serialize,
-};
+use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
+use crate::law::LawFault;
 use crate::{error::Result, expression::Scalar, tensor::larger};
 
 /// Unilateral constraint: normal displacement <= gap, or normal velocity <= 0.

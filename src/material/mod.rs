@@ -16,14 +16,3 @@ pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use isotropic::Isotropic;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
-
-/// What is wrong with a key of a law that is in its range.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LawFault {
-    /// The key in the law's table.
-    pub key: &'static str,
-    /// What is wrong.
-    pub message: String,
-    /// What to do about it.
-    pub help: String,
-}

@@ -17,9 +17,10 @@ pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
 pub use return_mapping::{Extrapolated, Returned, Tangent};
 
-use super::{Elasticity, Hypothesis, Isotropic, LawFault};
+use super::{Elasticity, Hypothesis, Isotropic};
 use crate::{
     lanes::{LANES, Pack},
+    law::LawFault,
     tensor::Mandel,
 };
 use schemars::JsonSchema;

@@ -1,6 +1,7 @@
 //! Linear viscosity `A(e) = volumetric tr(e) I + shear e`, section 5 of Wang and Cheng (2022).
 
-use super::{Isotropic, LawFault};
+use super::Isotropic;
+use crate::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,10 +27,13 @@ impl Viscosity {
     pub fn fault(&self, dimension: usize) -> Option<LawFault> {
         let Self { volumetric, shear } = *self;
         let modulus = dimension as f64 * volumetric + shear;
-        (modulus <= 0.0 && shear > 0.0).then(|| LawFault {
-            key: "volumetric",
-            message: format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}"),
-            help: format!("volumetric must be above {}", -shear / dimension as f64),
+        (modulus <= 0.0 && shear > 0.0).then(|| {
+            let message = format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}");
+            LawFault::at_value(
+                "volumetric",
+                message,
+                format!("volumetric must be above {}", -shear / dimension as f64),
+            )
         })
     }
 }
@@ -44,6 +48,9 @@ mod tests {
         assert_eq!(law(25.0).tensor().smallest_modulus::<3>(), 50.0, "the paper's");
         assert_eq!((law(25.0).fault(2), law(-24.9).fault(2)), (None, None));
         let fault = law(-20.0).fault(3).expect("3 x -20 + 50 is negative");
-        assert_eq!((fault.key, &*fault.help), ("volumetric", "volumetric must be above -16.666666666666668"));
+        assert_eq!(
+            (&*fault.key, &*fault.help),
+            ("volumetric", "volumetric must be above -16.666666666666668")
+        );
     }
 }

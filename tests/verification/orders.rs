@@ -49,7 +49,7 @@ pub const EFFECTS: [Acting; 7] = [
         name: "creep that hardens",
         material: "viscoplasticity.norton = { rate = 0.02, reference_stress = 1.0, exponent = 3.0, hardening_strain = 0.1 }",
         contact: "",
-        sign: |totals| totals.viscoplastic_dissipation,
+        sign: |totals| totals.energy.viscoplastic,
     },
     Acting {
         name: "damage",

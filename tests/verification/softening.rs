@@ -94,20 +94,20 @@ fn long_steps(session: &Session, scheme: &str) {
         format!(
             "{}[time]\nscheme = \"{scheme}\"\nend = 1\nstep = {}\n[solver]\ntolerance = 1e-12\n[material]\n\
              hypothesis = \"plane_strain\"\nelasticity = {{ youngs_modulus = 100, poisson_ratio = 0 }}\n\
-             damage = {{ threshold = 0.1, viscosity = 0.5, exponent = 1, largest = 0.95 }}\n\
+             damage = {{ threshold = 0.05, viscosity = 0.5, exponent = 1, largest = 0.95 }}\n\
              [[support]]\non = [\"left\"]\nfix = [\"x\"]\n[[support]]\non = [\"bottom\"]\nfix = [\"y\"]\n\
-             [[traction]]\non = [\"right\"]\nvalue = [\"6*min(t, 0.5)\", 0]\n",
+             [[traction]]\non = [\"right\"]\nvalue = [\"10*min(t, 0.5)\", 0]\n",
             any_mesh::<2>(),
             1.0 / steps as f64
         )
     };
-    // Uniaxial stress s over the sound part: (1 - d) S = s, Y = S^2 / (2 E), 0.5 d' = (1 - d) max(Y - 0.1, 0).
+    // Uniaxial stress s over the sound part: (1 - d) S = s, Y = S^2 / (2 E), 0.5 d' = (1 - d) max(Y - 0.05, 0).
     let (mut exact, substeps) = (0.0f64, 200_000);
     for at in 0..substeps {
         let t = f64::from(at) / f64::from(substeps);
         let rate = |t: f64, d: f64| {
-            let sound = 6.0 * t.min(0.5) / (1.0 - d);
-            (1.0 - d) * (sound * sound / 200.0 - 0.1).max(0.0) / 0.5
+            let sound = 10.0 * t.min(0.5) / (1.0 - d);
+            (1.0 - d) * (sound * sound / 200.0 - 0.05).max(0.0) / 0.5
         };
         let h = 1.0 / f64::from(substeps);
         let first = rate(t, exact);

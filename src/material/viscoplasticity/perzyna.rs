@@ -25,7 +25,8 @@ mod tests;
 use super::{Flow, Parameters, Tangent, one_by_one};
 use crate::{
     lanes::{LANES, Pack},
-    material::{Elastic, Elasticity, Hypothesis, Isotropic, LawFault},
+    law::LawFault,
+    material::{Elastic, Elasticity, Hypothesis, Isotropic},
     tensor::{Mandel, dot, normal_components, trace, von_mises},
 };
 use multiversion::multiversion;
@@ -85,10 +86,9 @@ impl Parameters for Perzyna {
     }
 
     fn fault(&self) -> Option<LawFault> {
-        (self.yield_stress == 0.0 && self.exponent != 1.0).then(|| LawFault {
-            key: "exponent",
-            message: "a power of the overstress over the yield stress needs a positive yield stress".into(),
-            help: "give a positive yield_stress, or leave exponent out".into(),
+        (self.yield_stress == 0.0 && self.exponent != 1.0).then(|| {
+            let message = "a power of the overstress over the yield stress needs a positive yield stress";
+            LawFault::at_value("exponent", message, "give a positive yield_stress, or leave exponent out")
         })
     }
 

@@ -1,4 +1,4 @@
-//! What all families of laws share: faults, and calls of the law that was chosen.
+//! What all families of laws share: what is wrong with their keys, and calls of the law that was chosen.
 
 /// What is wrong with a key of a law.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,4 +42,4 @@ macro_rules! calls {
         )*
     };
 }
-pub(super) use calls;
+pub(crate) use calls;
