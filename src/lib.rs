@@ -5,7 +5,7 @@
 
 pub mod error;
 pub mod tensor;
-pub mod lanes;
+pub mod simd;
 pub mod nearest;
 pub mod expression;
 pub mod law;

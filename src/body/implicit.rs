@@ -3,8 +3,8 @@
 use super::Body;
 use crate::{
     effect::{Blend, Contact, Effect, Energy, Step, SurfaceEffect, SurfaceStep, Tangents},
-    lanes::Pack,
     mesh::Mesh,
+    simd::Pack,
     space::{Batch, Geometry, Needs, Nodal},
     tensor::{Mandel, add_scaled, component, dot, symmetric_part},
 };

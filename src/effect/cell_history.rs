@@ -1,5 +1,5 @@
 use super::History;
-use crate::{lanes::Pack, space::CellRun};
+use crate::{simd::Pack, space::CellRun};
 use std::borrow::Cow;
 
 /// Values of the cells of some materials, `W` a cell, converged and trial, in packs as the geometry has them. Other cells take no

@@ -3,8 +3,8 @@ use super::{
     cell_history::CellHistory, evolution::Evolution,
 };
 use crate::{
-    lanes::{LANES, Pack},
     material::{self, ByMaterial, Elastic},
+    simd::{LANES, Pack},
     space::{Batch, CellRun, Needs},
     tensor::{Mandel, add_scaled},
 };

@@ -1,7 +1,7 @@
 use super::{Curvature, Effect, Energy, Form, Phases, Step, StressError, isotropic};
 use crate::{
-    lanes::Pack,
     material::{ByMaterial, Isotropic},
+    simd::Pack,
     space::{Batch, CellMatrix, Integrity, Needs, Simplex},
     tensor::{add_scaled, dot},
 };

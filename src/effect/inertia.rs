@@ -1,7 +1,7 @@
 use super::{Effect, Energy, Form, Phases, Step};
 use crate::{
-    lanes::{LANES, sum},
     material::ByMaterial,
+    simd::{LANES, sum},
     space::{Batch, CellMatrix, Corners, Needs, Simplex, SimplexPack},
 };
 use multiversion::multiversion;

@@ -1,8 +1,8 @@
 //! Stresses and energies of isotropic tensors, cells side by side.
 
 use crate::{
-    lanes::{LANES, Pack, sum},
     material::Isotropic,
+    simd::{LANES, Pack, sum},
     space::{Integrity, SimplexPack},
     tensor::{add_scaled, dot},
 };

@@ -1,7 +1,7 @@
 //! The largest stress and strain of a body.
 
 use crate::{
-    lanes::{LANES, Pack},
+    simd::{LANES, Pack},
     tensor::{dot, larger, von_mises_square},
 };
 use multiversion::multiversion;

@@ -2,8 +2,8 @@
 
 use super::Step;
 use crate::{
-    lanes::Pack,
     material::Isotropic,
+    simd::Pack,
     space::{Integrity, SimplexPack},
 };
 

@@ -19,8 +19,8 @@ pub use return_mapping::{Extrapolated, Returned, Tangent};
 
 use super::{Elasticity, Hypothesis, Isotropic};
 use crate::{
-    lanes::{LANES, Pack},
     law::LawFault,
+    simd::{LANES, Pack},
     tensor::Mandel,
 };
 use schemars::JsonSchema;

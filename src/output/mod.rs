@@ -19,7 +19,7 @@ pub mod parallel_file;
 pub mod probes;
 pub mod profiles;
 pub mod redistribution;
-mod room;
+mod free_space;
 pub mod seal;
 mod stacked_view;
 pub mod whole_file;

@@ -12,8 +12,8 @@
 //! write (room.rs). As MPI closes all files of HDF5 when it ends,
 //! a process that gave a file up leaves without (see [`given_up`]).
 
+use super::free_space;
 use super::hyperslab::{Element, Rows};
-use super::room;
 use super::stacked_view;
 use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
@@ -68,7 +68,7 @@ impl ParallelFile {
         communicator: &impl Communicator,
     ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
-        let lacks = room::lacks(path, room::TABLES, communicator.rank() == 0);
+        let lacks = free_space::lacks(path, free_space::TABLES, communicator.rank() == 0);
         agree(
             &communicator,
             lacks.map_err(|why| Error::Failed(format!("cannot write {}: {why}. {ROOM}", path.display()))),
@@ -122,8 +122,8 @@ impl ParallelFile {
 
     /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
     pub(super) fn need_room(&self, bytes: u64) -> Result<(), Agreed> {
-        let more = bytes.saturating_add(room::TABLES);
-        let lacks = room::lacks(&self.path, more, self.communicator.rank() == 0);
+        let more = bytes.saturating_add(free_space::TABLES);
+        let lacks = free_space::lacks(&self.path, more, self.communicator.rank() == 0);
         self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
     }
 

@@ -17,7 +17,7 @@ use std::ptr;
 /// To PETSc the operator is a shell matrix whose null space is the complement of the subspace: it projects every result
 /// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] takes the preconditioner of the constant
 /// matrix, or one made for its own subspace if that lacks 16 directions or more. From then on it is made anew only
-/// when a solve has not converged in as many iterations as that is worth ([`ProjectedKsp::set_patience`]), and the solve
+/// when a solve has not converged in as many iterations as that is worth ([`ProjectedKsp::set_refresh_threshold`]), and the solve
 /// goes on from where it was.
 #[derive(Debug)]
 pub struct ProjectedKsp {
@@ -33,7 +33,7 @@ pub struct ProjectedKsp {
     tolerances: (f64, f64, usize),
     /// The smallest right-hand side since the tolerances were set.
     smallest: f64,
-    patience: usize,
+    refresh_threshold: usize,
     /// Whether the next solve is the first since the tolerances were set.
     first: bool,
     /// Whether the preconditioner is one for subspaces.
@@ -70,7 +70,7 @@ impl ProjectedKsp {
             block,
             tolerances: (1e-5, 0.0, 10_000),
             smallest: f64::INFINITY,
-            patience: usize::MAX,
+            refresh_threshold: usize::MAX,
             first: true,
             reducing: false,
         })
@@ -103,8 +103,8 @@ impl ProjectedKsp {
     }
 
     /// Iterations with the preconditioner of another subspace after which it is made for the subspace in use.
-    pub fn set_patience(&mut self, iterations: usize) {
-        self.patience = iterations;
+    pub fn set_refresh_threshold(&mut self, iterations: usize) {
+        self.refresh_threshold = iterations;
     }
 
     /// Takes the constant matrix and sets up its preconditioner. Collective.
@@ -143,7 +143,7 @@ impl ProjectedKsp {
     /// this one. Collective.
     fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<[bool; 2]> {
         let Some(constant) = &self.constant else { return Ok([false; 2]) };
-        if self.patience == usize::MAX || !operator.may_project() {
+        if self.refresh_threshold == usize::MAX || !operator.may_project() {
             return Ok([false; 2]);
         }
         let reduced = match &mut self.reduced {
@@ -269,7 +269,7 @@ impl ProjectedKsp {
     ) -> Result<ProjectedOutcome> {
         let (target, share) = self.target(right_hand_side)?;
         let iterations = self.tolerances.2;
-        let first = if stale { self.patience.min(iterations) } else { iterations };
+        let first = if stale { self.refresh_threshold.min(iterations) } else { iterations };
         let mut outcome = ProjectedOutcome { linear: NOTHING, indefinite: false, refreshed: false };
         if first > 0 {
             self.ksp.set_tolerances(0.0, target, first)?;
@@ -302,7 +302,7 @@ impl ProjectedKsp {
     ) -> Result<ProjectedOutcome> {
         let (_, share) = self.target(right_hand_side)?;
         let iterations = self.tolerances.2;
-        let first = if stale { self.patience.min(iterations).max(1) } else { iterations };
+        let first = if stale { self.refresh_threshold.min(iterations).max(1) } else { iterations };
         let linear = self.gmres(share, first)?.solve(right_hand_side, solution)?;
         let outcome = ProjectedOutcome { linear, indefinite: false, refreshed: false };
         if !stale || linear.reason != TOO_MANY {

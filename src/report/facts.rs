@@ -1,8 +1,8 @@
 //! The numbers of a run in words: status, sizes, certificates, seconds.
 
 use super::{
+    artifacts::Found,
     colour::{LINES, hex},
-    found::Found,
     markup::{escape, facts, paragraph, table},
     picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
     scale::{number, size},

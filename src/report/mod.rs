@@ -3,7 +3,7 @@
 mod arc;
 mod boundary;
 mod facts;
-mod found;
+mod artifacts;
 mod friction;
 mod history;
 mod law;
@@ -17,9 +17,9 @@ use crate::{
     error::{Error, Result},
     run::VERSION,
 };
+use artifacts::{Found, Gap};
 use body::Body;
 use boundary::{Boundary, Laws};
-use found::{Found, Gap};
 use law::Law;
 use markup::{escape, paragraph};
 use page::Page;

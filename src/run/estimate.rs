@@ -9,7 +9,7 @@ use super::Inventory;
 use crate::{
     body::Body,
     session::Session,
-    stepping::{FactorPrecision, Preconditioner, Service},
+    stepping::{FactorPrecision, Preconditioner, ProblemSize},
 };
 use serde::Serialize;
 
@@ -79,8 +79,8 @@ impl Estimate {
         ];
         let [mesh_bytes, facets, vectors] = session.sum(own);
         let matrix = matrix_bytes(D, nodes, cells, facets);
-        let service = Service::of(session, body, steps, precision);
-        let cost = service.cost(preconditioner);
+        let problem = ProblemSize::of(session, body, steps, precision);
+        let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
         let redundant = preconditioner.is_redundant(session.ranks(), mesh.total_nodes * D);

@@ -6,7 +6,7 @@ mod deadline;
 mod estimate;
 mod folder;
 mod header;
-mod hold;
+mod validate;
 mod inventory;
 mod obstacles;
 mod outputs;

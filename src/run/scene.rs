@@ -1,6 +1,6 @@
 //! Each rank's part of a job's mesh, from wherever the job takes it.
 
-use super::hold::hold;
+use super::validate::validate;
 use crate::{
     agreement::Agreed,
     error::{Error, Result},
@@ -41,8 +41,8 @@ impl Scene {
             }
         };
         match &scene {
-            Self::Two(mesh) => hold(session, mesh, loaded)?,
-            Self::Three(mesh) => hold(session, mesh, loaded)?,
+            Self::Two(mesh) => validate(session, mesh, loaded)?,
+            Self::Three(mesh) => validate(session, mesh, loaded)?,
         }
         Ok(scene)
     }

@@ -1,6 +1,6 @@
 //! What a run starts from and a check describes: nothing of it touches the output folder.
 
-use super::{build, hold::refuse_free_bodies, obstacles, steps};
+use super::{build, obstacles, steps, validate::refuse_free_bodies};
 use crate::{
     body::Body,
     certificate::{Accepted, Certificates, Verdict},

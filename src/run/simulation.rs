@@ -1,10 +1,10 @@
 //! A job in memory: set up and stepped without a file.
 
 use super::{
-    hold::hold,
     scene::split,
     setup::{Setup, setup},
     steps,
+    validate::validate,
 };
 use crate::{
     body::Body,
@@ -39,7 +39,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     /// mesh. `S` is the number of stress components that go with the job's hypothesis. Collective.
     pub fn new(session: &Session, loaded: &mut Loaded, mesh: Option<GlobalMesh<D>>) -> Result<Self> {
         let mesh = split(session, mesh)?;
-        hold(session, &mesh, loaded)?;
+        validate(session, &mesh, loaded)?;
         Self::on(session, loaded, mesh)
     }
 

@@ -4,8 +4,8 @@
 
 use super::{Geometry, SimplexPack, kernels, kernels::Corners};
 use crate::{
-    lanes::{LANES, Pack},
     mesh::Mesh,
+    simd::{LANES, Pack},
     tensor::add_scaled,
 };
 use multiversion::multiversion;

@@ -1,8 +1,8 @@
 //! Volumes and shape function gradients of cells, computed once.
 
 use crate::{
-    lanes::{LANES, Pack, prefetch},
     mesh::{Mesh, shape},
+    simd::{LANES, Pack, prefetch},
     tensor::Vector,
 };
 

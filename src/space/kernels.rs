@@ -2,7 +2,7 @@
 
 use super::SimplexPack;
 use crate::{
-    lanes::{LANES, Pack},
+    simd::{LANES, Pack},
     tensor::component,
 };
 

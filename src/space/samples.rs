@@ -1,6 +1,6 @@
 //! Cells for tests of passes over them.
 
-use crate::{lanes::LANES, mesh::Mesh};
+use crate::{mesh::Mesh, simd::LANES};
 
 /// A number between -1 and 1.
 pub fn number(i: usize) -> f64 {

@@ -25,7 +25,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 
 /// Steps of one length between two growths of it.
-const PATIENCE: u32 = 2;
+const STEPS_BEFORE_GROWTH: u32 = 2;
 /// Share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
@@ -251,7 +251,7 @@ impl<const D: usize> Adaptive<D> {
         }
         self.pace.taken += 1;
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
-        if self.pace.taken >= PATIENCE && length >= 2.0 * step.length && level < self.highest {
+        if self.pace.taken >= STEPS_BEFORE_GROWTH && length >= 2.0 * step.length && level < self.highest {
             self.pace.level = level + 1;
             self.pace.taken = 0;
         }
@@ -283,7 +283,7 @@ mod tests {
     fn small_errors_let_steps_double_after_some_patience() {
         let mut adaptive = adaptive();
         adaptive.grow(step(0.01), 1e-3);
-        assert_eq!(adaptive.pace.level, 0, "patience");
+        assert_eq!(adaptive.pace.level, 0, "refresh_threshold");
         adaptive.grow(step(0.01), 1e-3);
         assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 0));
         adaptive.grow(step(0.02), 5e-3);
@@ -340,7 +340,7 @@ mod tests {
         assert_eq!(adaptive.next_length(100.0, 0.0), 0.08, "nothing was before the first");
         assert_eq!(adaptive.next_length(100.0, 0.01), 0.02);
         assert_eq!(adaptive.next_length(100.0, 0.005), 0.01);
-        assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a rung of the ladder");
+        assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a power of two times the first length");
         assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the ladder");
         assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of what is left");
         assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "cut by the target, not here");

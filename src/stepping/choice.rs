@@ -3,10 +3,10 @@
 use super::{
     bounded::{self, Bounded},
     condensed::Condensed,
+    factor_cache,
     flow::Flow,
     linear_solver::{Method, Preconditioner, SolverSettings},
     newton::Newton,
-    rungs,
     step_solver::Solver,
 };
 use crate::{
@@ -60,7 +60,7 @@ pub(super) fn whole_newton<const D: usize, const S: usize>(
     preconditioner: Preconditioner,
 ) -> Result<Solver> {
     let unknowns = body.mesh.total_nodes * D;
-    let linear_solver = rungs::projected::<D>(session, preconditioner, unknowns, like)?;
+    let linear_solver = factor_cache::projected::<D>(session, preconditioner, unknowns, like)?;
     let mut newton = Newton::new(like, &body.contacts, linear_solver)?;
     if body.flows() {
         newton.flow = Some(Flow::new(like)?);

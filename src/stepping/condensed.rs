@@ -7,7 +7,7 @@
 
 use super::{
     StepOutcome,
-    condensed_matrix::{CondensedMatrix, Motion, Room, Subspace},
+    condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
     newton::{From, Newton, Task},
     refined::Refinement,
 };
@@ -198,7 +198,7 @@ impl Condensed {
             motions: self.motions.clone(),
             springs: springs.unwrap_or_default().to_vec(),
             subspace: Subspace::whole(&self.trial)?,
-            room: Room::new(&self.motions, self.unknowns.len())?,
+            workspace: Workspace::new(&self.motions, self.unknowns.len())?,
         };
         if springs.is_none() {
             number_nodes(&mut body.contacts, &self.nodes);

@@ -33,11 +33,11 @@ pub(super) struct CondensedMatrix {
     /// Stiffness along each motion of this rank that the factor has and the matrix has not, in N s/m; none, or one a motion.
     pub springs: Vec<f64>,
     pub subspace: RefCell<Subspace>,
-    pub room: RefCell<Room>,
+    pub workspace: RefCell<Workspace>,
 }
 
-/// What products need room for.
-pub(super) struct Room {
+/// Work vectors of products.
+pub(super) struct Workspace {
     /// Amounts of the motions of this rank, and of all ranks, in the order of the motions.
     own: Vec<f64>,
     all: Vec<f64>,
@@ -53,7 +53,7 @@ pub(super) struct Room {
     traffic: u64,
 }
 
-impl Room {
+impl Workspace {
     /// For these motions of this rank, and so many of all ranks. Collective.
     pub fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
         let world = SimpleCommunicator::world();
@@ -93,34 +93,34 @@ impl Subspace {
 impl CondensedMatrix {
     /// Writes a vector of contact nodes that moves by `L x`.
     pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
-        let room = &mut *self.room.borrow_mut();
-        room.traffic += self.bytes();
-        self.times_lower(x, &mut room.placed[0]);
-        self.write(&room.placed[0], vector)
+        let workspace = &mut *self.workspace.borrow_mut();
+        workspace.traffic += self.bytes();
+        self.times_lower(x, &mut workspace.placed[0]);
+        self.write(&workspace.placed[0], vector)
     }
 
     /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
     pub fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
-        let room = &mut *self.room.borrow_mut();
-        self.read(vector, room)?;
-        room.traffic += self.bytes();
-        self.times_upper(&room.placed[0], product);
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(vector, workspace)?;
+        workspace.traffic += self.bytes();
+        self.times_upper(&workspace.placed[0], product);
         Ok(())
     }
 
     /// Counts traffic from here on.
     pub fn restart_traffic(&self) {
-        self.room.borrow_mut().traffic = 0;
+        self.workspace.borrow_mut().traffic = 0;
     }
 
     /// Bytes of `L`, or of the factor on a subspace, that products and solves read since then.
     pub fn traffic(&self) -> u64 {
-        self.room.borrow().traffic
+        self.workspace.borrow().traffic
     }
 
     /// Reads the amounts of all motions in a vector of contact nodes into the first place, in the order of the factor. Collective.
-    fn read(&self, vector: &DistributedVector, room: &mut Room) -> Result<()> {
-        let Room { own, all, gathering, placed: [placed, _], .. } = room;
+    fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
+        let Workspace { own, all, gathering, placed: [placed, _], .. } = workspace;
         {
             let values = vector.owned()?;
             for (amount, motion) in own.iter_mut().zip(&self.motions) {
@@ -184,10 +184,10 @@ impl CondensedMatrix {
         &self,
         project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
         column: &mut DistributedVector,
-        room: &mut Room,
+        workspace: &mut Workspace,
     ) -> Result<()> {
         let dimension = self.motions.first().map_or(0, |motion| motion.direction.len());
-        for (i, image) in room.images.iter_mut().enumerate() {
+        for (i, image) in workspace.images.iter_mut().enumerate() {
             {
                 let mut values = column.owned_mut()?;
                 values.fill(0.0);
@@ -199,17 +199,21 @@ impl CondensedMatrix {
             image.clear();
             image.extend_from_slice(&column.owned()?);
         }
-        room.own_blocks.clear();
+        workspace.own_blocks.clear();
         for row in &self.motions {
             for other in self.motions.iter().filter(|other| other.at == row.at) {
                 let mut entry = 0.0;
-                for (j, image) in other.direction.iter().zip(&room.images) {
+                for (j, image) in other.direction.iter().zip(&workspace.images) {
                     entry += j * dot(&row.direction, &image[row.at..][..dimension]);
                 }
-                room.own_blocks.push(entry);
+                workspace.own_blocks.push(entry);
             }
         }
-        room.block_gathering.gather(&SimpleCommunicator::world(), &room.own_blocks, &mut room.blocks);
+        workspace.block_gathering.gather(
+            &SimpleCommunicator::world(),
+            &workspace.own_blocks,
+            &mut workspace.blocks,
+        );
         Ok(())
     }
 
@@ -252,23 +256,23 @@ const DIMENSIONS: usize = 3;
 
 impl StepMatrix for CondensedMatrix {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        let room = &mut *self.room.borrow_mut();
-        self.read(x, room)?;
-        room.traffic += 2 * self.bytes();
-        let [amounts, product] = &mut room.placed;
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(x, workspace)?;
+        workspace.traffic += 2 * self.bytes();
+        let [amounts, product] = &mut workspace.placed;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
-        for ((spring, amount), number) in self.springs.iter().zip(&room.own).zip(self.own.clone()) {
+        for ((spring, amount), number) in self.springs.iter().zip(&workspace.own).zip(self.own.clone()) {
             amounts[self.places[number]] -= spring * amount;
         }
         self.write(amounts, y)
     }
 
     fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        let room = &mut *self.room.borrow_mut();
-        self.read(r, room)?;
-        room.traffic += 2 * self.bytes();
-        let [amounts, ordered] = &mut room.placed;
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(r, workspace)?;
+        workspace.traffic += 2 * self.bytes();
+        let [amounts, ordered] = &mut workspace.placed;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {
             Subspace { factor: Some(factor), in_use: true, .. } => {
@@ -283,9 +287,9 @@ impl StepMatrix for CondensedMatrix {
 
     fn look(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut subspace = self.subspace.borrow_mut();
-        let room = &mut *self.room.borrow_mut();
-        self.write_blocks(project, &mut subspace.room, room)?;
-        let blocks = &room.blocks;
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.write_blocks(project, &mut subspace.room, workspace)?;
+        let blocks = &workspace.blocks;
         let (mut removed, mut first) = (0.0, 0);
         for count in self.nodes.iter().map(ExactSizeIterator::len) {
             removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();

@@ -39,7 +39,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     }
     if let Some(traction) = &state.contact_traction {
         let traction = traction.owned()?;
-        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));
     }
     Ok(())
 }

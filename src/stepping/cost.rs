@@ -4,7 +4,7 @@
 //! operations; multigrid works in proportion to the unknowns. The constants were measured on one core of a common server with
 //! 10^4 to 10^6 unknowns (docs/speed.md); expect a factor of two either way.
 
-use super::linear_solver::{FactorPrecision, Preconditioner, Service};
+use super::linear_solver::{FactorPrecision, Preconditioner, ProblemSize};
 use crate::{body::Body, petsc::Precision, session::Session};
 
 /// Costs of a preconditioner with the solves of a step, on one rank and over all ranks together.
@@ -34,7 +34,7 @@ struct Iterations {
     friction: f64,
 }
 
-impl Service {
+impl ProblemSize {
     /// What a preconditioner has to serve in so many steps of this body.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_factor_in_space_soon_outgrows_multigrid() {
-        let service = Service {
+        let problem = ProblemSize {
             dimension: 3,
             unknowns: 1_000_000,
             ranks: 1,
@@ -167,7 +167,7 @@ mod tests {
             precision: FactorPrecision::Double,
         };
         let [factor, multigrid] =
-            [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| service.cost(which));
+            [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| problem.cost(which));
         assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
     }
 }

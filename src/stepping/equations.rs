@@ -64,7 +64,7 @@ pub struct ContactEquations<'a, const D: usize> {
     pub cells: Option<&'a mut dyn CellForces>,
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
-    /// What the evaluation needs room for.
+    /// Work vectors of the evaluation.
     pub scratch: &'a mut Scratch,
     /// Solves with the Jacobian; its constant matrix is `K`.
     pub linear_solver: &'a mut ProjectedKsp,

@@ -70,7 +70,7 @@ pub struct SolverSettings {
 
 /// What a preconditioner has to serve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Service {
+pub struct ProblemSize {
     /// Dimension of the space.
     pub dimension: usize,
     /// Velocity components over all ranks.
@@ -95,19 +95,19 @@ const REDUNDANT: usize = 50_000;
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
 impl Preconditioner {
-    /// Replaces `Auto` by what takes less time for this service, and says why.
-    pub fn resolve(self, service: Service) -> (Self, String) {
-        let (chosen, why) = self.choose(service);
-        let single = chosen == Self::Cholesky && service.factor_precision() == Precision::Single;
+    /// Replaces `Auto` by what takes less time for this problem, and says why.
+    pub fn resolve(self, problem: ProblemSize) -> (Self, String) {
+        let (chosen, why) = self.choose(problem);
+        let single = chosen == Self::Cholesky && problem.factor_precision() == Precision::Single;
         (chosen, if single { format!("{why}; factors in single precision") } else { why })
     }
 
-    fn choose(self, service: Service) -> (Self, String) {
+    fn choose(self, problem: ProblemSize) -> (Self, String) {
         if self != Self::Auto {
             return (self, "[solver] preconditioner asks for it".into());
         }
-        let memory = service.cost(Self::Cholesky).memory;
-        if service.ranks > 1 && service.unknowns > REDUNDANT {
+        let memory = problem.cost(Self::Cholesky).memory;
+        if problem.ranks > 1 && problem.unknowns > REDUNDANT {
             let why = format!(
                 "above {REDUNDANT} velocity components several ranks don't factor all of the matrix each"
             );
@@ -116,11 +116,11 @@ impl Preconditioner {
         if memory > LARGEST_FACTOR {
             return (Self::Gamg, format!("a factor would take some {:.0} GB", memory / 1e9));
         }
-        let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| service.seconds(which));
+        let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| problem.seconds(which));
         let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
         let why = format!(
             "{} steps a matrix take some {} by a factorisation, {} by multigrid",
-            service.steps,
+            problem.steps,
             seconds(factored),
             seconds(multigrid)
         );
@@ -133,7 +133,7 @@ impl Preconditioner {
     }
 
     /// Iterations that cost as much as making it anew; in 3D that never pays (measured, see docs/contact-preconditioner.md).
-    pub(super) fn patience(self, dimension: usize) -> usize {
+    pub(super) fn refresh_threshold(self, dimension: usize) -> usize {
         match self {
             _ if dimension == 3 => usize::MAX,
             Self::Auto | Self::Cholesky => 5,
@@ -210,32 +210,32 @@ fn seconds(time: f64) -> String {
 mod tests {
     use super::*;
 
-    fn service(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> Service {
+    fn problem(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> ProblemSize {
         let precision = FactorPrecision::Auto;
-        Service { dimension, unknowns, ranks, steps, contact: true, friction: false, precision }
+        ProblemSize { dimension, unknowns, ranks, steps, contact: true, friction: false, precision }
     }
 
-    fn chosen(service: Service) -> Preconditioner {
-        Preconditioner::Auto.resolve(service).0
+    fn chosen(problem: ProblemSize) -> Preconditioner {
+        Preconditioner::Auto.resolve(problem).0
     }
 
     #[test]
     fn many_steps_pay_for_larger_factors() {
-        assert_eq!(chosen(service(2, 500_000, 1, 64)), Preconditioner::Cholesky);
-        assert_eq!(chosen(service(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
-        assert_eq!(chosen(service(3, 100_000, 1, 1)), Preconditioner::Gamg);
-        assert_eq!(chosen(service(3, 1_000_000, 1, 1_000_000)), Preconditioner::Gamg);
+        assert_eq!(chosen(problem(2, 500_000, 1, 64)), Preconditioner::Cholesky);
+        assert_eq!(chosen(problem(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
+        assert_eq!(chosen(problem(3, 100_000, 1, 1)), Preconditioner::Gamg);
+        assert_eq!(chosen(problem(3, 1_000_000, 1, 1_000_000)), Preconditioner::Gamg);
     }
 
     #[test]
     fn factors_in_space_are_in_single_precision_where_few_steps_share_them() {
-        let precision = |service: Service| service.factor_precision();
-        assert_eq!(precision(service(3, 100_000, 1, 16)), Precision::Single);
-        assert_eq!(precision(service(3, 100_000, 1, 1000)), Precision::Double);
-        assert_eq!(precision(service(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
-        assert_eq!(precision(service(2, 500_000, 1, 1)), Precision::Double);
-        assert_eq!(precision(Service { contact: false, ..service(3, 100_000, 1, 1) }), Precision::Double);
-        let asked = |steps| Service { precision: FactorPrecision::Single, ..service(2, 1_000, 1, steps) };
+        let precision = |problem: ProblemSize| problem.factor_precision();
+        assert_eq!(precision(problem(3, 100_000, 1, 16)), Precision::Single);
+        assert_eq!(precision(problem(3, 100_000, 1, 1000)), Precision::Double);
+        assert_eq!(precision(problem(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
+        assert_eq!(precision(problem(2, 500_000, 1, 1)), Precision::Double);
+        assert_eq!(precision(ProblemSize { contact: false, ..problem(3, 100_000, 1, 1) }), Precision::Double);
+        let asked = |steps| ProblemSize { precision: FactorPrecision::Single, ..problem(2, 1_000, 1, steps) };
         assert_eq!(precision(asked(1000)), Precision::Single);
         let (_, why) = Preconditioner::Cholesky.resolve(asked(1));
         assert!(why.ends_with("; factors in single precision"), "{why}");
@@ -243,18 +243,18 @@ mod tests {
 
     #[test]
     fn friction_is_dear_for_multigrid() {
-        let gliding = service(3, 100_000, 1, 4);
-        assert_eq!(chosen(Service { friction: true, ..gliding }), Preconditioner::Cholesky);
+        let gliding = problem(3, 100_000, 1, 4);
+        assert_eq!(chosen(ProblemSize { friction: true, ..gliding }), Preconditioner::Cholesky);
     }
 
     #[test]
     fn ranks_factor_small_matrices_each_for_itself() {
-        assert_eq!(chosen(service(2, 500_000, 2, 64)), Preconditioner::Gamg);
-        assert_eq!(chosen(service(2, 40_000, 2, 64)), Preconditioner::Cholesky);
+        assert_eq!(chosen(problem(2, 500_000, 2, 64)), Preconditioner::Gamg);
+        assert_eq!(chosen(problem(2, 40_000, 2, 64)), Preconditioner::Cholesky);
         for steps in [1, 8, 1000] {
-            assert_eq!(chosen(service(2, 300, 7, steps)), Preconditioner::Cholesky);
+            assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
         }
-        let (asked, why) = Preconditioner::Gamg.resolve(service(3, 9, 1, 1));
+        let (asked, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
         assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
     }
 }

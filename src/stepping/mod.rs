@@ -1,7 +1,7 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
-mod attempts;
+mod fallbacks;
 mod bdf2;
 mod bounded;
 mod choice;
@@ -12,7 +12,7 @@ mod cost;
 mod drives;
 mod equations;
 mod flow;
-mod guesses;
+mod multistart;
 mod implicit;
 mod implicit_euler;
 mod lagged_euler;
@@ -20,7 +20,7 @@ mod linear_solver;
 mod newton;
 mod outcome;
 mod refined;
-mod rungs;
+mod factor_cache;
 mod scheme;
 mod springs;
 mod step_clock;
@@ -33,7 +33,7 @@ pub use adaptive::{Adaptive, AdaptiveSettings, Pace};
 pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use linear_solver::{
-    FactorPrecision, FrictionIteration, Method, Preconditioner, Service, SolverSettings,
+    FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize, SolverSettings,
 };
 pub use outcome::StepOutcome;
 pub use scheme::Scheme;

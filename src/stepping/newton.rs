@@ -2,9 +2,9 @@
 
 use super::{
     StepOutcome,
-    attempts::{ATTEMPTS, Search},
     bounded::Bounded,
     equations::{Effort, Scratch, StepMatrix},
+    fallbacks::{FALLBACKS, Search},
     flow::{Flow, FlowStart},
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
 };
@@ -137,7 +137,7 @@ impl Newton {
             if !outcome.converged() {
                 return Err(failed(step, outcome.words(), REMEDY));
             }
-            return self.judge(
+            return self.check_inclusion(
                 session,
                 body,
                 step,
@@ -154,7 +154,7 @@ impl Newton {
         self.start.copy_from(trial)?;
         let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
         let (follows, chosen) = (body.contacts.iter().any(follows), self.chosen_search);
-        let mut attempts = ATTEMPTS.iter().filter(|a| match a.iteration {
+        let mut attempts = FALLBACKS.iter().filter(|a| match a.iteration {
             FrictionIteration::Newton => !follows || settings.friction == FrictionIteration::Newton,
             FrictionIteration::FixedPoint => follows,
         });
@@ -192,13 +192,14 @@ impl Newton {
         if attempt.is_none() {
             return Err(failed(step, &why, REMEDY));
         }
-        let judged = self.judge(session, body, step, trial, settings, (newton_iterations, &effort));
+        let checked =
+            self.check_inclusion(session, body, step, trial, settings, (newton_iterations, &effort));
         self.effort = effort;
-        judged
+        checked
     }
 
     /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
-    fn judge<const D: usize, const S: usize>(
+    fn check_inclusion<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -280,8 +281,8 @@ fn resistance<const D: usize>(
     Ok([normal, against(motion, square)?])
 }
 
-/// Lets the contacts of a body be judged by the matrix of the whole body, however steps are solved. Collective.
-pub(super) fn judge_by<const D: usize>(
+/// Lets the contacts of a body be checked by the matrix of the whole body, however steps are solved. Collective.
+pub(super) fn set_reference_values<const D: usize>(
     session: &Session,
     contacts: &mut [Contact<D>],
     like: &DistributedVector,
@@ -299,10 +300,13 @@ pub(super) fn judge_by<const D: usize>(
 }
 
 /// Takes the pressures of all contacts back to those of the converged state.
-pub(super) fn recall<const D: usize, const S: usize>(body: &mut Body<D, S>, from: From<'_>) -> Result<()> {
+pub(super) fn restore_pressures<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    from: From<'_>,
+) -> Result<()> {
     if let Some(traction) = from.traction {
         let traction = traction.owned()?;
-        body.contacts.iter_mut().for_each(|contact| contact.recall(&traction));
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use super::{
     StepOutcome,
     condensed::{Condensed, Factored, factored},
     equations::StepMatrix,
-    newton::{From, Task, recall},
+    newton::{From, Task, restore_pressures},
 };
 use crate::{body::Body, error::Result, petsc::DistributedVector, session::Session};
 
@@ -68,7 +68,7 @@ impl Condensed {
         };
         if refined.is_none() {
             trial.copy_from(&refinement.first)?;
-            recall(body, from)?;
+            restore_pressures(body, from)?;
         }
         self.refinement = Some(refinement);
         Ok(refined)

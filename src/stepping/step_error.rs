@@ -34,7 +34,7 @@ pub struct StepError {
 
 /// Room for nodal values with ghosts.
 #[derive(Debug, Default)]
-pub(super) struct ErrorRoom {
+pub(super) struct ErrorWorkspace {
     curved: Vec<f64>,
     strained: Vec<f64>,
     end: Vec<f64>,
@@ -57,7 +57,7 @@ impl Stepper {
         let trial = self.trial.local()?;
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let ErrorRoom { curved, strained, end, forces } = &mut self.room;
+        let ErrorWorkspace { curved, strained, end, forces } = &mut self.workspace;
         write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
         // Displacements, and stresses with them, are one order better in the formula of second order.
         let length = if self.scheme.is_two_step() && step.previous_length > 0.0 {
@@ -98,7 +98,7 @@ impl Stepper {
 }
 
 /// Writes these values in place of the ones before.
-fn write(room: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
-    room.clear();
-    room.extend(values);
+fn write(target: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
+    target.clear();
+    target.extend(values);
 }

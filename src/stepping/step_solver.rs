@@ -3,10 +3,10 @@
 use super::{
     StepOutcome, choice,
     condensed::Condensed,
+    factor_cache::{self, Cached, FactorCache, Krylov},
     flow::FlowStart,
-    linear_solver::{LINEAR_ITERATIONS, Preconditioner, Service, SolverSettings},
-    newton::{From, Newton, REMEDY, Task, failed, judge_by},
-    rungs::{self, Krylov, Rung, Rungs},
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
+    newton::{From, Newton, REMEDY, Task, failed, set_reference_values},
     springs::Springs,
 };
 use crate::{
@@ -37,11 +37,11 @@ pub(super) enum Solver {
     Condensed(Box<Condensed>),
 }
 
-/// A step's length with the length of the rung whose preconditioner serves it, both as matrices have them, in s.
+/// The length of a step, and that of the steps for which its preconditioner is set up, both as matrices have them, in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lengths {
     pub matrix: f64,
-    pub rung: f64,
+    pub cached: f64,
 }
 
 /// The matrix for steps of one length, and what solves with it.
@@ -50,14 +50,14 @@ pub(super) struct StepSolver {
     /// Why the preconditioner is what it is.
     reason: String,
     /// The matrix that the preconditioner in use is of.
-    rung: Option<(f64, Matrix)>,
-    /// The matrix of steps that are of no rung's length.
+    cached: Option<(f64, Matrix)>,
+    /// The matrix of steps of another length than that of the preconditioner.
     between: Option<(f64, Matrix)>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
     /// What else is kept.
-    rungs: Option<Rungs>,
+    cache: Option<FactorCache>,
     /// What keeps factors of bodies that contact alone holds from being singular.
     springs: Springs,
 }
@@ -71,22 +71,22 @@ impl StepSolver {
         settings: SolverSettings,
     ) -> Result<Self> {
         let unknowns = body.mesh.total_nodes * D;
-        let service = Service::of(session, body, settings.steps, settings.factor_precision);
-        let (preconditioner, reason) = settings.preconditioner.resolve(service);
+        let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision);
+        let (preconditioner, reason) = settings.preconditioner.resolve(problem);
         let flows = body.flows();
         let solver = if body.contacts.is_empty() && !flows {
-            Solver::Linear(rungs::linear(session, preconditioner, unknowns)?)
+            Solver::Linear(factor_cache::linear(session, preconditioner, unknowns)?)
         } else {
-            choice::newton(session, body, state, settings, (preconditioner, service.factor_precision()))?
+            choice::newton(session, body, state, settings, (preconditioner, problem.factor_precision()))?
         };
         Ok(Self {
             settings: SolverSettings { preconditioner, ..settings },
             reason,
-            rung: None,
+            cached: None,
             between: None,
             matrix_norm: 0.0,
             solver,
-            rungs: None,
+            cache: None,
             springs: Springs::default(),
         })
     }
@@ -112,11 +112,12 @@ impl StepSolver {
     /// Whether the matrices are those of these lengths.
     pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
         let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
-        let rung = length(&self.rung);
-        rung == Some(self.rung_of(lengths)) && length(&self.between).or(rung) == Some(lengths.matrix)
+        let cached = length(&self.cached);
+        cached == Some(self.cached_length(lengths))
+            && length(&self.between).or(cached) == Some(lengths.matrix)
     }
 
-    /// Assembles the matrix of this length and sets the preconditioner of its rung up, unless they are there; says whether a
+    /// Assembles the matrix of this length and sets its preconditioner up, unless they are there; says whether a
     /// preconditioner was made. `like` is laid out as velocities are. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
@@ -126,30 +127,30 @@ impl StepSolver {
         like: &DistributedVector,
     ) -> Result<bool> {
         self.between = None;
-        let rung = self.rung_of(lengths);
+        let cached = self.cached_length(lengths);
         let mut made = false;
-        if self.rung.as_ref().is_none_or(|(known, _)| *known != rung) {
-            made = self.change_rung(session, body, rung, like)?;
+        if self.cached.as_ref().is_none_or(|(known, _)| *known != cached) {
+            made = self.change_matrix(session, body, cached, like)?;
         }
-        if lengths.matrix != rung {
+        if lengths.matrix != cached {
             let rows = matrix_rows(session, body, lengths.matrix)?;
             self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
         self.matrix_norm = self.matrix()?.norm()?;
-        judge_by(session, &mut body.contacts, like, self.matrix()?)?;
-        if let (Solver::Linear(ksp), Some((_, rung))) = (&mut self.solver, &self.rung) {
-            ksp.set_matrices(self.between.as_ref().map_or(rung, |(_, matrix)| matrix), rung)?;
+        set_reference_values(session, &mut body.contacts, like, self.matrix()?)?;
+        if let (Solver::Linear(ksp), Some((_, cached))) = (&mut self.solver, &self.cached) {
+            ksp.set_matrices(self.between.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
         }
         Ok(made)
     }
 
     /// The length whose matrix is set up: what is condensed serves no other.
-    fn rung_of(&self, lengths: Lengths) -> f64 {
-        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.rung }
+    fn cached_length(&self, lengths: Lengths) -> f64 {
+        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
     }
 
-    /// Brings the rung of this length into use; says whether it had to be made. Collective.
-    fn change_rung<const D: usize, const S: usize>(
+    /// Brings the matrix and preconditioner of this length into use; says whether they had to be made. Collective.
+    fn change_matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
@@ -157,18 +158,18 @@ impl StepSolver {
         like: &DistributedVector,
     ) -> Result<bool> {
         let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
-        let found = self.rungs.as_mut().and_then(|rungs| rungs.take(length));
+        let found = self.cache.as_mut().and_then(|cache| cache.take(length));
         let (is_there, mut next) = match found {
-            Some(Rung { matrix, krylov, .. }) => (Some(matrix), Some(krylov)),
+            Some(Cached { matrix, krylov, .. }) => (Some(matrix), Some(krylov)),
             None => (None, None),
         };
-        if let Some((length, matrix)) = self.rung.take() {
-            let rungs = match &mut self.rungs {
-                Some(rungs) => rungs,
+        if let Some((length, matrix)) = self.cached.take() {
+            let cache = match &mut self.cache {
+                Some(cache) => cache,
                 none => {
                     let bytes = 12.0 * matrix.stored_entries()?;
                     let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
-                    none.insert(Rungs::new(kept - 1))
+                    none.insert(FactorCache::new(kept - 1))
                 }
             };
             let mut krylov = match next.take() {
@@ -176,10 +177,10 @@ impl StepSolver {
                 None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
             };
             krylov.exchange(&mut self.solver);
-            rungs.put(Rung { length, matrix, krylov });
+            cache.put(Cached { length, matrix, krylov });
         }
         if let Some(matrix) = is_there {
-            self.rung = Some((length, matrix));
+            self.cached = Some((length, matrix));
             return Ok(false);
         }
         let mut rows = matrix_rows(session, body, length)?;
@@ -190,7 +191,7 @@ impl StepSolver {
                 if condensed.precision_in_use()? == Precision::Single {
                     matrix.multiply_often()?;
                 }
-                self.rung = Some((length, matrix));
+                self.cached = Some((length, matrix));
                 return Ok(true);
             }
             self.solver = choice::whole_newton(session, body, like, self.settings, chosen)?;
@@ -221,14 +222,14 @@ impl StepSolver {
             }
             Solver::Condensed(_) => {}
         }
-        self.rung = Some((length, matrix));
+        self.cached = Some((length, matrix));
         Ok(true)
     }
 
     /// The matrix in use.
     fn matrix(&self) -> Result<&Matrix> {
         let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
-        self.between.as_ref().or(self.rung.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
+        self.between.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
     }
 
     /// `y = K x`. Collective.
@@ -268,7 +269,7 @@ impl StepSolver {
     }
 
     fn matrices(&self) -> impl Iterator<Item = &Matrix> {
-        [&self.rung, &self.between].into_iter().flatten().map(|(_, matrix)| matrix)
+        [&self.cached, &self.between].into_iter().flatten().map(|(_, matrix)| matrix)
     }
 
     /// Applies the preconditioner. Collective.
@@ -342,7 +343,7 @@ impl StepSolver {
         (forces, tolerance): (&DistributedVector, f64),
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let Some((length, matrix)) = self.between.as_ref().or(self.rung.as_ref()) else {
+        let Some((length, matrix)) = self.between.as_ref().or(self.cached.as_ref()) else {
             return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
         };
         let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };

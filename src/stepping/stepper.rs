@@ -3,13 +3,13 @@
 use super::{
     StepOutcome,
     contacts::{commit_tractions, prepare_contacts},
-    guesses::{is_new, other_solutions},
+    factor_cache::nearest,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
-    rungs::nearest,
+    multistart::{is_new, other_solutions},
     scheme::{Method, Scheme},
     step_clock::{Stages, StepClock, StepTraffic},
-    step_error::ErrorRoom,
+    step_error::ErrorWorkspace,
     step_solver::{Known, Lengths, StepSolver},
 };
 use crate::{
@@ -35,7 +35,7 @@ pub struct Stepper {
     /// Whether the scheme has finished the step that was attempted last, so that trial histories are those of its solution.
     is_finished: bool,
     /// Room for the error of a step.
-    pub(super) room: ErrorRoom,
+    pub(super) workspace: ErrorWorkspace,
     /// Length in s through which the ladder of preconditioners goes.
     ladder: f64,
     /// Other starts from which steps with contact are solved, to look for other solutions.
@@ -70,7 +70,7 @@ impl Stepper {
             right_hand_side: state.velocity.like()?,
             trial: state.velocity.like()?,
             is_finished: false,
-            room: ErrorRoom::default(),
+            workspace: ErrorWorkspace::default(),
             ladder: 1.0,
             guesses: 0,
             accepts_fast_flow: false,
@@ -125,8 +125,8 @@ impl Stepper {
         body: &mut Body<D, S>,
         step: Step,
     ) -> Result<()> {
-        let rung = self.method.steady_length(nearest(self.ladder, step.length));
-        let lengths = Lengths { matrix: self.method.matrix_length(step), rung };
+        let cached = self.method.steady_length(nearest(self.ladder, step.length));
+        let lengths = Lengths { matrix: self.method.matrix_length(step), cached };
         if self.solver.is_prepared_for(lengths) {
             return Ok(());
         }

@@ -8,10 +8,10 @@ use clarke::{
         ViscousStress,
     },
     job::Job,
-    lanes::LANES,
     material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
     run::{Inventory, Simulation},
     session::Session,
+    simd::LANES,
     space::{Batch, CellMatrix, Geometry, Simplex},
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};

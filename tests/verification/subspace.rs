@@ -43,13 +43,13 @@ fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<
     let (body, state) = body::<D, S>(session, whole, &[("left", Held::All)], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
-    let solver = |patience| {
+    let solver = |refresh_threshold| {
         let mut solver = ProjectedKsp::new("", &state.velocity, D).expect("solver");
         solver.linear_solver().set_method("cg").expect("cg");
         solver.linear_solver().set_preconditioner("redundant", None).expect("redundant");
         solver.linear_solver().apply_options().expect("options");
         solver.set_tolerances(1e-11, 0.0, 500).expect("tolerances");
-        solver.set_patience(patience);
+        solver.set_refresh_threshold(refresh_threshold);
         solver.set_constant(&matrix).expect("matrix");
         solver
     };

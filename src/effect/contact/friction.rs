@@ -106,7 +106,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
-    pub fn recall(&mut self, points: &[Point<D>], traction: &[f64]) {
+    pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
             point.traction = point.along(traction);
             point.pressure = points[point.at].pressure;

@@ -151,12 +151,12 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Takes the pressures from the nodal tractions of the converged state.
-    pub fn recall(&mut self, traction: &[f64]) {
+    pub fn restore_pressures(&mut self, traction: &[f64]) {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             point.pressure = point.along(traction);
         }
         if let Some(friction) = &mut self.friction {
-            friction.recall(&self.points, traction);
+            friction.restore_pressures(&self.points, traction);
         }
     }
 

@@ -5,8 +5,8 @@
 use super::ViscoplasticFlow;
 use crate::{
     effect::{Energy, Step},
-    lanes::{LANES, Pack, sum},
     material::{Flow, FlowLaw},
+    simd::{LANES, Pack, sum},
     space::{Batch, Integrity, SimplexPack},
     tensor::{add_scaled, dot},
 };

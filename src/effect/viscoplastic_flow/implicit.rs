@@ -7,8 +7,8 @@
 use super::ViscoplasticFlow;
 use crate::{
     effect::{Blend, Energy, Step, Tangents},
-    lanes::Pack,
     material::{Extrapolated, Flow, FlowLaw, Tangent},
+    simd::Pack,
     space::Batch,
     tensor::{Mandel, add_scaled, dot},
 };

@@ -24,9 +24,9 @@ mod tests;
 
 use super::{Flow, Parameters, Tangent, one_by_one};
 use crate::{
-    lanes::{LANES, Pack},
     law::LawFault,
     material::{Elastic, Elasticity, Hypothesis, Isotropic},
+    simd::{LANES, Pack},
     tensor::{Mandel, dot, normal_components, trace, von_mises},
 };
 use multiversion::multiversion;

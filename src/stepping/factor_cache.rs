@@ -1,7 +1,6 @@
-//! Matrices with what solves with them, kept for when steps are of these lengths again.
+//! Matrices with their preconditioners, kept for when steps are of these lengths again.
 //!
-//! Steps come from a ladder of powers of two, its rungs. What solves with the matrix of a rung serves all lengths near it as a
-//! preconditioner: two matrices `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
+//! Step lengths are powers of two times the first one. The preconditioner of such a length serves all lengths near it: two matrices `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
 
 use super::{condensed::Factored, linear_solver::Preconditioner, newton::Newton, step_solver::Solver};
 use crate::{
@@ -11,13 +10,13 @@ use crate::{
 };
 use std::mem::swap;
 
-/// Rungs that are kept at most, with the one in use.
+/// Matrices that are kept at most, with the one in use.
 const MOST: usize = 8;
 /// Bytes of a rank that they may take.
 const ROOM: f64 = 512e6;
 
 /// A matrix with its preconditioner.
-pub(super) struct Rung {
+pub(super) struct Cached {
     /// Length in s of the steps that the matrix is of.
     pub length: f64,
     /// The matrix.
@@ -26,7 +25,7 @@ pub(super) struct Rung {
     pub krylov: Krylov,
 }
 
-/// A linear solver and its preconditioner; all rungs of a run have the same kind.
+/// A linear solver and its preconditioner; all of a run have the same kind.
 pub(super) enum Krylov {
     /// For linear steps.
     Linear(Ksp),
@@ -55,7 +54,7 @@ pub(super) fn projected<const D: usize>(
     let mut solver = ProjectedKsp::new("", like, D)?;
     chosen.configure(solver.linear_solver(), session.ranks(), unknowns)?;
     solver.linear_solver().apply_options()?;
-    solver.set_patience(chosen.patience(D));
+    solver.set_refresh_threshold(chosen.refresh_threshold(D));
     Ok(solver)
 }
 
@@ -92,32 +91,32 @@ impl Krylov {
     }
 }
 
-/// Rungs that are not in use, the last used one last.
-pub(super) struct Rungs {
-    kept: Vec<Rung>,
+/// Matrices with their preconditioners that are not in use, the one used last at the end.
+pub(super) struct FactorCache {
+    kept: Vec<Cached>,
     most: usize,
 }
 
-impl Rungs {
+impl FactorCache {
     /// None yet; so many are kept besides the one in use.
     pub fn new(most: usize) -> Self {
         Self { kept: Vec::new(), most }
     }
 
     /// Puts one away; gives the one that has not been used for longest where there are too many.
-    pub fn put(&mut self, rung: Rung) -> Option<Rung> {
-        self.kept.push(rung);
+    pub fn put(&mut self, cached: Cached) -> Option<Cached> {
+        self.kept.push(cached);
         (self.kept.len() > self.most).then(|| self.kept.remove(0))
     }
 
     /// Takes the one of this length out.
-    pub fn take(&mut self, length: f64) -> Option<Rung> {
-        let at = self.kept.iter().position(|rung| rung.length == length)?;
+    pub fn take(&mut self, length: f64) -> Option<Cached> {
+        let at = self.kept.iter().position(|cached| cached.length == length)?;
         Some(self.kept.remove(at))
     }
 }
 
-/// The rung of the ladder through `base` that steps of this length are nearest to.
+/// The power of two times `base` that is nearest to this length.
 pub(super) fn nearest(base: f64, length: f64) -> f64 {
     base * 2f64.powi((length / base).log2().round() as i32)
 }
@@ -149,20 +148,20 @@ impl Preconditioner {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stepping::{FactorPrecision, Service};
+    use crate::stepping::{FactorPrecision, ProblemSize};
 
     #[test]
     fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
-        for (length, rung) in [(0.01, 0.01), (0.08, 0.08), (0.012, 0.01), (0.015, 0.02), (0.0072, 0.01)] {
-            assert_eq!(nearest(0.01, length), rung);
+        for (length, cached) in [(0.01, 0.01), (0.08, 0.08), (0.012, 0.01), (0.015, 0.02), (0.0072, 0.01)] {
+            assert_eq!(nearest(0.01, length), cached);
         }
     }
 
     #[test]
-    fn small_problems_keep_a_ladder_and_large_ones_what_they_use() {
+    fn small_problems_keep_many_lengths_and_large_ones_what_they_use() {
         let kept = |unknowns: usize, ranks| {
             let precision = FactorPrecision::Auto;
-            let service = Service {
+            let problem = ProblemSize {
                 dimension: 3,
                 unknowns,
                 ranks,
@@ -171,7 +170,7 @@ mod tests {
                 friction: false,
                 precision,
             };
-            Preconditioner::Auto.resolve(service).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+            Preconditioner::Auto.resolve(problem).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
         };
         assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
         assert_eq!(kept(1_000_000, 8), 2);

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Refuses a mesh without what the job speaks of, and one on which it makes no sense; warns of bad cells. Collective.
-pub(super) fn hold<const D: usize>(
+pub(super) fn validate<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     loaded: &mut Loaded,

@@ -3,7 +3,7 @@
 use super::{
     equations::{CellForces, ContactEquations, Effort, cycle},
     linear_solver::FrictionIteration,
-    newton::{From, Newton, STEEP, Task, recall},
+    newton::{From, Newton, STEEP, Task, restore_pressures},
 };
 use crate::{
     body::Body,
@@ -17,7 +17,7 @@ use crate::{
 const FIXED_POINTS: usize = 200;
 /// One way to solve a step.
 #[derive(Clone, Copy)]
-pub(super) struct Attempt {
+pub(super) struct Fallback {
     pub search: Search,
     /// How much stiffer than the body the parameters of the graphs are: which branches come back depends on it.
     pub stiffer: f64,
@@ -35,8 +35,8 @@ pub(super) enum Search {
     Equilibrated,
 }
 
-const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> Attempt {
-    Attempt { search, stiffer, iteration }
+const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> Fallback {
+    Fallback { search, stiffer, iteration }
 }
 
 /// What is tried in turn until a step is solved, each time from where the step started.
@@ -44,7 +44,7 @@ const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> 
 /// Full steps first: a new set of branches raises the residual of the whole body, so that a search would creep where full
 /// steps arrive. In equilibrium it is that of the contact points alone, which tells how far off these are. A fixed point,
 /// at last, does not cycle between pressure and friction; it serves friction that follows the pressure.
-pub(super) const ATTEMPTS: [Attempt; 12] = [
+pub(super) const FALLBACKS: [Fallback; 12] = [
     attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
     attempt(Search::Equilibrated, 1.0, FrictionIteration::Newton),
     attempt(Search::Equilibrated, 10.0, FrictionIteration::Newton),
@@ -67,7 +67,7 @@ impl Newton {
     pub(super) fn parametrise<const D: usize, const S: usize>(
         &self,
         body: &mut Body<D, S>,
-        attempt: Attempt,
+        attempt: Fallback,
     ) {
         let follows = attempt.iteration == FrictionIteration::Newton;
         for ((contact, scales), fall) in body.contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
@@ -85,7 +85,7 @@ impl Newton {
         trial: &mut DistributedVector,
     ) -> Result<()> {
         trial.copy_from(&self.start)?;
-        recall(body, from)
+        restore_pressures(body, from)
     }
 
     /// Solves once. A fixed point holds friction bounds at pressures that are brought up to date until these solve the
@@ -95,7 +95,7 @@ impl Newton {
         session: &Session,
         body: &mut Body<D, S>,
         task: Task<'_>,
-        attempt: Attempt,
+        attempt: Fallback,
         trial: &mut DistributedVector,
         effort: &mut Effort,
     ) -> Result<Attempted> {
