@@ -9,7 +9,7 @@
 //!
 //! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
 //! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks ask for room before they
-//! write (room.rs). As MPI closes all files of HDF5 when it ends,
+//! write (free_space.rs). As MPI closes all files of HDF5 when it ends,
 //! a process that gave a file up leaves without (see [`given_up`]).
 
 use super::free_space;
