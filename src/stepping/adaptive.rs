@@ -283,7 +283,7 @@ mod tests {
     fn small_errors_let_steps_double_after_some_patience() {
         let mut adaptive = adaptive();
         adaptive.grow(step(0.01), 1e-3);
-        assert_eq!(adaptive.pace.level, 0, "refresh_threshold");
+        assert_eq!(adaptive.pace.level, 0, "one step is not enough");
         adaptive.grow(step(0.01), 1e-3);
         assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 0));
         adaptive.grow(step(0.02), 5e-3);
