@@ -6,7 +6,6 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 use std::cell::Cell;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Time that a rank with a fault of a library gives the others to come to the agreement that ends the run.
@@ -61,7 +60,7 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
     let watch = error
         .as_ref()
         .filter(|error| size > 1 && error.is_local_fault())
-        .map(|error| Watch::over(rank, error));
+        .map(|error| end_alone_after_grace(rank, error));
     communicator.all_reduce_into(&own, &mut lowest, SystemOperation::min());
     drop(watch);
     if lowest == size
@@ -89,35 +88,20 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
     })
 }
 
-/// Ends the run on all ranks unless dropped in time. A library that fails on one rank amid a collective operation of its own
-/// leaves the others in it, so that they never come to the agreement; the run ends with exit code 4 in either case.
-struct Watch {
-    dropped: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Watch {
-    fn over(rank: i32, error: &Error) -> Self {
-        let words = format!(
-            "error: rank {rank}: {error}\nOther ranks wait inside the library and can't be told: the run ends here."
-        );
-        let (dropped, waiting) = channel();
-        let thread = std::thread::spawn(move || {
-            if waiting.recv_timeout(GRACE) == Err(RecvTimeoutError::Timeout) {
-                eprintln!("{words}");
-                SimpleCommunicator::world().abort(Exit::Internal as i32);
-            }
-        });
-        Self { dropped: Some(dropped), thread: Some(thread) }
-    }
-}
-
-impl Drop for Watch {
-    fn drop(&mut self) {
-        self.dropped = None;
-        // The thread has nothing to give back, not even where it panicked.
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
+/// Ends the run on all ranks unless what this gives is dropped in time. A library that fails on one rank amid a collective operation
+/// of its own leaves the others in it, so that they never come to the agreement; the run ends with exit code 4 in either case.
+fn end_alone_after_grace(rank: i32, error: &Error) -> Sender<()> {
+    let words = format!(
+        "error: rank {rank}: {error}\nOther ranks wait inside the library and can't be told: the run ends here."
+    );
+    let (dropped, waiting) = channel();
+    std::thread::spawn(move || {
+        if waiting.recv_timeout(GRACE) == Err(RecvTimeoutError::Timeout) {
+            eprintln!("{words}");
+            SimpleCommunicator::world().abort(Exit::Internal as i32);
+        }
+    });
+    dropped
 }
 
 thread_local! {

@@ -164,8 +164,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().any(|e| e.has_power_law())
     }
 
-    /// The step in s beyond which explicit flow by power laws is unstable at the stresses on this rank for which explicit forces were added since the last call; `None` if there
-    /// are no such laws, on all ranks alike.
+    /// The step in s beyond which explicit flow by power laws is unstable at the stresses on this rank for which explicit forces were
+    /// added since the last call; `None` if there are no such laws, on all ranks alike.
     pub fn take_flow_step_bound(&mut self) -> Option<f64> {
         let fastest = self.effects.iter_mut().filter_map(|e| e.take_fastest_flow()).reduce(f64::max)?;
         Some(2.0 / fastest)

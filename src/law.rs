@@ -1,4 +1,4 @@
-//! What all families of laws share: what is wrong with their keys, and calls of the law that was chosen.
+//! What all families of laws share: what is wrong with their keys, the root of a scalar equation, and calls of the law that was chosen.
 
 /// What is wrong with a key of a law.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +28,38 @@ impl LawFault {
     pub fn within(self, table: &str) -> Self {
         Self { key: format!("{table}.{}", self.key), ..self }
     }
+}
+
+/// The root of an increasing function that is negative at `low` and not at `high`, by Newton's method kept inside a bracket.
+/// `function` gives value and derivative.
+pub(crate) fn increasing_root(
+    mut low: f64,
+    mut high: f64,
+    start: f64,
+    mut function: impl FnMut(f64) -> [f64; 2],
+) -> f64 {
+    let mut at = start;
+    for _ in 0..200 {
+        let [value, slope] = function(at);
+        if value > 0.0 {
+            high = at
+        } else {
+            low = at
+        }
+        let newton = at - value / slope;
+        let next = if low < newton && newton < high {
+            newton
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            2.0 * at
+        };
+        if (next - at).abs() <= 2.0 * f64::EPSILON * next.abs() || value == 0.0 {
+            return if value == 0.0 { at } else { next };
+        }
+        at = next;
+    }
+    at
 }
 
 /// Methods of an enum of laws that call the same ones of the chosen law, by a `match` that the macro `$each` makes.

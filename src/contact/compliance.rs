@@ -5,7 +5,7 @@
 //! constant is 0.
 
 use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
-use crate::{error::Result, expression::Scalar};
+use crate::{error::Result, expression::Scalar, law::increasing_root};
 
 /// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,9 +28,6 @@ pub struct Compliance {
 fn one() -> f64 {
     1.0
 }
-
-/// Bisection halves the bracket if Newton's method does not; more iterations than the bits of a number serve nothing.
-const ITERATIONS: usize = 100;
 
 impl Compliance {
     /// Pressure in Pa at a penetration in m.
@@ -58,23 +55,9 @@ impl Compliance {
         if self.exponent == 1.0 {
             return excess / (1.0 + ratio * self.stiffness);
         }
-        let (mut low, mut high) = (0.0, excess);
-        let mut at = excess;
-        for _ in 0..ITERATIONS {
-            let value = at + ratio * self.pressure_at(at) - excess;
-            if value > 0.0 {
-                high = at;
-            } else {
-                low = at;
-            }
-            let newton = at - value / (1.0 + ratio * self.stiffness_at(at));
-            let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - at).abs() <= 4.0 * f64::EPSILON * next {
-                return next;
-            }
-            at = next;
-        }
-        at
+        increasing_root(0.0, excess, excess, |at| {
+            [at + ratio * self.pressure_at(at) - excess, 1.0 + ratio * self.stiffness_at(at)]
+        })
     }
 }
 

@@ -6,7 +6,7 @@
 //! dissipated.
 
 use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
-use crate::error::Result;
+use crate::{error::Result, law::increasing_root};
 
 /// Pressure `limit * (1 - exp(-normal velocity / velocity))` on what approaches, none on what leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -20,9 +20,6 @@ pub struct ExponentialDamper {
     pub velocity: f64,
 }
 
-/// Newton's method rises to the root; where rounding leads it out of the bracket bisection takes over.
-const ITERATIONS: usize = 100;
-
 impl ExponentialDamper {
     fn pressure_at(&self, velocity: f64) -> f64 {
         if velocity <= 0.0 { 0.0 } else { -self.limit * (-velocity / self.velocity).exp_m1() }
@@ -35,23 +32,8 @@ impl ExponentialDamper {
     /// The root of `c v + p(v) = s` for a positive `s`. The left side rises and is concave, so that Newton's method comes from
     /// below, where it starts: the pressure is neither above its limit nor above its tangent at rest.
     fn approach(&self, s: f64, c: f64) -> f64 {
-        let (mut low, mut high) =
-            (f64::max((s - self.limit) / c, s / (c + self.limit / self.velocity)), s / c);
-        let mut at = low;
-        for _ in 0..ITERATIONS {
-            let open = c * at + self.pressure_at(at) - s;
-            if open.abs() <= 4.0 * f64::EPSILON * s {
-                return at;
-            }
-            if open > 0.0 {
-                high = at;
-            } else {
-                low = at;
-            }
-            let newton = at - open / (c + self.slope_at(at));
-            at = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
-        }
-        at
+        let low = f64::max((s - self.limit) / c, s / (c + self.limit / self.velocity));
+        increasing_root(low, s / c, low, |v| [c * v + self.pressure_at(v) - s, c + self.slope_at(v)])
     }
 }
 

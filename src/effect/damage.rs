@@ -121,12 +121,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
             }
             batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
             if let Some(tangents) = &mut tangents {
-                let cell = batch.first + lane;
-                if slope != 0.0 && tangents.has(cell) {
+                let (tangent, flows) = tangents.entry::<S>(batch.first + lane);
+                weaken_tangent(law, (damage, slope, evolution.blend.length), &sound, tangent);
+                if flows && slope != 0.0 {
                     tangents.mark_skew();
                 }
-                let change = (damage, slope, evolution.blend.length);
-                weaken_tangent(law, change, &sound, tangents.last::<S>(cell));
             }
         }
         batch.integrity.weaken(left);

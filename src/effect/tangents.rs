@@ -32,28 +32,16 @@ impl Tangents {
         self.values.extend_from_slice(tangent.as_flattened());
     }
 
-    /// The matrix of this cell, zero if it had none, where no cell after it has one yet; for effects that change what others made of the
-    /// stress.
-    pub fn last<const S: usize>(&mut self, cell: usize) -> &mut [f64] {
-        // Cells of a batch come in order, so that the cell is among the last few.
-        let at = self.cells.iter().rposition(|&known| known as usize <= cell);
-        let at = match at {
-            Some(at) if self.cells[at] as usize == cell => at,
-            before => {
-                let at = before.map_or(0, |before| before + 1);
-                self.cells.insert(at, cell as u32);
-                let zeros = std::iter::repeat_n(0.0, S * S);
-                self.values.splice(at * S * S..at * S * S, zeros);
-                at
-            }
-        };
-        &mut self.values[at * S * S..][..S * S]
-    }
-
-    /// Whether this cell has a matrix.
-    pub fn has(&self, cell: usize) -> bool {
-        let last = self.cells.iter().rev().find(|&&known| known as usize <= cell);
-        last.is_some_and(|&known| known as usize == cell)
+    /// The matrix of this cell, zero if it had none, and whether it had one: for effects that change what others made of the stress.
+    pub fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
+        // Cells come in their order.
+        let found = self.cells.binary_search(&(cell as u32));
+        let at = found.unwrap_or_else(|at| {
+            self.cells.insert(at, cell as u32);
+            self.values.splice(at * S * S..at * S * S, std::iter::repeat_n(0.0, S * S));
+            at
+        });
+        (&mut self.values[at * S * S..][..S * S], found.is_ok())
     }
 
     /// Says that a matrix is not symmetric.

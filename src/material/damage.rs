@@ -14,7 +14,7 @@
 //! thinner the band of cells in which it gathers.
 
 use super::{Elastic, Elasticity, Hypothesis};
-use crate::tensor::Mandel;
+use crate::{law::increasing_root, tensor::Mandel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -80,27 +80,15 @@ impl Elastic<Damage> {
             return [start.min(largest), 0.0];
         }
         let left = |damage: f64| if exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(exponent) };
-        // The root lies between these: what is left falls with damage. Newton's method, halving where it leaves them.
-        let (mut low, mut high) = (start, (start + growth * left(start)).min(largest));
+        // What is left falls with damage.
+        let high = (start + growth * left(start)).min(largest);
         if high - start <= growth * left(high) {
             return if high < largest { [high, length / viscosity * left(high)] } else { [largest, 0.0] };
         }
         let slope = |damage: f64| 1.0 + growth * exponent * (1.0 - damage).powf(exponent - 1.0);
-        let mut damage = high;
-        for _ in 0..100 {
-            let excess = damage - start - growth * left(damage);
-            if excess > 0.0 {
-                high = damage
-            } else {
-                low = damage
-            }
-            let next = damage - excess / slope(damage);
-            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-            if (next - damage).abs() <= f64::EPSILON {
-                break;
-            }
-            damage = next;
-        }
+        let damage = increasing_root(start, high, high, |damage| {
+            [damage - start - growth * left(damage), slope(damage)]
+        });
         [damage, length / viscosity * left(damage) / slope(damage)]
     }
 }

@@ -281,7 +281,7 @@ fn resistance<const D: usize>(
     Ok([normal, against(motion, square)?])
 }
 
-/// Lets the contacts of a body be checked by the matrix of the whole body, however steps are solved. Collective.
+/// Sets the reference values of the contacts from the matrix of the whole body, however steps are solved. Collective.
 pub(super) fn set_reference_values<const D: usize>(
     session: &Session,
     contacts: &mut [Contact<D>],

@@ -13,10 +13,8 @@
 
 use super::{NO_YIELD_STRESS, Perzyna};
 use crate::{
-    material::{
-        Elastic, Tangent,
-        viscoplasticity::{Flow, return_mapping::increasing_root},
-    },
+    law::increasing_root,
+    material::{Elastic, Tangent, viscoplasticity::Flow},
     tensor::Mandel,
 };
 use std::f64::consts::FRAC_1_SQRT_2;
