@@ -201,6 +201,40 @@ fn files_that_are_no_mesh_in_parts_are_refused_on_all_ranks_together() {
 }
 
 #[test]
+fn a_mesh_in_parts_that_was_changed_and_sealed_again_is_not_the_one_its_header_tells_of() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = split(folder.path(), "wheel_segment", 2);
+    let places = |file: &hdf5::File| file.dataset("nodes/place").expect("coordinates");
+    let moved = {
+        let file = hdf5::File::open_rw(&path).expect("opened");
+        let mut coordinates = places(&file).read_2d::<f64>().expect("read");
+        coordinates[[5, 0]] *= 1.0 + 1e-12;
+        places(&file).write(&coordinates).expect("written");
+        coordinates
+    };
+    assert_eq!(places(&hdf5::File::open(&path).expect("opened")).read_2d::<f64>().expect("read"), moved);
+    reseal(&path);
+    for ranks in [1, 2] {
+        wheel(&path).run_with(ranks, &[]).expect(2).says("is not the one its header tells of");
+    }
+}
+
+/// Makes the seal true again, as `output/seal.rs` describes it.
+fn reseal(path: &Path) {
+    let mut bytes = std::fs::read(path).expect("read");
+    let (seal, content) = bytes.split_at_mut(512);
+    let blocks = content.chunks(1 << 20).enumerate();
+    let digest = blocks.fold(0_u64, |sum, (number, block)| {
+        sum.wrapping_add(xxhash_rust::xxh3::xxh3_64_with_seed(block, number as u64))
+    });
+    seal[24..32].copy_from_slice(&(512 + content.len() as u64).to_le_bytes());
+    seal[32..40].copy_from_slice(&digest.to_le_bytes());
+    let own = xxhash_rust::xxh3::xxh3_64(&seal[..504]);
+    seal[504..].copy_from_slice(&own.to_le_bytes());
+    std::fs::write(path, bytes).expect("written");
+}
+
+#[test]
 fn splitting_says_what_is_wrong_and_leaves_nothing() {
     let folder = tempfile::tempdir().expect("folder");
     let target = folder.path().join("out.h5").display().to_string();
