@@ -27,7 +27,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs lint install clean
+.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs bench-accuracy lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo 'make check64   only whether it compiles there'
 	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost; ARGS=--write puts the tables into docs'
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
+	@echo 'make bench-accuracy  the studies of docs/what-accuracy-costs.md; ARGS=--write puts their tables into it'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -98,6 +99,10 @@ bench: deps
 # --write puts the tables into docs/speed.md.
 bench-runs: deps
 	cargo bench --locked --bench whole_runs -- $(ARGS)
+
+# The studies behind docs/what-accuracy-costs.md, some ten minutes; ARGS=--write puts their tables into it.
+bench-accuracy: deps
+	cargo bench --locked --bench accuracy -- $(ARGS)
 
 lint: deps
 	cargo fmt --all --check
