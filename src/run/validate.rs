@@ -5,7 +5,7 @@ use crate::{
     body::Body,
     effect::Contact,
     error::Result,
-    job::{self, Job, Loaded, Material, MeshNames},
+    job::{Job, Loaded, Material, MeshNames},
     mesh::{Mesh, rigid::free_motions},
     session::Session,
 };
@@ -86,7 +86,8 @@ fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
 
 /// A fault if the scheme can't move some material at all.
 fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
-    if loaded.job.time.scheme != job::Scheme::LaggedEuler {
+    let scheme = loaded.job.time.scheme;
+    if scheme.is_implicit() {
         return Ok(());
     }
     for region in &mesh.regions {
@@ -96,8 +97,9 @@ fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Resul
             return Err(loaded.fault(
                 "time.scheme",
                 format!(
-                    "scheme \"lagged_euler\" takes elastic stress from the step before: without density and viscosity \
-                     nothing determines the velocity{place}"
+                    "scheme \"{}\" takes elastic stress from the step before: without density and viscosity nothing \
+                     determines the velocity{place}",
+                    scheme.name()
                 ),
                 "give [material] density or [material.viscosity], or take an implicit scheme",
             ));

@@ -72,7 +72,7 @@ pub fn in_dimension(
 /// Holds every run against the one that differs by the tightest tolerance only. Collective.
 pub fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut Results) -> Result<()> {
     let same = |a: &Planned, b: &Planned| {
-        (&a.cells, a.step, a.adaptive, &a.scheme, &a.set) == (&b.cells, b.step, b.adaptive, &b.scheme, &b.set)
+        (&a.cells, a.step, a.adaptive, a.scheme, &a.set) == (&b.cells, b.step, b.adaptive, b.scheme, &b.set)
     };
     for (at, planned) in plan.runs.iter().enumerate() {
         let others = plan.runs.iter().enumerate().filter(|(other, run)| {

@@ -14,7 +14,7 @@ fn sizes(plan: &Plan, ran: &[Ran]) -> Vec<Option<Size>> {
         record.is_complete().then(|| Size {
             family: format!(
                 "{} {:e} {:?} {:?}",
-                planned.scheme, planned.tolerance, planned.adaptive, planned.set
+                planned.scheme.name(), planned.tolerance, planned.adaptive, planned.set
             ),
             mesh: (record.cells as f64).powf(-1.0 / record.dimension.max(1) as f64),
             step: planned.step,
@@ -51,7 +51,7 @@ fn order(plan: &Plan, results: &Results, run: usize, norm: usize, refined: &Refi
         refined: refined.what,
         against: results.runs[refined.of].name.clone(),
         observed: observed(coarse, fine, refined.factor)?,
-        expected: theory.map(|norm| expected(norm, refined.what, &plan.runs[run].scheme)),
+        expected: theory.map(|norm| expected(norm, refined.what, plan.runs[run].scheme)),
     })
 }
 

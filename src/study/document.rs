@@ -171,8 +171,8 @@ pub struct Norm {
     pub space: Space,
     /// What is made of the values over time.
     pub over: Over,
-    /// The order that theory predicts; absent: of smooth solutions, 1 in V and Q and 2 in H with the mesh, 1 (bdf2: 2)
-    /// with the step, the lower one where both change.
+    /// The order that theory predicts; absent: of smooth solutions, 1 in V and Q and 2 in H with the mesh, that of
+    /// the scheme with the step, the lower one where both change.
     #[schemars(extend("exclusiveMinimum" = 0), example = 1.0)]
     pub expected_order: Option<f64>,
     /// Published errors, one for each [[run]] in their order: printed beside ours with ratio and order.

@@ -209,7 +209,7 @@ fn result(planned: &Planned, ran: &Ran, take: Take) -> RunResult {
     let record = &ran.record;
     RunResult {
         name: planned.name.clone(),
-        scheme: planned.scheme.clone(),
+        scheme: planned.scheme.name().to_owned(),
         cells: planned.cells.clone(),
         step: planned.step,
         adaptive: planned.adaptive,

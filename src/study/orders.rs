@@ -1,6 +1,7 @@
 //! Observed orders of convergence, and those that theory predicts.
 
 use super::document::{Norm, Space};
+use crate::job::Scheme;
 use serde::{Deserialize, Serialize};
 
 /// What a run was refined in against an earlier one.
@@ -89,9 +90,9 @@ pub fn observed(coarse: f64, fine: f64, factor: f64) -> Option<f64> {
 }
 
 /// The order that theory predicts: the study's, or that of smooth solutions.
-pub fn expected(norm: &Norm, what: Refined, scheme: &str) -> f64 {
+pub fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
     let mesh: f64 = if norm.space == Space::H { 2.0 } else { 1.0 };
-    let step = if scheme == "bdf2" { 2.0 } else { 1.0 };
+    let step = f64::from(scheme.order());
     norm.expected_order.unwrap_or(match what {
         Refined::Mesh => mesh,
         Refined::Step => step,
@@ -102,7 +103,10 @@ pub fn expected(norm: &Norm, what: Refined, scheme: &str) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::document::{Over, Quantity};
+    use crate::{
+        job::Scheme::{Bdf2, LaggedEuler},
+        study::document::{Over, Quantity},
+    };
 
     fn size(family: &str, cells: f64, step: f64) -> Option<Size> {
         Some(Size { family: family.into(), mesh: 1.0 / cells, step })
@@ -156,10 +160,10 @@ mod tests {
             published: Vec::new(),
             targets: Vec::new(),
         };
-        assert_eq!(expected(&norm(Space::H, None), Refined::Mesh, "bdf2"), 2.0);
-        assert_eq!(expected(&norm(Space::H, None), Refined::Both, "lagged_euler"), 1.0);
-        assert_eq!(expected(&norm(Space::V, None), Refined::Step, "bdf2"), 2.0);
-        assert_eq!(expected(&norm(Space::V, None), Refined::Both, "bdf2"), 1.0);
-        assert_eq!(expected(&norm(Space::V, Some(1.5)), Refined::Both, "bdf2"), 1.5);
+        assert_eq!(expected(&norm(Space::H, None), Refined::Mesh, Bdf2), 2.0);
+        assert_eq!(expected(&norm(Space::H, None), Refined::Both, LaggedEuler), 1.0);
+        assert_eq!(expected(&norm(Space::V, None), Refined::Step, Bdf2), 2.0);
+        assert_eq!(expected(&norm(Space::V, None), Refined::Both, Bdf2), 1.0);
+        assert_eq!(expected(&norm(Space::V, Some(1.5)), Refined::Both, Bdf2), 1.5);
     }
 }

@@ -23,8 +23,8 @@ pub struct Planned {
     pub cells: Vec<u32>,
     /// Length of a step in s.
     pub step: f64,
-    /// Name of the time scheme.
-    pub scheme: String,
+    /// Time scheme.
+    pub scheme: Scheme,
     /// The solver's tolerance.
     pub tolerance: f64,
     /// What else it overrides.
@@ -202,7 +202,7 @@ impl Source<'_> {
         }
         overrides.extend(run.step.map(|step| format!("time.step={step:?}")));
         overrides.extend(run.adaptive.map(|tolerance| self.adaptive(run, tolerance)));
-        overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", word(scheme))));
+        overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", scheme.name())));
         overrides.extend(run.tolerance.map(|tolerance| format!("solver.tolerance={tolerance:?}")));
         overrides.extend(run.set.iter().cloned());
         let mut loaded = Job::load(&self.file, &overrides).map_err(|error| {
@@ -232,7 +232,7 @@ impl Source<'_> {
         Ok(Planned {
             cells,
             step: job.time.step,
-            scheme: word(job.time.scheme),
+            scheme: job.time.scheme,
             tolerance: job.solver.tolerance,
             set: run.set.clone(),
             adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
@@ -297,16 +297,11 @@ fn called(run: &Run, fixed_name: Option<&str>) -> String {
 }
 
 fn made_name(job: &Job, cells: &[u32], run: &Run) -> String {
-    let mut parts = vec![word(job.time.scheme)];
+    let mut parts = vec![job.time.scheme.name().to_owned()];
     parts.extend((!cells.is_empty()).then(|| by(cells)));
     parts.push(run.adaptive.map_or(job.time.step.to_string(), |tolerance| format!("adaptive-{tolerance}")));
     parts.extend(run.tolerance.map(|tolerance| format!("{tolerance:e}")));
     parts.join("-")
-}
-
-/// A scheme's name in jobs.
-pub fn word(scheme: Scheme) -> String {
-    serde_json::to_value(scheme).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// All combinations, the steps running fastest.

@@ -28,18 +28,50 @@ pub struct Time {
     pub adaptive: Option<Adaptive>,
 }
 
-/// How a step is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Scheme {
+/// Makes [`Scheme`] of a list: the meaning of each scheme, its name in job files and its properties.
+macro_rules! schemes {
+    ($($(#[$about:meta])* $scheme:ident = $name:literal {
+        order: $order:literal, is_implicit: $is_implicit:literal, is_two_step: $is_two_step:literal
+    })*) => {
+        /// How a step is taken.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+        pub enum Scheme {
+            $($(#[$about])* #[serde(rename = $name)] $scheme,)*
+        }
+
+        impl Scheme {
+            /// Its name in job files.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$scheme => $name,)* }
+            }
+
+            /// Its order of convergence in time for smooth solutions.
+            pub fn order(self) -> u32 {
+                match self { $(Self::$scheme => $order,)* }
+            }
+
+            /// Whether every stress is taken at the end of the step.
+            pub fn is_implicit(self) -> bool {
+                match self { $(Self::$scheme => $is_implicit,)* }
+            }
+
+            /// Whether a step starts from the last two states.
+            pub fn is_two_step(self) -> bool {
+                match self { $(Self::$scheme => $is_two_step,)* }
+            }
+        }
+    };
+}
+
+schemes! {
     /// Wang and Cheng's (24)-(25): elastic and viscoplastic stress, damage, adhesion and contact memory lag by a step; stable for small
     /// steps only.
     #[default]
-    LaggedEuler,
+    LaggedEuler = "lagged_euler" { order: 1, is_implicit: false, is_two_step: false }
     /// Every stress at the end of the step: no bound on the step.
-    ImplicitEuler,
+    ImplicitEuler = "implicit_euler" { order: 1, is_implicit: true, is_two_step: false }
     /// Second order in time. What does not yield does not flow, as under implicit_euler.
-    Bdf2,
+    Bdf2 = "bdf2" { order: 2, is_implicit: true, is_two_step: true }
 }
 
 /// Steps chosen by their error.
