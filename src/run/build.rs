@@ -10,13 +10,13 @@ use crate::{
         fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named},
+    job::{self, Fix, Job, Material, Named, Scheme},
     material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     mesh::Mesh,
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme, SolverSettings},
+    stepping::{FactorPrecision, FrictionIteration, Method, Preconditioner, SolverSettings},
     tensor::Vector,
 };
 
@@ -31,7 +31,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = supports(job, &mesh);
     let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry, scheme(job)))?;
+    let effects = session.agree(effects(&materials, &geometry, job.time.scheme))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {
@@ -48,14 +48,14 @@ pub(super) fn body<const D: usize, const S: usize>(
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
     }
-    if scheme(job).is_two_step() {
+    if job.time.scheme.is_two_step() {
         state.previous_displacement = Some(state.displacement.like()?);
     }
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body { mesh, geometry, effects, contacts, surface_effects, load, fixed };
-    if job.time.adaptive.is_some() || scheme(job).is_two_step() {
+    if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
         body.keep_earlier();
     }
     Ok((body, state))
@@ -111,7 +111,7 @@ fn surface_effects<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
-    let is_implicit = scheme(job).is_implicit();
+    let is_implicit = job.time.scheme.is_implicit();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for contact in &job.contact {
         let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
@@ -218,15 +218,6 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     let mut velocity = state.velocity.owned_mut()?;
     velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
     Ok(())
-}
-
-/// The job's time scheme.
-pub(super) fn scheme(job: &Job) -> Scheme {
-    match job.time.scheme {
-        job::Scheme::LaggedEuler => Scheme::LaggedEuler,
-        job::Scheme::ImplicitEuler => Scheme::ImplicitEuler,
-        job::Scheme::Bdf2 => Scheme::Bdf2,
-    }
 }
 
 /// The job's wishes for the solver.

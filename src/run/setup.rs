@@ -41,7 +41,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
-    let scheme = Stepper::new(session, &body, &state, build::scheme(job), build::settings(job));
+    let scheme = Stepper::new(session, &body, &state, job.time.scheme, build::settings(job));
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",

@@ -10,37 +10,7 @@ use crate::{
     state::State,
 };
 
-/// How a step is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scheme {
-    /// Elastic and viscoplastic stress lag by a step, as in Wang and Cheng (2022).
-    LaggedEuler,
-    /// Every stress at the end of the step.
-    ImplicitEuler,
-    /// Every stress at the end of the step, second order.
-    Bdf2,
-}
-
-impl Scheme {
-    /// Its name in job files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LaggedEuler => "lagged_euler",
-            Self::ImplicitEuler => "implicit_euler",
-            Self::Bdf2 => "bdf2",
-        }
-    }
-
-    /// Whether elastic and viscoplastic stress are those at the end of the step.
-    pub fn is_implicit(self) -> bool {
-        self != Self::LaggedEuler
-    }
-
-    /// Whether a step starts from the last two states.
-    pub fn is_two_step(self) -> bool {
-        self == Self::Bdf2
-    }
-}
+pub use crate::job::Scheme;
 
 /// A scheme with what it keeps from one part of a step to the next.
 pub(super) enum Method {
