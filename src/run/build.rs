@@ -16,7 +16,7 @@ use crate::{
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::{FactorPrecision, FrictionIteration, Method, Preconditioner, SolverSettings},
+    stepping::SolverSettings,
     tensor::Vector,
 };
 
@@ -220,31 +220,16 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     Ok(())
 }
 
-/// The job's wishes for the solver.
+/// How the job has the equations of a step solved.
 pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
         tolerance: job.solver.tolerance,
         inclusion_tolerance: job.solver.inclusion_tolerance,
-        method: match job.solver.method {
-            job::Method::Newton => Method::Newton,
-            job::Method::Vinewtonrsls => Method::VariationalInequality,
-        },
-        preconditioner: match job.solver.preconditioner {
-            job::Preconditioner::Auto => Preconditioner::Auto,
-            job::Preconditioner::Cholesky => Preconditioner::Cholesky,
-            job::Preconditioner::Gamg => Preconditioner::Gamg,
-            job::Preconditioner::Boomeramg => Preconditioner::Boomeramg,
-        },
-        factor_precision: match job.solver.factor_precision {
-            job::FactorPrecision::Auto => FactorPrecision::Auto,
-            job::FactorPrecision::Single => FactorPrecision::Single,
-            job::FactorPrecision::Double => FactorPrecision::Double,
-        },
+        method: job.solver.method,
+        preconditioner: job.solver.preconditioner,
+        factor_precision: job.solver.factor_precision,
         steps: steps::steps_a_matrix(job),
         newton_iterations: job.solver.max_newton_iterations as usize,
-        friction: match job.solver.friction {
-            job::FrictionIteration::Newton => FrictionIteration::Newton,
-            job::FrictionIteration::FixedPoint => FrictionIteration::FixedPoint,
-        },
+        friction: job.solver.friction,
     }
 }

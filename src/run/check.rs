@@ -1,7 +1,7 @@
 //! Everything but the run: what a job would simulate, on which mesh, how and at what cost.
 
 use super::{
-    Inventory, build,
+    Inventory,
     estimate::Estimate,
     folder::refuse_unwritable,
     header,
@@ -104,7 +104,6 @@ fn report<const D: usize, const S: usize>(
     let steps = steps::landings(job).steps_after(0.0, longest);
     let inventory = Inventory::of(session, body, scheme);
     let (preconditioner, reason) = scheme.preconditioner();
-    let precision = build::settings(job).factor_precision;
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,
@@ -134,7 +133,7 @@ fn report<const D: usize, const S: usize>(
             worst_cell: quality.worst_cell,
             poor_cells: quality.poor,
         },
-        estimate: Estimate::new(session, body, &inventory, (preconditioner, precision), steps),
+        estimate: Estimate::new(session, body, &inventory, (preconditioner, job.solver.factor_precision), steps),
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         header: header::lines(session, loaded, ready)?,

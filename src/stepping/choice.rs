@@ -65,7 +65,7 @@ pub(super) fn whole_newton<const D: usize, const S: usize>(
     if body.flows() {
         newton.flow = Some(Flow::new(like)?);
     }
-    if settings.method == Method::VariationalInequality {
+    if settings.method == Method::Vinewtonrsls {
         session.agree(bounded::refuse(body))?;
         if body.flows() {
             return Err(Error::Refused(

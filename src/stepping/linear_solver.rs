@@ -5,47 +5,7 @@ use crate::{
     petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
 };
 
-/// The preconditioner a job asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Preconditioner {
-    /// Chosen by size.
-    Auto,
-    /// Cholesky factorisation.
-    Cholesky,
-    /// PETSc's smoothed aggregation multigrid with the rigid motions.
-    Gamg,
-    /// hypre's BoomerAMG.
-    Boomeramg,
-}
-
-/// What solves a step with contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Newton's method on the contact graphs.
-    Newton,
-    /// PETSc's solver for variational inequalities, where contacts are nothing but bounds on velocity components.
-    VariationalInequality,
-}
-
-/// How friction bounds that follow the contact pressure find it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrictionIteration {
-    /// Within Newton's method.
-    Newton,
-    /// Around Newton's method, which sees given bounds.
-    FixedPoint,
-}
-
-/// The precision of the factors of a matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FactorPrecision {
-    /// Single for large factors, where that is enough.
-    Auto,
-    /// 32 bits, where that is enough; solutions are corrected with residuals of 64 bits.
-    Single,
-    /// 64 bits.
-    Double,
-}
+pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner};
 
 /// How the equations of a step are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
