@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    job::Scalar,
+    job::{BodyForce, Scalar},
     mesh::{Mesh, shape::facet_normal},
     space::{Geometry, cell_rule, facet_rule},
     tensor::{Vector, norm},
@@ -14,13 +14,6 @@ pub struct Traction {
     /// Local facets.
     pub facets: Vec<u32>,
     /// One component an axis, in Pa.
-    pub value: Vec<Scalar>,
-}
-
-/// A force per volume in all cells.
-#[derive(Debug)]
-pub struct BodyForce {
-    /// One component an axis, in N/m^d.
     pub value: Vec<Scalar>,
 }
 

@@ -31,7 +31,7 @@ pub use damage::Damage;
 pub use elasticity::{ElasticLaw, Elasticity};
 pub use energy::{Energy, Role};
 pub use inertia::Inertia;
-pub use load::{BodyForce, Load, Traction};
+pub use load::{Load, Traction};
 pub use peaks::{PeakSquares, Peaks};
 pub use step_error::{Curvature, StressError};
 pub use support::{Held, Support, fixed_components};

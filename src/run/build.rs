@@ -5,7 +5,7 @@ use crate::{
     body::Body,
     contact::{Gap, NormalResponse},
     effect::{
-        self, Adhesion, BodyForce, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
+        self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
         Load, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
         fixed_components,
     },
@@ -187,7 +187,7 @@ fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {
     let traction = |t: &job::Traction| Traction { facets: facets(mesh, &t.on), value: t.value.clone() };
     Load {
         tractions: job.traction.iter().map(traction).collect(),
-        body_forces: job.body_force.iter().map(|b| BodyForce { value: b.value.clone() }).collect(),
+        body_forces: job.body_force.clone(),
     }
 }
 

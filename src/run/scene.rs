@@ -7,7 +7,7 @@ use crate::{
     job::{self, Loaded, Partition},
     mesh::{
         GlobalMesh, Mesh, distribute,
-        generate::{Cuboid, Diagonal, Grading, Grid, Rectangle, Toward},
+        generate::{Cuboid, Grading, Grid, Rectangle, Toward},
         gmsh::{self, AnyMesh},
         partition::{Method, divide},
     },
@@ -108,15 +108,9 @@ fn from_file(session: &Session, path: &Path) -> Result<Scene, Agreed> {
 }
 
 fn rectangle(of: &job::Rectangle) -> Result<Rectangle> {
-    let diagonal = match of.diagonal {
-        job::Diagonal::Right => Diagonal::Right,
-        job::Diagonal::Left => Diagonal::Left,
-        job::Diagonal::Alternating => Diagonal::Alternating,
-        job::Diagonal::Crossed => Diagonal::Crossed,
-    };
     let grading = |power, low, high| grading(power, &of.grading.toward, low, high);
     let gradings = [grading(of.grading.x, "left", "right"), grading(of.grading.y, "bottom", "top")];
-    Rectangle::new(of.size, of.cells.map(|n| n as usize), diagonal, gradings)
+    Rectangle::new(of.size, of.cells.map(|n| n as usize), of.diagonal, gradings)
 }
 
 fn cuboid(of: &job::Cuboid) -> Result<Cuboid> {

@@ -5,18 +5,7 @@ use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
 use std::ops::Range;
 
-/// How each quadrilateral of the grid is cut into triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Diagonal {
-    /// From the lower left to the upper right corner.
-    Right,
-    /// From the upper left to the lower right corner.
-    Left,
-    /// Right and left in turn, like a chessboard; right in the lower left corner.
-    Alternating,
-    /// Both, meeting in an extra node in the middle: four triangles.
-    Crossed,
-}
+pub use crate::job::Diagonal;
 
 /// A rectangle `[0, size[0]] x [0, size[1]]` (m) of quadrilaterals along x and y, each cut into triangles.
 ///
