@@ -1,4 +1,4 @@
-//! Pictures of the deformed body: coloured by speed, by von Mises stress, and under arrows along its contact boundary.
+//! Pictures of the deformed body: coloured by its fields, and under arrows along its contact boundary.
 
 use super::{
     colour::{Colour, Shades, VIRIDIS, dimmed, hex},
@@ -8,7 +8,15 @@ use super::{
     scale::{Scale, extent, number},
     view::{Face, View, faces, outline},
 };
-use crate::{error::Result, output::field_snapshot::Snapshot};
+use crate::{
+    error::Result,
+    output::{
+        field_list::DISPLACEMENT,
+        field_snapshot::Snapshot,
+        fields::{Place, Shape},
+        output_field::{OutputField, Shading},
+    },
+};
 use std::fmt::Write;
 
 /// Errors below this share of the largest are drawn as that.
@@ -45,8 +53,9 @@ impl<'a> Body<'a> {
     pub fn new(snapshot: &'a Snapshot) -> Self {
         let magnification = magnification(snapshot);
         let view = View::of(snapshot);
+        let displacement = snapshot.vectors(&DISPLACEMENT);
         let moved = |(n, x): (usize, &[f64; 3])| {
-            let u = snapshot.displacement.as_ref().map_or([0.0; 3], |field| field[n]);
+            let u = displacement.map_or([0.0; 3], |field| field[n]);
             std::array::from_fn(|i| x[i] + magnification * u[i])
         };
         let places = snapshot.nodes.iter().enumerate().map(moved).collect();
@@ -58,26 +67,40 @@ impl<'a> Body<'a> {
         Self { axes, ..self }
     }
 
-    /// Coloured by the speed of its nodes, if the file has it.
-    pub fn speed(&self) -> Result<Option<Picture>> {
-        let Some(velocity) = &self.snapshot.velocity else { return Ok(None) };
-        let speed: Vec<f64> = velocity.iter().map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
-        let look = Coloured { name: "speed", quantity: "speed", unit: "m/s", shades: VIRIDIS };
-        self.nodal(look, &speed).map(Some)
+    /// Coloured by a field, if it has a picture and the file has it.
+    pub fn of_field(&self, field: &OutputField) -> Result<Option<Picture>> {
+        let (Some(picture), Some(values)) = (field.picture, self.snapshot.values(field)) else {
+            return Ok(None);
+        };
+        let lengths: Vec<f64>;
+        let values = match field.shape {
+            Shape::Scalar => values,
+            Shape::Vector | Shape::Tensor => {
+                lengths = values.chunks_exact(field.width()).map(length).collect();
+                &lengths
+            }
+        };
+        let unit = field.unit(self.snapshot.dimension());
+        let look =
+            Coloured { name: picture.name, quantity: picture.quantity, unit, shades: VIRIDIS };
+        let of_face = |face: &Face| match field.place {
+            Place::Node => mean(face, values),
+            Place::Cell => values[face.cell as usize],
+        };
+        let drawn = match picture.shading {
+            Shading::Linear => self.field(look, linear(extent(values.iter().copied())), of_face)?,
+            Shading::Errors => {
+                let mut drawn = self.field(look, of_errors(values), of_face)?;
+                drawn.caption += &format!(" Of all cells together: {} {unit}.", number(length(values)));
+                drawn
+            }
+        };
+        Ok(Some(drawn))
     }
 
     /// Coloured by a quantity of its nodes.
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
-        let of_face = |face: &Face| face.nodes.iter().map(|n| values[*n as usize]).sum::<f64>() / 3.0;
-        self.field(look, linear(extent(values.iter().copied())), of_face)
-    }
-
-    /// Coloured by the von Mises norm of the stress in its cells, if the file has it.
-    pub fn von_mises(&self) -> Result<Option<Picture>> {
-        let Some(stress) = &self.snapshot.von_mises else { return Ok(None) };
-        let range = extent(stress.iter().copied());
-        let look = Coloured { name: "von_mises", quantity: "von Mises stress", unit: "Pa", shades: VIRIDIS };
-        self.field(look, linear(range), |face| stress[face.cell as usize]).map(Some)
+        self.field(look, linear(extent(values.iter().copied())), |face| mean(face, values))
     }
 
     /// Coloured by errors of its cells, by their powers of ten.
@@ -87,27 +110,9 @@ impl<'a> Body<'a> {
         self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize])
     }
 
-    /// Coloured by the error indicator of its cells, if the file has it: by powers of ten, down to a hundredth of
-    /// the largest, with the total.
-    pub fn error_indicator(&self) -> Result<Option<Picture>> {
-        let Some(errors) = &self.snapshot.error_indicator else { return Ok(None) };
-        let largest = extent(errors.iter().copied()).map_or(0.0, |range| range.1);
-        let unit = if self.snapshot.dimension() == 2 { "√(J/m)" } else { "√J" };
-        let look = Coloured { name: "error_indicator", quantity: "error indicator", unit, shades: VIRIDIS };
-        let scale = if largest > 0.0 {
-            Scale::logarithmic(errors.iter().copied().filter(|error| *error >= 1e-2 * largest))
-        } else {
-            Scale::linear(errors.iter().copied(), false)
-        };
-        let mut picture = self.field(look, scale, |face| errors[face.cell as usize])?;
-        let total = errors.iter().map(|error| error * error).sum::<f64>().sqrt();
-        picture.caption += &format!(" Of all cells together: {} {unit}.", number(total));
-        Ok(Some(picture))
-    }
-
     /// How much the displacement is magnified, in words.
     pub fn magnified(&self) -> String {
-        match &self.snapshot.displacement {
+        match self.snapshot.vectors(&DISPLACEMENT) {
             None => "undeformed".into(),
             Some(_) if self.magnification == 1.0 => "displacement to scale".into(),
             Some(_) => format!("displacement × {}", number(self.magnification)),
@@ -235,7 +240,7 @@ impl<'a> Body<'a> {
             return self.directions(frame);
         }
         let mut out = String::new();
-        if self.magnification != 0.0 && self.snapshot.displacement.is_some() {
+        if self.magnification != 0.0 && self.snapshot.vectors(&DISPLACEMENT).is_some() {
             out.push_str(
                 "<path fill=\"none\" stroke=\"#555\" stroke-width=\"1\" stroke-dasharray=\"5 4\" d=\"",
             );
@@ -274,6 +279,26 @@ fn linear(range: Option<(f64, f64)>) -> Scale {
     Scale::linear(range.map_or([0.0; 2], |(low, high)| [low, high]).into_iter(), false)
 }
 
+/// Of errors, down to a hundredth of the largest.
+fn of_errors(values: &[f64]) -> Scale {
+    match extent(values.iter().copied()) {
+        Some((_, largest)) if largest > 0.0 => {
+            Scale::logarithmic(values.iter().copied().filter(|error| *error >= 1e-2 * largest))
+        }
+        _ => Scale::linear(values.iter().copied(), false),
+    }
+}
+
+/// Of what nodes have, on a face.
+fn mean(face: &Face, nodal: &[f64]) -> f64 {
+    face.nodes.iter().map(|n| nodal[*n as usize]).sum::<f64>() / 3.0
+}
+
+/// The root of the sum of the squares.
+fn length(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
 fn size(snapshot: &Snapshot) -> f64 {
     let length =
         |axis: usize| extent(snapshot.nodes.iter().map(|x| x[axis])).map_or(0.0, |(low, high)| high - low);
@@ -282,7 +307,7 @@ fn size(snapshot: &Snapshot) -> f64 {
 
 /// A round factor that makes displacements visible; never below 1.
 fn magnification(snapshot: &Snapshot) -> f64 {
-    let lengths = snapshot.displacement.iter().flatten().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let lengths = snapshot.vectors(&DISPLACEMENT).into_iter().flatten().map(|u| length(u));
     let largest = extent(lengths).map_or(0.0, |range| range.1);
     let wanted = VISIBLE * size(snapshot) / largest;
     if wanted.is_finite() && wanted > 1.0 { leading_digit(wanted) } else { 1.0 }
@@ -297,6 +322,8 @@ fn leading_digit(size: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::field_list::{FIELDS, VELOCITY, VON_MISES};
+    use std::collections::BTreeMap;
 
     fn square(displacement: f64) -> Snapshot {
         Snapshot {
@@ -304,9 +331,11 @@ mod tests {
             cells: vec![0, 1, 2, 0, 2, 3],
             corners: 3,
             time: 0.5,
-            displacement: Some(vec![[displacement, 0.0, 0.0]; 4]),
-            velocity: Some(vec![[0.0, 3.0, 4.0]; 4]),
-            von_mises: Some(vec![1.0, 2.5]),
+            fields: BTreeMap::from([
+                ("displacement", [displacement, 0.0, 0.0].repeat(4)),
+                ("velocity", [0.0, 3.0, 4.0].repeat(4)),
+                ("von_mises", vec![1.0, 2.5]),
+            ]),
             ..Snapshot::default()
         }
     }
@@ -322,7 +351,7 @@ mod tests {
             let snapshot = square(displacement);
             let body = Body::new(&snapshot);
             assert_eq!(body.magnification, factor);
-            let picture = body.speed().expect("drawn").expect("velocity");
+            let picture = body.of_field(&VELOCITY).expect("drawn").expect("velocity");
             assert!(picture.svg.contains(words) && picture.caption.contains(words), "{}", picture.caption);
             assert!(picture.caption.contains("from 5 to 5 m/s"), "{}", picture.caption);
         }
@@ -330,16 +359,16 @@ mod tests {
 
     #[test]
     fn fields_that_a_file_lacks_are_not_drawn() {
-        let bare = Snapshot { velocity: None, von_mises: None, displacement: None, ..square(0.0) };
+        let bare = square(0.0).without_fields();
         let body = Body::new(&bare);
-        assert!(body.speed().expect("speed").is_none() && body.von_mises().expect("stress").is_none());
+        assert!(FIELDS.iter().all(|field| body.of_field(field).expect("nothing to draw").is_none()));
         assert_eq!(body.magnified(), "undeformed");
     }
 
     #[test]
     fn cells_of_different_stress_have_different_shades() {
         let snapshot = square(0.01);
-        let svg = Body::new(&snapshot).von_mises().expect("drawn").expect("stress").svg;
+        let svg = Body::new(&snapshot).of_field(&VON_MISES).expect("drawn").expect("stress").svg;
         for shade in [VIRIDIS.at(0.0), VIRIDIS.at(1.0)] {
             assert!(svg.contains(&format!("<path fill=\"{}\"", hex(shade))));
         }

@@ -10,15 +10,54 @@
 //!
 //! Means never cross the boundary between two materials, where stresses may jump.
 
+use super::{
+    field::{Place, Shape},
+    output_field::{Computed, Converged, FieldPicture, Figures, OutputField, Shading},
+};
 use crate::{
     body::Body,
     effect::Form,
     error::Result,
+    job::Output,
     material::Isotropic,
     petsc::DistributedVector,
     session::Session,
     tensor::{Mandel, add_scaled},
 };
+
+/// The indicator as a field that runs write.
+pub const ERROR_INDICATOR: OutputField = OutputField {
+    name: "error_indicator",
+    place: Place::Cell,
+    shape: Shape::Scalar,
+    units: ["√(J/m)", "√J"],
+    is_asked_for: Some(|output: &Output| output.error_indicator),
+    picture: Some(FieldPicture {
+        name: "error_indicator",
+        quantity: "error indicator",
+        shading: Shading::Errors,
+    }),
+    figures: Some(Figures {
+        names: &["error_indicator", "relative_error_indicator"],
+        line: |figures: &[f64]| {
+            format!("indicator  error of the stress {:.4e}, {:.1} % of its norm", figures[0], 100.0 * figures[1])
+        },
+        shown: &[(
+            "relative_error_indicator",
+            "error indicator over the norm of the stress at the end",
+            "",
+        )],
+    }),
+};
+
+/// Computes the field; its figures are total and relative size. Collective.
+pub(super) fn compute<'a, const D: usize, const S: usize>(
+    at: Converged<'a, D, S>,
+) -> Result<Option<Computed<'a>>> {
+    let indicator = &mut ErrorIndicator::new(at.session, at.body)?;
+    let Indicated { cells, total, relative } = indicator.of(at.session, at.body, at.stress)?;
+    Ok(Some(Computed { values: Box::new(cells), figures: vec![total, relative] }))
+}
 
 /// The indicator of a body, with room for the means.
 #[derive(Debug)]

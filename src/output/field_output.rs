@@ -1,46 +1,46 @@
 //! Which fields go into `fields.vtkhdf`.
 
 use super::{
-    field_snapshot::has_field,
+    field_list::{COUNT, FIELDS, computations},
     fields::{Field, FieldFile, FieldMesh, Place, Shape},
     log::Log,
+    output_field::{Computed, Converged, OutputField},
 };
 use crate::{
     agreement::Agreed,
     body::Body,
     effect::History,
     error::{Error, Result},
-    job::Output,
+    job::Job,
     session::Session,
-    state::State,
-    tensor::{Mandel, von_mises},
 };
 use hdf5::filters::deflate_available;
-use std::path::Path;
-
-/// Name of the field that the job asks for.
-pub const ERROR_INDICATOR: &str = "error_indicator";
+use std::{collections::BTreeMap, path::Path};
 
 /// The field file of a run.
-pub struct FieldOutput<const D: usize>(FieldFile<D>);
+pub struct FieldOutput<const D: usize> {
+    file: FieldFile<D>,
+    /// Which of [`FIELDS`] the run writes if it has them.
+    is_wanted: [bool; COUNT],
+}
 
 impl<const D: usize> FieldOutput<D> {
-    /// Creates the files with the mesh, or goes on with them behind this time; files that
-    /// can't be read are put aside. Refused where they hold the error indicator and it is not wanted, or the other way
-    /// round, and where HDF5 can't compress though it is to. Collective.
+    /// Creates the files in the output folder of the job with the mesh, or goes on with them behind this time; files that can't be
+    /// read are put aside. Refused where they hold a field that the job does not ask for, or the other way round, and where HDF5
+    /// can't compress though it is to. Collective.
     pub fn open<const S: usize>(
         session: &Session,
-        folder: &Path,
+        job: &Job,
         body: &Body<D, S>,
         goes_on_after: Option<f64>,
-        output: &Output,
         log: &mut Log,
     ) -> Result<Self> {
-        let (mesh, compression) = (&body.mesh, output.compression);
+        let (folder, mesh, compression) = (job.output_folder(), &body.mesh, job.output.compression);
         if compression > 0 && !deflate_available() {
             let words = "output.compression: the HDF5 library here was built without zlib; leave the key out";
             return Err(Error::Refused(words.into()));
         }
+        let is_wanted = FIELDS.each_ref().map(|field| field.is_wanted(&job.output));
         let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
         let (point_ids, cell_ids) = (wide(&mesh.node_ids[..mesh.owned]), wide(&mesh.cell_ids));
         let cells: Vec<u64> = mesh.cells.iter().map(|&node| u64::from(mesh.global_node(node))).collect();
@@ -50,83 +50,106 @@ impl<const D: usize> FieldOutput<D> {
             cells: &cells,
             cell_ids: &cell_ids,
         };
-        let file = folder.join("fields.vtkhdf");
-        let exists = session.largest([f64::from(u8::from(session.is_first() && file.exists()))])[0] > 0.0;
+        let create = || FieldFile::create(folder, session.world(), parts, compression);
+        let path = folder.join("fields.vtkhdf");
+        let exists = session.largest([f64::from(u8::from(session.is_first() && path.exists()))])[0] > 0.0;
         let (Some(time), true) = (goes_on_after, exists) else {
-            return Ok(Self(FieldFile::create(folder, session.world(), parts, compression)?));
+            return Ok(Self { file: create()?, is_wanted });
         };
-        let holds = if session.is_first() { has_field(&file, ERROR_INDICATOR) } else { None };
-        let fits = holds.is_none_or(|holds| holds == output.error_indicator);
-        session.agree(fits.then_some(()).ok_or_else(|| other_fields(&file, output.error_indicator)))?;
-        match FieldFile::resume(folder, session.world(), parts, time, compression) {
-            Ok(resumed) => Ok(Self(resumed)),
+        session.agree(if session.is_first() { refuse_other_fields(&path, is_wanted) } else { Ok(()) })?;
+        let file = match FieldFile::resume(folder, session.world(), parts, time, compression) {
+            Ok(resumed) => resumed,
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
                 log.warning(format!("{error}; it is kept as {}, a new one is begun", aside.display()));
-                let moved = if session.is_first() { std::fs::rename(&file, &aside) } else { Ok(()) };
+                let moved = if session.is_first() { std::fs::rename(&path, &aside) } else { Ok(()) };
                 session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
-                Ok(Self(FieldFile::create(folder, session.world(), parts, compression)?))
+                create()?
             }
-        }
+        };
+        Ok(Self { file, is_wanted })
     }
 
     /// Whether writing failed before, so that no step can follow.
     pub fn is_broken(&self) -> bool {
-        self.0.is_broken()
+        self.file.is_broken()
     }
 
     /// The last time written, if any.
     pub fn last_time(&self) -> Option<f64> {
-        self.0.times().last().copied()
+        self.file.times().last().copied()
     }
 
-    /// Appends the state, whose total stress is given one a cell, as is the error indicator if it is wanted. Collective.
-    pub fn write<const S: usize>(
-        &mut self,
-        body: &Body<D, S>,
-        state: &State,
-        stress: &[Mandel<S>],
-        indicator: Option<&[f64]>,
-    ) -> Result<()> {
-        let (displacement, velocity) = (state.displacement.owned()?, state.velocity.owned()?);
-        let norms: Vec<f64> = stress.iter().map(von_mises).collect();
-        let mut fields = vec![
-            Field { name: "displacement", place: Place::Node, shape: Shape::Vector, values: &displacement },
-            Field { name: "velocity", place: Place::Node, shape: Shape::Vector, values: &velocity },
-            Field { name: "stress", place: Place::Cell, shape: Shape::Tensor, values: stress.as_flattened() },
-            Field { name: "von_mises", place: Place::Cell, shape: Shape::Scalar, values: &norms },
-        ];
-        if let Some(values) = indicator {
-            fields.push(Field { name: ERROR_INDICATOR, place: Place::Cell, shape: Shape::Scalar, values });
+    /// Appends a state. Collective.
+    pub fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
+        let computed = self.computed(at, |_| true)?;
+        let mut fields = Vec::new();
+        for (OutputField { name, place, shape, .. }, computed) in &computed {
+            fields.push(Field { name, place: *place, shape: *shape, values: &**computed.values });
         }
-        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
-        if let Some(values) = traction.as_deref() {
-            fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
-        }
-        let of_cells: Vec<History> = body.effects.iter().flat_map(|e| e.histories()).collect();
+        let of_cells: Vec<History> = at.body.effects.iter().flat_map(|e| e.histories()).collect();
         for history in &of_cells {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
         }
-        let of_nodes: Vec<History> = body.surface_effects.iter().flat_map(|e| e.histories()).collect();
+        let of_nodes: Vec<History> = at.body.surface_effects.iter().flat_map(|e| e.histories()).collect();
         for history in &of_nodes {
             let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });
         }
-        Ok(self.0.write_step(state.time, &fields)?)
+        Ok(self.file.write_step(at.state.time, &fields)?)
+    }
+
+    /// The figures of the fields of a state, by their names. Collective.
+    pub fn figures<const S: usize>(&self, at: Converged<D, S>) -> Result<BTreeMap<&'static str, f64>, Agreed> {
+        let computed = self.computed(at, |field| field.figures.is_some())?;
+        let named = |(field, computed): (&OutputField, Computed)| {
+            field.figures.into_iter().flat_map(|f| f.names).copied().zip(computed.figures)
+        };
+        Ok(computed.into_iter().flat_map(named).collect())
+    }
+
+    /// Those fields of a state that the run writes and that are chosen. Collective.
+    fn computed<'a, const S: usize>(
+        &self,
+        at: Converged<'a, D, S>,
+        is_chosen: impl Fn(&OutputField) -> bool,
+    ) -> Result<Vec<(&'static OutputField, Computed<'a>)>, Agreed> {
+        let mut found = Vec::new();
+        for ((field, compute), is_wanted) in FIELDS.iter().zip(computations::<D, S>()).zip(self.is_wanted) {
+            if is_wanted && is_chosen(field) {
+                let computed = at.session.agree(compute(at))?;
+                found.extend(computed.map(|computed| (field, computed)));
+            }
+        }
+        Ok(found)
     }
 
     /// Closes the files. Collective.
     pub fn close(self) -> Result<(), Agreed> {
-        self.0.close()
+        self.file.close()
     }
 }
 
-fn other_fields(file: &Path, wants_indicator: bool) -> Error {
-    let (word, there) = if wants_indicator { ("does not hold", "false") } else { ("holds", "true") };
-    Error::Refused(format!(
-        "{} {word} {ERROR_INDICATOR}, and all its times have the same fields: go on with output.{ERROR_INDICATOR} = {there}, or \
-         in another output.folder from a named checkpoint (--restart FILE.h5)",
-        file.display()
-    ))
+/// Refuses a file whose times hold a field that the run does not write, or lack one that it writes. A file without times or one
+/// that can't be read fits.
+fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
+    let Ok(file) = hdf5::File::open(path) else { return Ok(()) };
+    if !file.link_exists("VTKHDF/Steps") {
+        return Ok(());
+    }
+    for (OutputField { name, .. }, is_wanted) in
+        FIELDS.iter().zip(is_wanted).filter(|(field, _)| field.is_asked_for.is_some())
+    {
+        let holds = file.link_exists(&format!("Fields/{name}"));
+        if holds != is_wanted {
+            let word = if holds { "holds" } else { "does not hold" };
+            return Err(Error::Refused(format!(
+                "{} {word} {name}, and all its times have the same fields: go on with output.{name} = {holds}, or in another \
+                 output.folder from a named checkpoint (--restart FILE.h5)",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
 }

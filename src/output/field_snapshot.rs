@@ -1,8 +1,12 @@
 //! The mesh and the newest fields of a `fields.vtkhdf`, read in one process, without MPI.
 
-use super::field_output::ERROR_INDICATOR;
+use super::{
+    field::{Place, Shape},
+    field_list::FIELDS,
+    output_field::OutputField,
+};
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 /// The body and its fields at the last time in the file.
 #[derive(Debug, Clone, Default)]
@@ -17,14 +21,8 @@ pub struct Snapshot {
     pub cells: Vec<u32>,
     /// Nodes of a cell: 3 for triangles, 4 for tetrahedra.
     pub corners: usize,
-    /// Displacement of the nodes in m.
-    pub displacement: Option<Vec<[f64; 3]>>,
-    /// Velocity of the nodes in m/s.
-    pub velocity: Option<Vec<[f64; 3]>>,
-    /// Von Mises norm of the stress of the cells in Pa.
-    pub von_mises: Option<Vec<f64>>,
-    /// Error indicator of the cells in J^(1/2), in two dimensions (J/m)^(1/2).
-    pub error_indicator: Option<Vec<f64>>,
+    /// Values at that time of the fields that runs write, as files hold them, by their names; tensors are left out.
+    pub fields: BTreeMap<&'static str, Vec<f64>>,
 }
 
 impl Snapshot {
@@ -50,7 +48,17 @@ impl Snapshot {
 
     /// The body without what moves and stresses it.
     pub fn without_fields(self) -> Self {
-        Self { displacement: None, velocity: None, von_mises: None, ..self }
+        Self { fields: BTreeMap::new(), ..self }
+    }
+
+    /// Values of a field, if the file has it: three numbers a node or cell of vectors.
+    pub fn values(&self, field: &OutputField) -> Option<&[f64]> {
+        self.fields.get(field.name).map(Vec::as_slice)
+    }
+
+    /// Vectors of a field, if the file has it.
+    pub fn vectors(&self, field: &OutputField) -> Option<&[[f64; 3]]> {
+        self.values(field).map(|values| values.as_chunks().0)
     }
 
     /// Nodes of each cell.
@@ -60,25 +68,19 @@ impl Snapshot {
 
     fn is_sound(&self) -> bool {
         let nodes = self.nodes.len();
-        let fits = |field: &Option<Vec<[f64; 3]>>| field.as_ref().is_none_or(|f| f.len() == nodes);
-        let fits_cells = |field: &Option<Vec<f64>>| {
-            field.as_ref().is_none_or(|f| f.len() * self.corners == self.cells.len())
+        let fits = |field: &OutputField| {
+            let rows = match field.place {
+                Place::Node => nodes,
+                Place::Cell => self.cells.len() / self.corners,
+            };
+            self.values(field).is_none_or(|values| values.len() == rows * field.width())
         };
         matches!(self.corners, 3 | 4)
             && !self.cells.is_empty()
             && self.cells.len().is_multiple_of(self.corners)
             && self.cells.iter().all(|node| (*node as usize) < nodes)
-            && fits(&self.displacement)
-            && fits(&self.velocity)
-            && fits_cells(&self.von_mises)
-            && fits_cells(&self.error_indicator)
+            && FIELDS.iter().all(fits)
     }
-}
-
-/// Whether the steps of a field file hold the field; nothing for a file without steps or one that can't be read.
-pub fn has_field(path: &Path, name: &str) -> Option<bool> {
-    let file = hdf5::File::open(path).ok()?;
-    file.link_exists("VTKHDF/Steps").then(|| file.link_exists(&format!("Fields/{name}")))
 }
 
 fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
@@ -96,17 +98,13 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     snapshot.times.truncate(usize::try_from(steps).unwrap_or(0));
     let Some(&time) = snapshot.times.last() else { return Ok(snapshot) };
     snapshot.time = time;
-    let newest = |name: &str| -> hdf5::Result<Option<Vec<f64>>> {
+    for OutputField { name, .. } in FIELDS.iter().filter(|field| field.shape != Shape::Tensor) {
         let group = format!("Fields/{name}");
-        if !file.link_exists(&group) {
-            return Ok(None);
+        if file.link_exists(&group) {
+            let values = file.dataset(&format!("{group}/{}", steps - 1))?.read_raw::<f64>()?;
+            snapshot.fields.insert(name, values);
         }
-        file.dataset(&format!("{group}/{}", steps - 1))?.read_raw::<f64>().map(Some)
-    };
-    snapshot.displacement = newest("displacement")?.as_deref().map(triples);
-    snapshot.velocity = newest("velocity")?.as_deref().map(triples);
-    snapshot.von_mises = newest("von_mises")?;
-    snapshot.error_indicator = newest(ERROR_INDICATOR)?;
+    }
     Ok(snapshot)
 }
 

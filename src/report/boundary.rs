@@ -12,7 +12,11 @@ use super::{
     scale::{extent, number},
     table::Table,
 };
-use crate::{contact::FrictionLaw, error::Result, output::field_snapshot::Snapshot};
+use crate::{
+    contact::FrictionLaw,
+    error::Result,
+    output::{field_list::VELOCITY, field_snapshot::Snapshot},
+};
 use std::collections::HashMap;
 
 /// Bands behind a chart beyond which they would only confuse.
@@ -295,7 +299,7 @@ impl<'a> Boundary<'a> {
         let (Some(law), Some(Behind { snapshot, nodes, normals })) = (&self.friction, &self.behind) else {
             return Ok(None);
         };
-        let Some(velocity) = &snapshot.velocity else { return Ok(None) };
+        let Some(velocity) = snapshot.vectors(&VELOCITY) else { return Ok(None) };
         let pressure = self.table.column("contact_pressure").unwrap_or_default();
         let tractions: Vec<Vec<f64>> = ["x", "y", "z"]
             .iter()

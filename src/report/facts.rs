@@ -7,12 +7,15 @@ use super::{
     picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
     scale::{number, size},
 };
-use crate::certificate::{Accepted, Certificates};
+use crate::{
+    certificate::{Accepted, Certificates},
+    output::field_list::FIELDS,
+};
 use serde_json::Value;
 use std::fmt::Write;
 
-/// Members of `summary.json` with their words, in the order of the page.
-const MEMBERS: [(&str, &str, &str); 24] = [
+/// Members of `summary.json` with their words and units, in the order of the page: those before the figures of fields.
+const MEMBERS: [(&str, &str, &str); 10] = [
     ("status", "status", ""),
     ("error", "error", ""),
     ("time", "time reached", "s"),
@@ -23,7 +26,10 @@ const MEMBERS: [(&str, &str, &str); 24] = [
     ("final_von_mises", "largest von Mises stress at the end", "Pa"),
     ("max_von_mises", "largest von Mises stress of the run", "Pa"),
     ("max_strain", "largest strain of the run", ""),
-    ("relative_error_indicator", "error indicator over the norm of the stress at the end", ""),
+];
+
+/// Those behind the figures of fields.
+const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
     ("max_slip_pressure", "largest contact pressure under slip weakening", "Pa"),
@@ -42,7 +48,8 @@ const MEMBERS: [(&str, &str, &str); 24] = [
 /// Status in one sentence, and the table of everything that `summary.json` says about the run.
 pub fn summary(summary: &Value) -> String {
     let mut rows: Vec<(String, String)> = Vec::new();
-    for (member, words, unit) in MEMBERS {
+    let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
+    for &(member, words, unit) in MEMBERS.iter().chain(figures).chain(&MORE_MEMBERS) {
         match summary.get(member) {
             None | Some(Value::Null) => {}
             Some(value) => rows.push((words.into(), with_unit(value, unit))),

@@ -15,6 +15,7 @@ use crate::{
     drawing::{body, chart, colour, markup, picture, scale, view},
     effect::Energy,
     error::{Error, Result},
+    output::field_list::FIELDS,
     run::VERSION,
 };
 use artifacts::{Found, Gap};
@@ -125,8 +126,8 @@ fn head(found: &Found) -> String {
 fn body_section(page: &mut Page, found: &Found) -> Result<()> {
     let Some(snapshot) = &found.snapshot else { return Ok(()) };
     let body = Body::new(snapshot);
-    let pictures: Vec<_> =
-        [body.speed()?, body.von_mises()?, body.error_indicator()?].into_iter().flatten().collect();
+    let drawn = FIELDS.iter().filter_map(|field| body.of_field(field).transpose());
+    let pictures = drawn.collect::<Result<Vec<_>>>()?;
     let words = if pictures.is_empty() {
         paragraph("fields.vtkhdf holds a mesh, but no fields yet.")
     } else {

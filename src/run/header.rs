@@ -4,7 +4,7 @@ use super::{Summary, setup::Setup};
 use crate::{
     error::Result,
     job::{Loaded, Method},
-    output::log::Log,
+    output::{field_list::FIELDS, log::Log, output_field::Figures},
     session::Session,
 };
 use std::path::Path;
@@ -75,8 +75,9 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         summary.peaks.von_mises,
         summary.final_von_mises
     ));
-    if let (Some(total), Some(share)) = (summary.error_indicator, summary.relative_error_indicator) {
-        log.line(format!("indicator  error of the stress {total:.4e}, {:.1} % of its norm", 100.0 * share));
+    for Figures { names, line, .. } in FIELDS.iter().filter_map(|field| field.figures) {
+        let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
+        found.into_iter().for_each(|figures| log.line(line(&figures)));
     }
     if let Some(guesses) = summary.guesses {
         log.line(format!(

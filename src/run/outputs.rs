@@ -8,10 +8,10 @@ use crate::{
     output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, prune},
-        error_indicator::{ErrorIndicator, Indicated},
         field_output::FieldOutput,
         history::{History, Totals},
         log::Log,
+        output_field::Converged,
         probes::Probes,
         profiles::Profiles,
         whole_file::write_whole,
@@ -22,6 +22,7 @@ use crate::{
     tensor::Mandel,
 };
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -34,7 +35,6 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     probes: Probes<D>,
     profiles: Profiles<D>,
     fields: FieldOutput<D>,
-    indicator: Option<ErrorIndicator<S>>,
     every: Option<Every>,
     keep: usize,
     /// Bytes of the files that grow when the run began to write, and of checkpoints so far; on rank 0.
@@ -70,8 +70,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let before = if goes_on && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
-        let fields = FieldOutput::open(session, &folder, body, time, &job.output, log)?;
-        let indicator = job.output.error_indicator.then(|| ErrorIndicator::new(session, body)).transpose()?;
+        let fields = FieldOutput::open(session, job, body, time, log)?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
         let every = job.output.fields;
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
@@ -95,7 +94,6 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             probes,
             profiles,
             fields,
-            indicator,
             every,
             keep,
             before,
@@ -148,22 +146,16 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
 
     fn write_fields(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let stress = session.agree(body.stress(state))?;
-        let indicated = self.indicated(session, body, &stress)?;
-        self.fields.write(body, state, &stress, indicated.as_ref().map(|indicated| &indicated.cells[..]))?;
+        self.fields.write(Converged { session, body, state, stress: &stress })?;
         if !self.profiles.is_empty() {
             self.profiles.write(session, body, state, &stress)?;
         }
         Ok(())
     }
 
-    /// The error indicator of a stress, if the job asks for it. Collective.
-    pub fn indicated(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        stress: &[Mandel<S>],
-    ) -> Result<Option<Indicated>> {
-        self.indicator.as_mut().map(|indicator| indicator.of(session, body, stress)).transpose()
+    /// Numbers that sum up the fields of a state, by their names in `summary.json`. Collective.
+    pub fn figures(&self, at: Converged<D, S>) -> Result<BTreeMap<&'static str, f64>, Agreed> {
+        self.fields.figures(at)
     }
 
     /// Brings all rows to the files.

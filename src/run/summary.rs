@@ -8,7 +8,7 @@ use crate::{
     output::whole_file::write_whole,
 };
 use serde::Serialize;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 /// The file in the output folder.
 pub(super) const SUMMARY: &str = "summary.json";
@@ -66,12 +66,9 @@ pub struct Summary {
     /// Largest stress and strain after any step.
     #[serde(flatten)]
     pub peaks: Peaks,
-    /// Error indicator of the stress at the end, in J^(1/2), in two dimensions (J/m)^(1/2); absent unless asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error_indicator: Option<f64>,
-    /// Its share in the norm of the stress.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub relative_error_indicator: Option<f64>,
+    /// Figures of the fields that the run writes, at the end.
+    #[serde(flatten)]
+    pub of_fields: BTreeMap<&'static str, f64>,
     /// Largest scaled distance to a contact graph in any step.
     pub max_inclusion_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.

@@ -21,7 +21,7 @@ use crate::{
     error::{Error, Exit, Result},
     job::{Accept, Job, Loaded},
     mesh::Mesh,
-    output::{checkpoint::Identity, history::Totals, log::Log},
+    output::{checkpoint::Identity, history::Totals, log::Log, output_field::Converged},
     petsc::Precision,
     session::Session,
     state::State,
@@ -332,14 +332,15 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 
     fn summary(
-        &mut self,
+        &self,
         status: &'static str,
         error: Option<String>,
         restarted_from: Option<String>,
     ) -> Result<Summary> {
         let stress = self.body.stress(&self.state)?;
         let von_mises = stress.iter().map(von_mises).fold(0.0, larger);
-        let indicated = self.outputs.indicated(self.session, &self.body, &stress)?;
+        let (session, body, state) = (self.session, &self.body, &self.state);
+        let of_fields = self.outputs.figures(Converged { session, body, state, stress: &stress })?;
         let mesh = &self.body.mesh;
         Ok(Summary {
             status,
@@ -365,8 +366,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             restarted_from,
             final_von_mises: self.session.largest([von_mises])[0],
             peaks: self.totals.peaks,
-            error_indicator: indicated.as_ref().map(|indicated| indicated.total),
-            relative_error_indicator: indicated.as_ref().map(|indicated| indicated.relative),
+            of_fields,
             max_inclusion_residual: self.totals.max_inclusion_residual,
             max_energy_imbalance: self.totals.max_energy_imbalance,
             max_slip_pressure: self.totals.max_slip_pressure,

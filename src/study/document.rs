@@ -1,6 +1,12 @@
 //! The study as plain structs: the single source of every key's name, meaning, unit, range and default.
 
-use crate::job::{Kind, Scalar, Scheme, schema_of};
+use crate::{
+    job::{Kind, Scalar, Scheme, schema_of},
+    output::{
+        field_list::{DISPLACEMENT, STRESS, VELOCITY},
+        output_field::OutputField,
+    },
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{path::PathBuf, sync::LazyLock};
@@ -195,6 +201,17 @@ pub enum Quantity {
     Velocity,
     /// The total stress.
     Stress,
+}
+
+impl Quantity {
+    /// The field of field files that holds it.
+    pub fn field(self) -> &'static OutputField {
+        match self {
+            Self::Displacement => &DISPLACEMENT,
+            Self::Velocity => &VELOCITY,
+            Self::Stress => &STRESS,
+        }
+    }
 }
 
 /// The norm in space.

@@ -120,12 +120,9 @@ fn front(points: &[Point]) -> Vec<Point> {
 
 fn unit(of: Option<(Quantity, Space)>) -> &'static str {
     match of {
-        Some((Quantity::Stress, _)) => "Pa",
-        Some((Quantity::Displacement, Space::V)) => "",
-        Some((Quantity::Displacement, _)) => "m",
+        None | Some((Quantity::Displacement, Space::V)) => "",
         Some((Quantity::Velocity, Space::V)) => "1/s",
-        Some((Quantity::Velocity, _)) => "m/s",
-        None => "",
+        Some((of, _)) => of.field().units[0],
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::{
     error::{Error, Result},
+    output::fields::Place,
     space::Simplex,
     study::document::Quantity,
     tensor::Vector,
@@ -114,21 +115,24 @@ impl<const D: usize> StoredFields<D> {
 
     /// The values of a quantity at step `step` of the file.
     pub fn values(&self, of: Quantity, step: usize) -> Result<Values<D>> {
-        let (name, rows) = match of {
-            Quantity::Displacement => ("displacement", self.mesh.nodes.len()),
-            Quantity::Velocity => ("velocity", self.mesh.nodes.len()),
-            Quantity::Stress => ("stress", self.mesh.count()),
+        let field = of.field();
+        let name = field.name;
+        let rows = match field.place {
+            Place::Node => self.mesh.nodes.len(),
+            Place::Cell => self.mesh.count(),
         };
         let set = self.file.dataset(&format!("Fields/{name}/{step}")).and_then(|set| set.read_raw::<f64>());
         let numbers = set.map_err(|error| Error::unreadable(&self.path, error))?;
-        let width = if of == Quantity::Stress { 6 } else { 3 };
-        if numbers.len() != rows * width {
+        if numbers.len() != rows * field.width() {
             return Err(Error::Failed(format!("{}: field {name} is damaged", self.path.display())));
         }
-        Ok(if of == Quantity::Stress {
-            Values::Cells(numbers.chunks_exact(6).map(|c| std::array::from_fn(|i| c[i])).collect())
-        } else {
-            Values::Nodal(numbers.chunks_exact(3).map(|c| std::array::from_fn(|i| c[i])).collect())
+        Ok(match field.place {
+            Place::Cell => {
+                Values::Cells(numbers.chunks_exact(6).map(|c| std::array::from_fn(|i| c[i])).collect())
+            }
+            Place::Node => {
+                Values::Nodal(numbers.chunks_exact(3).map(|c| std::array::from_fn(|i| c[i])).collect())
+            }
         })
     }
 
