@@ -54,28 +54,39 @@ pub struct Identity {
     pub physics: BTreeMap<String, String>,
 }
 
-/// Saves the state. Collective, with the same outcome on all ranks.
+impl Header {
+    /// Of a state, and the sums over the steps to it.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        identity: &Identity,
+        body: &Body<D, S>,
+        state: &State,
+        totals: &Totals,
+    ) -> Self {
+        Self {
+            format: FORMAT,
+            version: identity.version.clone(),
+            ranks: session.ranks(),
+            dimension: D,
+            step: state.step,
+            time: state.time,
+            step_length: state.step_length,
+            totals: *totals,
+            mesh: digest(body),
+            physics: identity.physics.clone(),
+        }
+    }
+}
+
+/// Saves the state under its header. Collective, with the same outcome on all ranks.
 pub fn save<const D: usize, const S: usize>(
     session: &Session,
     path: &Path,
-    identity: &Identity,
+    header: &Header,
     body: &Body<D, S>,
     state: &State,
-    totals: &Totals,
 ) -> Result<()> {
-    let header = Header {
-        format: FORMAT,
-        version: identity.version.clone(),
-        ranks: session.ranks(),
-        dimension: D,
-        step: state.step,
-        time: state.time,
-        step_length: state.step_length,
-        totals: *totals,
-        mesh: digest(body),
-        physics: identity.physics.clone(),
-    };
-    let header = serde_json::to_vec_pretty(&header)
+    let header = serde_json::to_vec_pretty(header)
         .map_err(|e| Error::Internal(format!("the checkpoint's header can't be written: {e}")))?;
     let (nodes, cells) = (owned_node_ids(body), cell_ids(body));
     let sets = [

@@ -82,14 +82,14 @@ impl<const D: usize> FieldFile<D> {
         let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
         let points = Slab::new(&file, &communicator, mesh.points.len());
         let cells = Slab::new(&file, &communicator, mesh.cell_ids.len());
-        write_mesh(&file, &communicator, &mesh, [&points, &cells], compression)?;
-        file.flush()?;
-        let xdmf = folder.join("fields.xdmf");
-        let stale = communicator.rank() == 0 && xdmf.exists();
-        let removed = if stale { std::fs::remove_file(&xdmf) } else { Ok(()) };
-        agree(&communicator, removed.map_err(|error| Error::unwritable(&xdmf, error)))?;
-        let (kinds, times) = (Vec::new(), Vec::new());
-        Ok(Self { file, communicator, xdmf, points, cells, kinds, times, compression })
+        let (kinds, times, xdmf) = (Vec::new(), Vec::new(), folder.join("fields.xdmf"));
+        let created = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
+        created.write_mesh(&mesh)?;
+        created.file.flush()?;
+        let stale = created.communicator.rank() == 0 && created.xdmf.exists();
+        let removed = if stale { std::fs::remove_file(&created.xdmf) } else { Ok(()) };
+        agree(&created.communicator, removed.map_err(|error| Error::unwritable(&created.xdmf, error)))?;
+        Ok(created)
     }
 
     /// Opens the files of an earlier run to go on, keeping the steps up to `time` (s). The mesh must be the same, its
@@ -163,6 +163,47 @@ impl<const D: usize> FieldFile<D> {
     /// Closes the files.
     pub fn close(self) -> Result<(), Agreed> {
         self.file.close()
+    }
+
+    fn write_mesh(&self, mesh: &FieldMesh<D>) -> Result<(), Agreed> {
+        let Self { file, points, cells, compression: level, .. } = self;
+        for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
+            file.create_group(group)?;
+        }
+        file.set_numbers("VTKHDF", "Version", &[2_i64, 3])?;
+        file.set_text("VTKHDF", "Type", "UnstructuredGrid")?;
+        let first = self.communicator.rank() == 0;
+        let corners = D + 1;
+        let only_first = |value: u64| if first { vec![value as i64] } else { Vec::new() };
+        for (name, count) in [
+            ("NumberOfPoints", points.total),
+            ("NumberOfCells", cells.total),
+            ("NumberOfConnectivityIds", cells.total * corners as u64),
+        ] {
+            file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
+        }
+        let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
+        let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
+        file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, *level)?
+            .write(points.first, &coordinates)?;
+        file.create_packed_rows::<i64>("Mesh/cells", cells.total, corners, *level)?
+            .write(cells.first, &whole(mesh.cells))?;
+        file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
+
+        let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
+        let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
+        let start = if first { 0 } else { cells.first + 1 };
+        file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, *level)?.write(start, &offsets)?;
+        let kind: u8 = if D == 2 { 5 } else { 10 };
+        file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, *level)?
+            .write(cells.first, &vec![kind; cells.owned])?;
+
+        let node_ids = file.create_packed_rows::<i64>("VTKHDF/PointData/node", points.total, 1, *level)?;
+        node_ids.write(points.first, &whole(mesh.point_ids))?;
+        let cell_ids = file.create_packed_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1, *level)?;
+        cell_ids.write(cells.first, &whole(mesh.cell_ids))?;
+        let ranks = file.create_packed_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1, *level)?;
+        ranks.write(cells.first, &vec![self.communicator.rank(); cells.owned])
     }
 
     fn slab(&self, place: Place) -> &Slab {
@@ -261,52 +302,6 @@ impl<const D: usize> FieldFile<D> {
         };
         agree(&self.communicator, written)
     }
-}
-
-fn write_mesh<const D: usize>(
-    file: &ParallelFile,
-    communicator: &impl Communicator,
-    mesh: &FieldMesh<D>,
-    [points, cells]: [&Slab; 2],
-    level: u8,
-) -> Result<(), Agreed> {
-    for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
-        file.create_group(group)?;
-    }
-    file.set_numbers("VTKHDF", "Version", &[2_i64, 3])?;
-    file.set_text("VTKHDF", "Type", "UnstructuredGrid")?;
-    let first = communicator.rank() == 0;
-    let corners = D + 1;
-    let only_first = |value: u64| if first { vec![value as i64] } else { Vec::new() };
-    for (name, count) in [
-        ("NumberOfPoints", points.total),
-        ("NumberOfCells", cells.total),
-        ("NumberOfConnectivityIds", cells.total * corners as u64),
-    ] {
-        file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
-    }
-    let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
-    let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
-    file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, level)?
-        .write(points.first, &coordinates)?;
-    file.create_packed_rows::<i64>("Mesh/cells", cells.total, corners, level)?
-        .write(cells.first, &whole(mesh.cells))?;
-    file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
-
-    let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
-    let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
-    let start = if first { 0 } else { cells.first + 1 };
-    file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, level)?.write(start, &offsets)?;
-    let kind: u8 = if D == 2 { 5 } else { 10 };
-    file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, level)?
-        .write(cells.first, &vec![kind; cells.owned])?;
-
-    let node_ids = file.create_packed_rows::<i64>("VTKHDF/PointData/node", points.total, 1, level)?;
-    node_ids.write(points.first, &whole(mesh.point_ids))?;
-    let cell_ids = file.create_packed_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1, level)?;
-    cell_ids.write(cells.first, &whole(mesh.cell_ids))?;
-    let ranks = file.create_packed_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1, level)?;
-    ranks.write(cells.first, &vec![communicator.rank(); cells.owned])
 }
 
 fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>, Agreed> {

@@ -54,8 +54,11 @@ impl<const D: usize> Probes<D> {
         self.names.is_empty()
     }
 
-    /// Opens the file on rank 0, behind this step if the run goes on.
+    /// Opens the file on rank 0, if there are probes; behind this step if the run goes on.
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
+        if self.is_empty() {
+            return Ok(());
+        }
         let path = folder.join("probes.csv");
         let axes = &["x", "y", "z"][..D];
         let columns = |what: &str| axes.iter().map(|a| format!(",{what}_{a}")).collect::<String>();
@@ -89,9 +92,6 @@ impl<const D: usize> Probes<D> {
 
     /// Writes the rows of a step. Collective.
     pub fn write(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
-        if self.is_empty() {
-            return Ok(());
-        }
         self.values(session, mesh, state)?;
         let Some(file) = &mut self.file else { return Ok(()) };
         for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {

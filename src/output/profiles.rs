@@ -54,13 +54,11 @@ impl<const D: usize> Profiles<D> {
         })
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.profiles.is_empty()
-    }
-
-    /// Opens the file on rank 0, behind this time if the run goes on.
+    /// Opens the file on rank 0, if there are profiles; behind this time if the run goes on.
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<f64>) -> Result<()> {
+        if self.profiles.is_empty() {
+            return Ok(());
+        }
         let path = folder.join("profiles.csv");
         let axes = ["x", "y", "z"][..D].join(",");
         let friction = ["x", "y", "z"][..if self.with_friction { D } else { 0 }]

@@ -18,6 +18,7 @@ use crate::{
     mesh::{Mesh, check::Quality},
     session::Session,
     state::State,
+    stepping::ProblemSize,
 };
 use serde::Serialize;
 
@@ -104,6 +105,7 @@ fn report<const D: usize, const S: usize>(
     let steps = steps::landings(job).steps_after(0.0, longest);
     let inventory = Inventory::of(session, body, scheme);
     let (preconditioner, reason) = scheme.preconditioner();
+    let problem = ProblemSize::of(session, body, steps, job.solver.factor_precision);
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,
@@ -133,7 +135,7 @@ fn report<const D: usize, const S: usize>(
             worst_cell: quality.worst_cell,
             poor_cells: quality.poor,
         },
-        estimate: Estimate::new(session, body, &inventory, (preconditioner, job.solver.factor_precision), steps),
+        estimate: Estimate::new(session, body, &inventory, preconditioner, problem),
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
         header: header::lines(session, loaded, ready)?,

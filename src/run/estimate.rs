@@ -9,7 +9,7 @@ use super::Inventory;
 use crate::{
     body::Body,
     session::Session,
-    stepping::{FactorPrecision, Preconditioner, ProblemSize},
+    stepping::{Preconditioner, ProblemSize},
 };
 use serde::Serialize;
 
@@ -62,13 +62,13 @@ const VECTORS: f64 = 16.0;
 const CELL: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {
-    /// For a body and so many steps. Collective.
+    /// For a body under this preconditioner. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         inventory: &Inventory,
-        (preconditioner, precision): (Preconditioner, FactorPrecision),
-        steps: u64,
+        preconditioner: Preconditioner,
+        problem: ProblemSize,
     ) -> Self {
         let mesh = &body.mesh;
         let (nodes, cells) = (mesh.total_nodes as f64, mesh.total_cells as f64);
@@ -79,7 +79,6 @@ impl Estimate {
         ];
         let [mesh_bytes, facets, vectors] = session.sum(own);
         let matrix = matrix_bytes(D, nodes, cells, facets);
-        let problem = ProblemSize::of(session, body, steps, precision);
         let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
@@ -102,7 +101,7 @@ impl Estimate {
                 total: total as u64,
                 whole_mesh_at_start: if mesh.handed_out { whole as u64 } else { 0 },
             },
-            seconds: TimeEstimate { set_up, step, run: set_up + step * steps as f64 },
+            seconds: TimeEstimate { set_up, step, run: set_up + step * problem.steps as f64 },
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::{
     error::Result,
     job::{Every, Job},
     output::{
-        checkpoint::{self, Identity},
+        checkpoint::{self, Header, Identity},
         checkpoint_folder::{checkpoint_path, prune},
         field_output::FieldOutput,
         history::{History, Totals},
@@ -45,7 +45,9 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
 }
 
 /// What files are to say and hold.
-pub(super) struct Wanted<const D: usize> {
+pub(super) struct Wanted<'a, const D: usize> {
+    /// What the job asks for.
+    pub job: &'a Job,
     /// Whose checkpoints they are.
     pub identity: Identity,
     /// Where to look.
@@ -58,14 +60,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Finds profiles and opens the files; behind the state's step if the run goes on. Collective.
     pub fn open(
         session: &Session,
-        job: &Job,
         wanted: Wanted<D>,
         body: &Body<D, S>,
         state: &State,
         log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
-        let Wanted { identity, mut probes, goes_on } = wanted;
+        let Wanted { job, identity, mut probes, goes_on } = wanted;
         let folder = job.output_folder().to_owned();
         let before = if goes_on && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;
@@ -76,14 +77,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
         let profiles_after =
             time.map(|time| if due(every, state) && !is_there { time.next_down() } else { time });
-        let mut history = None;
-        let opened = if session.is_first() {
-            history_and_tables(&folder, job, step, profiles_after, &mut probes, &mut profiles)
-                .map(|h| history = Some(h))
-        } else {
-            Ok(())
+        let tables = || {
+            write_whole(&folder.join("job.toml"), &job.to_toml()?)?;
+            probes.open(&folder, step)?;
+            profiles.open(&folder, profiles_after)?;
+            History::open(&folder, step)
         };
-        session.agree(opened)?;
+        let history = session.agree(session.is_first().then(tables).transpose())?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let spent = start.elapsed();
         let checkpoints = 0;
@@ -147,10 +147,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     fn write_fields(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let stress = session.agree(body.stress(state))?;
         self.fields.write(Converged { session, body, state, stress: &stress })?;
-        if !self.profiles.is_empty() {
-            self.profiles.write(session, body, state, &stress)?;
-        }
-        Ok(())
+        Ok(self.profiles.write(session, body, state, &stress)?)
     }
 
     /// Numbers that sum up the fields of a state, by their names in `summary.json`. Collective.
@@ -176,7 +173,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let start = Instant::now();
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
-        checkpoint::save(session, &path, &self.identity, body, state, totals)?;
+        let header = Header::new(session, &self.identity, body, state, totals);
+        checkpoint::save(session, &path, &header, body, state)?;
         if session.is_first() {
             self.checkpoints += length(&path);
         }
@@ -225,25 +223,6 @@ fn has_come(every: Every, step: u64, [before, after]: [f64; 2]) -> bool {
             count(after) > count(before)
         }
     }
-}
-
-fn history_and_tables<const D: usize>(
-    folder: &Path,
-    job: &Job,
-    step: Option<u64>,
-    profiles_after: Option<f64>,
-    probes: &mut Probes<D>,
-    profiles: &mut Profiles<D>,
-) -> Result<History> {
-    let effective = folder.join("job.toml");
-    write_whole(&effective, &job.to_toml()?)?;
-    if !probes.is_empty() {
-        probes.open(folder, step)?;
-    }
-    if !profiles.is_empty() {
-        profiles.open(folder, profiles_after)?;
-    }
-    History::open(folder, step)
 }
 
 fn profiles<const D: usize, const S: usize>(

@@ -13,7 +13,8 @@ pub(super) fn seconds(
     session: &Session,
     run: Clock,
     setup: Duration,
-    (clock, output): (&StepClock, Duration),
+    clock: &StepClock,
+    output: Duration,
 ) -> Map<String, Value> {
     let phases = [
         ("total", run.began.elapsed()),

@@ -26,22 +26,29 @@ pub(super) struct Restored {
     pub words: String,
 }
 
-/// Puts the checkpoint that `start` asks for into the state. Collective.
+/// The checkpoints that a run may go on from, the best first; none if it starts anew. Refused where there should be one. Collective.
+pub(super) fn candidates(session: &Session, start: &Start, folder: &Path) -> Result<Vec<PathBuf>, Agreed> {
+    match start {
+        Start::Anew | Start::Over => Ok(Vec::new()),
+        Start::From(path) => Ok(vec![path.clone()]),
+        Start::Newest => {
+            let found = newest(session, folder)?;
+            let words = || format!("{}: no checkpoint to go on from; run without --restart", folder.display());
+            session.agree(if found.is_empty() { Err(Error::Refused(words())) } else { Ok(found) })
+        }
+    }
+}
+
+/// Puts the first good one of some checkpoints into the state; nothing without any. Collective.
 pub(super) fn restore<const D: usize, const S: usize>(
     session: &Session,
-    start: &Start,
-    folder: &Path,
+    candidates: &[PathBuf],
     identity: &Identity,
     body: &mut Body<D, S>,
     state: &mut State,
 ) -> Result<Option<Restored>, Agreed> {
-    let candidates = match start {
-        Start::Anew | Start::Over => return Ok(None),
-        Start::From(path) => vec![path.clone()],
-        Start::Newest => newest(session, folder)?,
-    };
     let mut faults = Vec::new();
-    for path in &candidates {
+    for path in candidates {
         match session.agree(checkpoint::restore(session, path, identity, body, state)) {
             Ok(header) => {
                 let file = path.display().to_string();
@@ -52,11 +59,13 @@ pub(super) fn restore<const D: usize, const S: usize>(
             Err(error) => faults.push(error.to_string()),
         }
     }
-    session.agree(Err(Error::Refused(if faults.is_empty() {
-        format!("{}: no checkpoint to go on from; run without --restart", folder.display())
-    } else {
-        format!("no good checkpoint to go on from; run without --restart\n{}", faults.join("\n"))
-    })))
+    if faults.is_empty() {
+        return Ok(None);
+    }
+    session.agree(Err(Error::Refused(format!(
+        "no good checkpoint to go on from; run without --restart\n{}",
+        faults.join("\n")
+    ))))
 }
 
 /// The checkpoints of a folder as rank 0 finds them, the newest first: what a rank sees of a shared folder may be old. Collective.

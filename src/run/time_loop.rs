@@ -7,7 +7,7 @@ use super::{
     header,
     outputs::{Outputs, Wanted},
     phases,
-    restored::restore,
+    restored::{candidates, restore},
     setup::{Setup, setup},
     simulation::{totals_at_start, watch_slip},
     step_line::StepLine,
@@ -58,7 +58,8 @@ pub(super) fn run<const D: usize, const S: usize>(
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
-    let restored = restore(session, start, folder, &identity, &mut ready.body, &mut ready.state)?;
+    let candidates = candidates(session, start, folder)?;
+    let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
     session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
@@ -71,8 +72,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         Some(restored) => restored.totals,
         None => session.agree(totals_at_start(session, &body, &state))?,
     };
-    let wanted = Wanted { identity, probes, goes_on };
-    let mut outputs = session.agree(Outputs::open(session, job, wanted, &body, &state, &mut log))?;
+    let wanted = Wanted { job, identity, probes, goes_on };
+    let mut outputs = session.agree(Outputs::open(session, wanted, &body, &state, &mut log))?;
     session.agree(outputs.at_start(session, &body, &state))?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
@@ -380,7 +381,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 self.session,
                 self.clock,
                 self.setup,
-                (&self.scheme.clock, self.outputs.spent),
+                &self.scheme.clock,
+                self.outputs.spent,
             ),
             traffic_bytes: phases::traffic(self.session, &self.scheme.traffic, self.outputs.written()),
             peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,

@@ -3,8 +3,8 @@
 //! The effects are found, not listed: every table of the job's physics that its schema lets be absent, and the density.
 
 use super::{
-    compare::in_dimension,
-    document::{Norm, Over, Quantity, Space, Timing},
+    compare::Compared,
+    document::{Norm, Over, Quantity, Space},
     execute::{Outcome, execute},
     measure::Target,
     plan::{Plan, Planned, trim},
@@ -17,7 +17,7 @@ use crate::{
     job::{Job, Kind, Loaded, Schema},
     session::Session,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::Value;
 
 /// Tables that are physics.
@@ -112,8 +112,8 @@ fn remove(value: &mut Value, parts: &[&str]) {
 
 /// Runs the base job whole and without each effect; `None` where it was asked to stop. Collective.
 pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
-    let folder = plan.folder.join("ablation");
-    let Some(whole) = run(session, &plan.study.timing, "whole", plan.base.clone(), &folder, say)? else {
+    let folder = folder(plan);
+    let Some(whole) = run(session, plan, "whole", plan.base.clone(), say)? else {
         return Ok(None);
     };
     let seconds = |record: &Record| seconds_of(record, plan.study.timing.take).map(|s| s.computing);
@@ -139,7 +139,7 @@ pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Opti
             Err(error) => effect.error = Some(first_line(&error.to_string())),
             Ok(loaded) => {
                 let name = format!("without-{}", path.replace('.', "-"));
-                let Some(record) = run(session, &plan.study.timing, &name, loaded, &folder, say)? else {
+                let Some(record) = run(session, plan, &name, loaded, say)? else {
                     return Ok(None);
                 };
                 effect.status = record.status.clone();
@@ -159,6 +159,11 @@ pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Opti
     Ok(Some(ablation))
 }
 
+/// Where the runs leave their files.
+fn folder(plan: &Plan) -> PathBuf {
+    plan.folder.join("ablation")
+}
+
 /// Relative changes of what is compared, against the whole job. Collective.
 fn change(
     session: &Session,
@@ -168,22 +173,23 @@ fn change(
     norms: &[Norm; 3],
 ) -> Result<[f64; 3]> {
     let whole = folder.join("whole");
-    let errors = in_dimension(session, dimension, run, Target::Run(&whole, true), norms)?;
+    let target = Target::Run(&whole, true);
+    let errors = Compared { dimension, folder: run, target }.errors(session, norms)?;
     let relative = |at: usize| {
         errors.measured.get(at).map_or(f64::NAN, |m| if m.error == 0.0 { 0.0 } else { m.error / m.size })
     };
     Ok(std::array::from_fn(relative))
 }
 
+/// Runs a job under this name, if it was not run before; `None` where it was asked to stop. Collective.
 fn run(
     session: &Session,
-    timing: &Timing,
+    plan: &Plan,
     name: &str,
     mut loaded: Loaded,
-    folder: &Path,
     say: &dyn Fn(&str),
 ) -> Result<Option<Record>> {
-    trim(&mut loaded.job, &folder.join(name));
+    trim(&mut loaded.job, &folder(plan).join(name));
     loaded.job.output.fields = None;
     let job = &loaded.job;
     let planned = Planned {
@@ -196,7 +202,7 @@ fn run(
         adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
         loaded,
     };
-    Ok(match execute(session, &planned, timing.repetitions as usize)? {
+    Ok(match execute(session, &planned, plan.study.timing.repetitions as usize)? {
         Outcome::Stopped => None,
         Outcome::Ran { record, .. } => {
             say(&format!("ablation {name}: {}", record.error.as_deref().unwrap_or("completed")));

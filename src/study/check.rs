@@ -1,6 +1,6 @@
 //! What is wrong with a study by itself and with its base job, before the jobs of its runs are loaded.
 
-use super::document::{Exact, Quantity, Reference, Run, Space, Study};
+use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study};
 use crate::job::{Document, Job};
 
 /// Runs of one study.
@@ -56,8 +56,8 @@ pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document
         let place = if study.norm.is_empty() { "probe.0" } else { "norm.0" };
         document.fault(place, "errors need a reference", "add [reference.run] or [reference.exact]");
     }
-    for (index, probe) in study.probe.iter().enumerate() {
-        check_probe(study, base, index, &probe.name, &probe.value, document);
+    for index in 0..study.probe.len() {
+        check_probe(study, base, index, document);
     }
 }
 
@@ -118,8 +118,9 @@ fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &m
     }
 }
 
-fn check_probe(study: &Study, base: &Job, index: usize, name: &str, value: &str, document: &mut Document) {
-    if !base.output.probe.iter().any(|probe| probe.name == name) {
+fn check_probe(study: &Study, base: &Job, index: usize, document: &mut Document) {
+    let ProbeError { name, value, .. } = &study.probe[index];
+    if !base.output.probe.iter().any(|probe| probe.name == *name) {
         let names: Vec<&str> = base.output.probe.iter().map(|probe| probe.name.as_str()).collect();
         let help = if names.is_empty() {
             "the base job has no probes: add [[output.probe]] to it".to_owned()

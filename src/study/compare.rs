@@ -15,26 +15,56 @@ use crate::{
 };
 use std::path::Path;
 
-/// Adds the errors of a run in all norms and at all probes. Collective.
-pub fn add_errors(
-    session: &Session,
-    plan: &Plan,
-    planned: &Planned,
-    record: &Record,
-    reference: Option<&Ran>,
-    run: &mut RunResult,
-) -> Result<()> {
-    let target = match (&plan.reference, reference) {
-        (None, _) => return Ok(()),
-        (Some(PlannedReference::Exact(exact)), _) => Target::Exact(exact),
-        (Some(PlannedReference::Run(other)), Some(ran)) if ran.record.is_complete() => {
-            let between = planned.adaptive.or(other.adaptive).is_some();
-            Target::Run(other.loaded.job.output_folder(), between)
+/// The fields of a run and what they are held against.
+pub struct Compared<'a> {
+    /// 2 or 3.
+    pub dimension: usize,
+    /// The folder of the run.
+    pub folder: &'a Path,
+    /// What it is held against.
+    pub target: Target<'a>,
+}
+
+impl<'a> Compared<'a> {
+    /// A run of the study and its reference; nothing in a study without one.
+    pub fn with_reference(
+        plan: &'a Plan,
+        planned: &'a Planned,
+        record: &Record,
+        reference: Option<&Ran>,
+    ) -> Result<Option<Self>> {
+        let target = match (&plan.reference, reference) {
+            (None, _) => return Ok(None),
+            (Some(PlannedReference::Exact(exact)), _) => Target::Exact(exact),
+            (Some(PlannedReference::Run(other)), Some(ran)) if ran.record.is_complete() => {
+                let between = planned.adaptive.or(other.adaptive).is_some();
+                Target::Run(other.loaded.job.output_folder(), between)
+            }
+            _ => {
+                return Err(Error::Failed(
+                    "the reference run failed: there is nothing to compare with".into(),
+                ));
+            }
+        };
+        let folder = planned.loaded.job.output_folder();
+        Ok(Some(Self { dimension: record.dimension, folder, target }))
+    }
+
+    /// Errors in norms. Collective.
+    pub fn errors(&self, session: &Session, norms: &[Norm]) -> Result<Errors> {
+        if norms.is_empty() {
+            return Ok(Errors::default());
         }
-        _ => return Err(Error::Failed("the reference run failed: there is nothing to compare with".into())),
-    };
-    let folder = planned.loaded.job.output_folder();
-    let found = in_dimension(session, record.dimension, folder, target, &plan.study.norm)?;
+        match self.dimension {
+            2 => errors::<2>(session, self.folder, self.target, norms),
+            _ => errors::<3>(session, self.folder, self.target, norms),
+        }
+    }
+}
+
+/// Adds the errors of a run in all norms and at all probes. Collective.
+pub fn add_errors(session: &Session, plan: &Plan, compared: &Compared, run: &mut RunResult) -> Result<()> {
+    let found = compared.errors(session, &plan.study.norm)?;
     run.errors = found.measured.into_iter().map(|m| Some(ErrorResult::new(m))).collect();
     for (error, place) in run.errors.iter_mut().flatten().zip(&found.places) {
         error.worst_time = Some(place.worst);
@@ -46,27 +76,10 @@ pub fn add_errors(
     for probe in &plan.study.probe {
         let place = plan.base.job.output.probe.iter().find(|p| p.name == probe.name);
         let point = place.map_or(&[][..], |p| &p.point);
-        let measured = session.agree(probe_error(folder, target, probe, point))?;
+        let measured = session.agree(probe_error(compared.folder, compared.target, probe, point))?;
         run.errors.push(Some(ErrorResult::new(measured)));
     }
     Ok(())
-}
-
-/// Errors in norms, in the dimension of the run. Collective.
-pub fn in_dimension(
-    session: &Session,
-    dimension: usize,
-    folder: &Path,
-    target: Target,
-    norms: &[Norm],
-) -> Result<Errors> {
-    if norms.is_empty() {
-        return Ok(Errors::default());
-    }
-    match dimension {
-        2 => errors::<2>(session, folder, target, norms),
-        _ => errors::<3>(session, folder, target, norms),
-    }
 }
 
 /// Holds every run against the one that differs by the tightest tolerance only. Collective.
@@ -84,11 +97,10 @@ pub fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut
         if !ran[at].record.is_complete() {
             continue;
         }
-        let folder = |planned: &Planned| planned.loaded.job.output_folder().to_owned();
-        let (mine, theirs) = (folder(planned), folder(tightest));
-        let target = Target::Run(&theirs, planned.adaptive.is_some());
-        let dimension = ran[at].record.dimension;
-        let measured = in_dimension(session, dimension, &mine, target, &plan.study.norm)?.measured;
+        let [mine, theirs] = [planned, tightest].map(|planned| planned.loaded.job.output_folder());
+        let target = Target::Run(theirs, planned.adaptive.is_some());
+        let compared = Compared { dimension: ran[at].record.dimension, folder: mine, target };
+        let measured = compared.errors(session, &plan.study.norm)?.measured;
         let change = |(norm, m): (usize, &Measured)| {
             let share = error_of(results, best, norm).map(|error| m.error / error).filter(|s| s.is_finite());
             Some(Change { difference: m.error, share_of_error: share })

@@ -4,7 +4,7 @@ use super::{
     document::{Quantity, Space},
     exact::ExactFields,
     overlap::{Piece, overlap},
-    stored::{StoredFields, StoredMesh, Values},
+    stored::{FieldAt, StoredFields, StoredMesh, Values},
 };
 use crate::{
     error::{Error, Result},
@@ -95,15 +95,14 @@ impl<'a, const D: usize> Pair<'a, D> {
 
     /// The squares over this rank's pieces, each with the cell of the run that it lies in.
     fn visit(&self, of: Quantity, space: Space, step: usize, add: impl FnMut(usize, Squares)) -> Result<()> {
-        let (time, values) = (self.run.times[step], self.run.values(of, step)?);
+        let time = self.run.times[step];
+        let mine = FieldAt { of, time, mesh: &self.run.mesh, values: &self.run.values(of, step)? };
         match &self.against {
             Against::Run(other) => {
-                let theirs = other.values_at(of, time)?;
-                over_pieces(space, (&self.run.mesh, &values), (&other.mesh, &theirs), &self.pieces, add)
+                let theirs = FieldAt { of, time, mesh: &other.mesh, values: &other.values_at(of, time)? };
+                over_pieces(space, mine, theirs, &self.pieces, add)
             }
-            Against::Exact(exact) => {
-                exact.visit(space, of, time, (&self.run.mesh, &values), self.range.clone(), add)
-            }
+            Against::Exact(exact) => exact.visit(space, mine, self.range.clone(), add),
         }
     }
 }
@@ -112,15 +111,16 @@ impl<'a, const D: usize> Pair<'a, D> {
 /// is added with its cell of the first mesh.
 fn over_pieces<const D: usize>(
     space: Space,
-    (one_mesh, one): (&StoredMesh<D>, &Values<D>),
-    (other_mesh, other): (&StoredMesh<D>, &Values<D>),
+    one: FieldAt<D>,
+    other: FieldAt<D>,
     pieces: &[Piece<D>],
     mut visit: impl FnMut(usize, Squares),
 ) -> Result<()> {
     let mut add = |piece: &Piece<D>, error: f64, size: f64| {
         visit(piece.one as usize, Squares { error: piece.volume * error, size: piece.volume * size });
     };
-    match (space, one, other) {
+    let (one_mesh, other_mesh) = (one.mesh, other.mesh);
+    match (space, one.values, other.values) {
         (Space::H, Values::Nodal(one), Values::Nodal(other)) => {
             for piece in pieces {
                 let (a, b) = (piece.one as usize, piece.other as usize);
@@ -213,8 +213,9 @@ mod tests {
     ) -> Squares {
         let pieces = overlap(one, other, 0..other.count());
         let mut sum = Squares::default();
-        over_pieces(space, (one, mine), (other, theirs), &pieces, |_, squares| sum.add(squares))
-            .expect("squares");
+        let field = |mesh, values| FieldAt { of: Quantity::Velocity, time: 0.0, mesh, values };
+        let fields = [field(one, mine), field(other, theirs)];
+        over_pieces(space, fields[0], fields[1], &pieces, |_, squares| sum.add(squares)).expect("squares");
         sum
     }
 

@@ -7,7 +7,7 @@
 use super::{
     difference::{Squares, minus, mix, symmetric, tensor_square},
     document::{Exact, Quantity, Space},
-    stored::{StoredMesh, Values},
+    stored::{FieldAt, Values},
 };
 use crate::{
     error::{Error, Result},
@@ -56,16 +56,15 @@ impl ExactFields {
         components.get(axis).map(|component| component.evaluate(time, point))
     }
 
-    /// The squares of a norm over some cells of a mesh, each added with its cell.
+    /// The squares of a norm over some cells of a field's mesh, each added with its cell.
     pub fn visit<const D: usize>(
         &self,
         space: Space,
-        of: Quantity,
-        time: f64,
-        (mesh, values): (&StoredMesh<D>, &Values<D>),
+        field: FieldAt<D>,
         cells: Range<usize>,
         mut add: impl FnMut(usize, Squares),
     ) -> Result<()> {
+        let FieldAt { of, time, mesh, values } = field;
         let components = if of == Quantity::Velocity { &self.velocity } else { &self.displacement };
         let vector = |point: &Vector<D>| -> Vector<D> {
             std::array::from_fn(|i| components.get(i).map_or(0.0, |c| c.evaluate(time, point)))
@@ -162,17 +161,18 @@ fn gradient<const D: usize>(
 mod tests {
     use super::*;
     use crate::job::Expression;
-    use crate::mesh::generate::{Diagonal, box_mesh, rectangle};
+    use crate::{
+        mesh::generate::{Diagonal, box_mesh, rectangle},
+        study::stored::StoredMesh,
+    };
 
     fn squares<const D: usize>(
         exact: &ExactFields,
         space: Space,
-        of: Quantity,
-        time: f64,
-        on: (&StoredMesh<D>, &Values<D>),
+        field: FieldAt<D>,
     ) -> Result<Squares> {
         let mut sum = Squares::default();
-        exact.visit(space, of, time, on, 0..on.0.count(), |_, squares| sum.add(squares))?;
+        exact.visit(space, field, 0..field.mesh.count(), |_, squares| sum.add(squares))?;
         Ok(sum)
     }
 
@@ -208,11 +208,13 @@ mod tests {
         let mesh = rectangle([1.0, 1.0], [2, 3], Diagonal::Left, [1.0; 2]).expect("mesh");
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nothing = Values::Nodal(vec![[0.0; 2]; mesh.nodes.len()]);
-        let of = |space| squares(&exact, space, Quantity::Velocity, 2.0, (&mesh, &nothing)).expect("sum");
+        let field = FieldAt { of: Quantity::Velocity, time: 2.0, mesh: &mesh, values: &nothing };
+        let of = |space| squares(&exact, space, field).expect("sum");
         assert!((of(Space::H).error - (4.0 / 9.0 + 0.2)).abs() < 1e-13);
         assert!((of(Space::V).error - 4.0).abs() < 1e-9, "{:?}", of(Space::V));
         let zero = Values::Cells(vec![[0.0; 6]; mesh.count()]);
-        let stress = squares(&exact, Space::Q, Quantity::Stress, 0.0, (&mesh, &zero)).expect("sum");
+        let field = FieldAt { of: Quantity::Stress, time: 0.0, mesh: &mesh, values: &zero };
+        let stress = squares(&exact, Space::Q, field).expect("sum");
         assert!((stress.error - (1.0 + 4.0 + 2.0 / 3.0)).abs() < 1e-13);
         assert_eq!(exact.column("velocity_y", 0.0, &[3.0, 0.0]), Some(9.0));
         assert_eq!(exact.column("pressure_y", 0.0, &[3.0, 0.0]), None);
@@ -229,7 +231,8 @@ mod tests {
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nodal = Values::Nodal(mesh.nodes.iter().map(|p| [p[0] + 2.0 * p[1], 3.0 * p[2], 0.5]).collect());
         for space in [Space::H, Space::V] {
-            let sum = squares(&exact, space, Quantity::Displacement, 0.5, (&mesh, &nodal)).expect("sum");
+            let field = FieldAt { of: Quantity::Displacement, time: 0.5, mesh: &mesh, values: &nodal };
+            let sum = squares(&exact, space, field).expect("sum");
             assert!(sum.error < 1e-15 && sum.size > 0.1, "{sum:?}");
         }
         assert_eq!(exact.stress_at::<3>(0.0, &[0.0; 3]), [1.0, 6.0, 5.0, 2.0, 4.0, 3.0]);
@@ -245,7 +248,8 @@ mod tests {
         let mesh = rectangle([1.0, 1.0], [1, 1], Diagonal::Left, [1.0; 2]).expect("mesh");
         let mesh = StoredMesh::new(mesh.nodes, mesh.cells);
         let nothing = Values::Nodal(vec![[0.0; 2]; 4]);
-        let error = squares(&exact, Space::H, Quantity::Displacement, 1.0, (&mesh, &nothing));
+        let field = FieldAt { of: Quantity::Displacement, time: 1.0, mesh: &mesh, values: &nothing };
+        let error = squares(&exact, Space::H, field);
         assert!(error.expect_err("refused").to_string().contains("t = 1 s"));
     }
 }

@@ -59,8 +59,14 @@ pub struct Place {
     pub cells: Vec<f64>,
 }
 
-/// A quantity, the space whose norm is taken, and whether that is at the end alone.
-type Kind = (Quantity, Space, bool);
+/// What norms are taken of.
+#[derive(Clone, Copy, PartialEq)]
+struct Kind {
+    of: Quantity,
+    space: Space,
+    /// Whether that is at the end alone.
+    at_end: bool,
+}
 
 /// Errors of the run in `folder` in some norms. Collective.
 pub fn errors<const D: usize>(
@@ -88,7 +94,7 @@ pub fn errors<const D: usize>(
     let mut found = Errors { notes: covered(pair.uncovered)?, ..Errors::default() };
     let mut known: Vec<(Kind, (Vec<Squares>, Place))> = Vec::new();
     for norm in norms {
-        let kind = (norm.of, norm.space, norm.over == Over::End);
+        let kind = Kind { of: norm.of, space: norm.space, at_end: norm.over == Over::End };
         if !known.iter().any(|(other, _)| *other == kind) {
             known.push((kind, over_time(session, &pair, &run, kind)?));
         }
@@ -117,7 +123,7 @@ fn over_time<const D: usize>(
     session: &Session,
     pair: &Pair<D>,
     run: &StoredFields<D>,
-    (of, space, at_end): Kind,
+    Kind { of, space, at_end }: Kind,
 ) -> Result<(Vec<Squares>, Place)> {
     let last = run.times.len().saturating_sub(1);
     let steps = if at_end { last..last + 1 } else { 0..last + 1 };

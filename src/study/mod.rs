@@ -35,6 +35,7 @@ use crate::{
     run::VERSION,
     session::Session,
 };
+use compare::Compared;
 use document::Take;
 use execute::{Outcome, execute};
 use plan::{Planned, PlannedReference};
@@ -193,7 +194,8 @@ fn assembled(
     }
     for (at, ran) in ran.iter().enumerate().filter(|(_, ran)| ran.record.is_complete()) {
         let run = &mut results.runs[at];
-        let added = compare::add_errors(session, plan, &plan.runs[at], &ran.record, reference, run);
+        let added = Compared::with_reference(plan, &plan.runs[at], &ran.record, reference)
+            .and_then(|compared| compared.map_or(Ok(()), |c| compare::add_errors(session, plan, &c, run)));
         run.error = added.err().map(|error| error.to_string());
         run.errors.resize(results.norms.len(), None);
     }

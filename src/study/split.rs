@@ -2,7 +2,7 @@
 
 use super::{
     Ran,
-    compare::in_dimension,
+    compare::Compared,
     measure::{Measured, Target},
     plan::{Plan, Planned, PlannedReference},
     results::Results,
@@ -21,8 +21,8 @@ pub fn add_parts(
     let distance = |from: &Planned, to: &Planned, dimension: usize| -> Result<Vec<Measured>> {
         let between = from.adaptive.or(to.adaptive).is_some();
         let target = Target::Run(to.loaded.job.output_folder(), between);
-        let folder = from.loaded.job.output_folder();
-        Ok(in_dimension(session, dimension, folder, target, &plan.study.norm)?.measured)
+        let compared = Compared { dimension, folder: from.loaded.job.output_folder(), target };
+        Ok(compared.errors(session, &plan.study.norm)?.measured)
     };
     for (at, run) in plan.runs.iter().enumerate().filter(|(_, run)| run.cells == reference.cells) {
         if plan.study.compare.split && is_like_base(run) {

@@ -79,6 +79,19 @@ pub enum Values<const D: usize> {
     Cells(Vec<[f64; 6]>),
 }
 
+/// Values of a quantity on their mesh.
+#[derive(Clone, Copy)]
+pub struct FieldAt<'a, const D: usize> {
+    /// What they are values of.
+    pub of: Quantity,
+    /// Their time in s.
+    pub time: f64,
+    /// Their mesh.
+    pub mesh: &'a StoredMesh<D>,
+    /// The values.
+    pub values: &'a Values<D>,
+}
+
 /// The field file of a run.
 pub struct StoredFields<const D: usize> {
     path: PathBuf,
