@@ -1,4 +1,4 @@
-//! Arguments to exit codes.
+//! The command line: arguments to exit codes.
 
 use crate::{
     agreement::Agreed,
@@ -136,7 +136,7 @@ pub fn main() -> ExitCode {
         Err(error) => match remedy(&arguments) {
             Some(words) if error.use_stderr() => Err(Error::Refused(words)),
             _ if error.use_stderr() => {
-                speak_alone(|| drop(error.print()));
+                print_once(|| drop(error.print()));
                 return ExitCode::from(Exit::Refused as u8);
             }
             _ => say(&error.render().to_string()),
@@ -145,7 +145,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(exit) => ExitCode::from(exit as u8),
         Err(error) => {
-            speak_alone(|| print_error(&error));
+            print_once(|| print_error(&error));
             ExitCode::from(Exit::from(error) as u8)
         }
     }
@@ -184,7 +184,7 @@ fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
     }
 }
 
-/// Better words than the parser's for a command line it refused.
+/// A clearer message than the parser's for a command line that it refused.
 fn remedy(arguments: &[OsString]) -> Option<String> {
     let words: Vec<&str> = arguments.iter().skip(1).filter_map(|word| word.to_str()).collect();
     let behind = words.iter().position(|word| *word == "--restart").and_then(|at| words.get(at + 1));
@@ -210,7 +210,7 @@ fn job_behind_restart(job: &str) -> String {
     )
 }
 
-/// What to say if this is no file but much like a command.
+/// The message for a word that is no file but resembles a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
     let near = nearest(word, COMMANDS)?;
@@ -218,15 +218,15 @@ fn misspelt_command(path: &Path) -> Option<String> {
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
 }
 
-/// This process's number where MPI has not started, if a launcher tells it.
+/// The rank of this process before MPI has started, if a launcher provides it.
 fn launched_rank() -> Option<u64> {
     let names = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
     names.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// Lets the first of the launched processes say why all of them end; they end together, because launchers kill the
-/// others, and what they still have to say, as soon as one has failed.
-fn speak_alone(words: impl FnOnce()) {
+/// Lets the first of the launched processes print why all of them end. They end together: launchers kill the others, with their
+/// pending output, as soon as one has failed.
+fn print_once(words: impl FnOnce()) {
     let rank = launched_rank();
     if rank.is_none_or(|rank| rank == 0) {
         words();
@@ -236,8 +236,8 @@ fn speak_alone(words: impl FnOnce()) {
     }
 }
 
-/// Lets the rank that an error comes from tell it; all end with its exit code.
-fn told(session: &Session, error: &Agreed) -> Exit {
+/// Prints an error on the rank where it occurred; returns its exit code on all ranks.
+fn printed(session: &Session, error: &Agreed) -> Exit {
     if session.rank() == error.rank() {
         print_error(error);
     }
@@ -250,7 +250,7 @@ fn print_error(error: &impl std::error::Error) {
     let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
 }
 
-/// Whether the words begin with `error`, in whatever colour.
+/// Whether the text begins with `error`, coloured or not.
 fn says_error(words: &str) -> bool {
     let mut rest = words;
     while let Some(colour) = rest.strip_prefix("\u{1b}[") {
@@ -267,12 +267,12 @@ fn say(text: &str) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Prints; a closed pipe is no fault.
+/// Prints; a closed pipe is not an error.
 fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
 }
 
-/// Makes a report on one process; under a launcher the others wait for its outcome, so that all end alike.
+/// Makes a report on one process; under a launcher the others wait for the outcome, so that all return the same exit code.
 fn report_on(folder: &Path) -> Result<Exit> {
     let make = || {
         let made = report(folder)?;
@@ -288,7 +288,7 @@ fn report_on(folder: &Path) -> Result<Exit> {
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let outcome = session.agree(if session.is_first() { make() } else { Ok(Exit::Done) });
-    Ok(outcome.unwrap_or_else(|error| told(&session, &error)))
+    Ok(outcome.unwrap_or_else(|error| printed(&session, &error)))
 }
 
 /// Splits a mesh, on one process.
@@ -338,7 +338,7 @@ fn check(job: &Path, overrides: &[String], json: bool) -> Result<Exit> {
     })
 }
 
-/// Loads a job on all ranks and works on it.
+/// Loads a job on all ranks and calls `work` with it.
 fn on_all_ranks(
     job: &Path,
     overrides: &[String],
@@ -362,13 +362,13 @@ fn run_study(path: &Path, overrides: &[String], ablate: bool, part: Option<study
     })
 }
 
-/// Starts MPI and PETSc and works; the rank with the fault speaks.
+/// Starts MPI and PETSc and calls `work`; the rank with an error prints it.
 fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit> {
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
     let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
-    let exit = session.agree(work(&session, clock)).unwrap_or_else(|error| told(&session, &error));
+    let exit = session.agree(work(&session, clock)).unwrap_or_else(|error| printed(&session, &error));
     if exit != Exit::Done && given_up() {
         session.world().barrier();
         std::process::exit(i32::from(exit as u8));

@@ -81,8 +81,7 @@ impl<'a> Body<'a> {
             }
         };
         let unit = field.unit(self.snapshot.dimension());
-        let look =
-            Coloured { name: picture.name, quantity: picture.quantity, unit, shades: VIRIDIS };
+        let look = Coloured { name: picture.name, quantity: picture.quantity, unit, shades: VIRIDIS };
         let of_face = |face: &Face| match field.place {
             Place::Node => mean(face, values),
             Place::Cell => values[face.cell as usize],

@@ -1,4 +1,4 @@
-//! What a checkpoint of a run holds, and how a run goes on from one.
+//! The content of a run's checkpoints, and how it is restored.
 
 use super::{
     checkpoint_file::{self, Checkpoint, RowSet, Table},
@@ -17,10 +17,10 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
-/// Raised whenever a file written before can't be read any more.
+/// Version of the layout; raised whenever older files can't be read any more.
 const FORMAT: u32 = 3;
 
-/// Everything of a checkpoint that is not a field.
+/// The data of a checkpoint that are not fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Version of the layout.
@@ -41,7 +41,7 @@ pub struct Header {
     pub totals: Totals,
     /// Digest of the mesh.
     pub mesh: String,
-    /// The part of the job that changes the answer, key by key.
+    /// The keys of the job that affect the results, with their values.
     pub physics: BTreeMap<String, String>,
 }
 
@@ -50,12 +50,12 @@ pub struct Header {
 pub struct Identity {
     /// Version of this solver.
     pub version: String,
-    /// The part of the job that changes the answer, key by key.
+    /// The keys of the job that affect the results, with their values.
     pub physics: BTreeMap<String, String>,
 }
 
 impl Header {
-    /// Of a state, and the sums over the steps to it.
+    /// The header of a state with the sums over the steps up to it.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         identity: &Identity,
@@ -125,7 +125,7 @@ pub fn save<const D: usize, const S: usize>(
     Ok(checkpoint_file::write(path, session.world(), &header, &sets, &tables)?)
 }
 
-/// Puts a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
+/// Reads a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
 /// damaged or of another problem.
 pub fn restore<const D: usize, const S: usize>(
     session: &Session,
@@ -174,7 +174,7 @@ pub fn restore<const D: usize, const S: usize>(
     Ok(header)
 }
 
-/// A file that can't be opened leaves the way to an older one open.
+/// A damaged file is a failure, not a refusal, so that an older checkpoint can be tried.
 fn damaged(error: Agreed) -> Error {
     if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error.into() }
 }

@@ -1,4 +1,4 @@
-//! The container of a checkpoint: a header and tables of numbers whose rows are known by global ids.
+//! The file format of checkpoints: a header and tables of numbers whose rows are identified by global ids.
 //!
 //! ```text
 //! /header                 the header's bytes, attribute checksum
@@ -46,8 +46,8 @@ pub struct Table<'a> {
     pub values: &'a [f64],
 }
 
-/// Writes a checkpoint; an older file of this name stays whole until the new one is, and nothing is left of one that
-/// can't be written. Collective, with the same outcome on all ranks.
+/// Writes a checkpoint; an older file of this name is replaced only when the new one is complete, and a file that can't be written
+/// is removed. Collective, with the same outcome on all ranks.
 pub fn write(
     path: &Path,
     communicator: &impl Communicator,
@@ -128,7 +128,7 @@ fn write_content(
     file.create_group("tables")?;
     for set in sets {
         if !are_whole(communicator, set.total, set.ids) {
-            // The plan that any reader makes says what is wrong with them.
+            // The redistribution that any reader plans finds what is wrong with them.
             Redistribution::new(communicator, set.total, set.ids, &[])?;
         }
         let first = file.slab_start(set.ids.len());
@@ -148,7 +148,7 @@ fn table_name(set: &str, name: &str) -> String {
     format!("tables/{set}/{name}")
 }
 
-/// A checkpoint that was found whole and is open for reading.
+/// A checkpoint that was verified and is open for reading.
 pub struct Checkpoint {
     file: ParallelFile,
     communicator: SimpleCommunicator,
@@ -156,7 +156,7 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Checks that the file is whole, opens it and reads the header. Collective, with the same outcome on all ranks.
+    /// Verifies the file, opens it and reads the header. Collective, with the same outcome on all ranks.
     pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         seal::verify(path, seal::CHECKPOINT, communicator)?;
         let communicator = communicator.duplicate();
@@ -170,7 +170,7 @@ impl Checkpoint {
         Ok(Self { file, communicator, header })
     }
 
-    /// The bytes that were given as header.
+    /// The bytes of the header.
     pub fn header(&self) -> &[u8] {
         &self.header
     }

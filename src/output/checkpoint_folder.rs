@@ -29,7 +29,7 @@ pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
     Ok(found)
 }
 
-/// Removes all but the newest `keep` checkpoints, and what runs that were killed left half-written. On one rank.
+/// Removes all but the newest `keep` checkpoints, and incomplete files of runs that were killed. On one rank.
 pub fn prune(folder: &Path, keep: usize) -> Result<()> {
     let old = list(folder)?.into_iter().skip(keep).map(|(_, path)| path);
     for path in old.chain(half_written(folder)?) {

@@ -1,4 +1,4 @@
-//! Tables that grow by rows and survive a restart; only rank 0 writes them.
+//! CSV tables that are extended row by row and continued by a restart; rank 0 writes them.
 
 use crate::agreement::pass;
 use crate::error::{Error, Result};
@@ -30,8 +30,8 @@ impl CsvFile {
         Ok(Self { path: path.to_owned(), writer: BufWriter::new(file), flushed: Instant::now() })
     }
 
-    /// Goes on with a table, keeping the rows whose first column is at most `last`; starts one where there is none or
-    /// it has another header.
+    /// Continues a table, keeping the rows whose first column is at most `last`; creates one if there is none or its header
+    /// differs.
     pub fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
         pass()?;
         let Ok(old) = File::open(path) else { return Self::create(path, header) };
@@ -63,7 +63,7 @@ impl CsvFile {
         if self.flushed.elapsed() > FLUSH_EVERY { self.write_out() } else { Ok(()) }
     }
 
-    /// Brings all rows to the file.
+    /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
         pass()?;
         self.write_out()

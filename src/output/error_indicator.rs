@@ -40,13 +40,13 @@ pub const ERROR_INDICATOR: OutputField = OutputField {
     figures: Some(Figures {
         names: &["error_indicator", "relative_error_indicator"],
         line: |figures: &[f64]| {
-            format!("indicator  error of the stress {:.4e}, {:.1} % of its norm", figures[0], 100.0 * figures[1])
+            format!(
+                "indicator  error of the stress {:.4e}, {:.1} % of its norm",
+                figures[0],
+                100.0 * figures[1]
+            )
         },
-        shown: &[(
-            "relative_error_indicator",
-            "error indicator over the norm of the stress at the end",
-            "",
-        )],
+        shown: &[("relative_error_indicator", "error indicator over the norm of the stress at the end", "")],
     }),
 };
 

@@ -1,4 +1,4 @@
-//! A field: what it has values for, what a value is, and how files hold it.
+//! A field: its place, its shape and its layout in files.
 
 use crate::tensor::component;
 
@@ -117,7 +117,7 @@ pub(super) fn data_group(place: Place) -> &'static str {
     }
 }
 
-/// How files call a place.
+/// The name of a place in files.
 pub(super) fn place_word(place: Place) -> &'static str {
     match place {
         Place::Node => "node",
@@ -125,7 +125,7 @@ pub(super) fn place_word(place: Place) -> &'static str {
     }
 }
 
-/// How files call a shape.
+/// The name of a shape in files.
 pub(super) fn shape_word(shape: Shape) -> &'static str {
     match shape {
         Shape::Scalar => "scalar",

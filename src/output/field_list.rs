@@ -1,5 +1,5 @@
 //! The fields that runs write, each declared once: field files, restarts, the summary, the log, the report and studies follow this
-//! list. Histories of effects come behind them by themselves.
+//! list. Histories of effects are appended automatically.
 
 use super::{
     error_indicator::{self, ERROR_INDICATOR},

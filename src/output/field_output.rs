@@ -1,4 +1,4 @@
-//! Which fields go into `fields.vtkhdf`.
+//! The field file of a run.
 
 use super::{
     field_list::{COUNT, FIELDS, computations},
@@ -25,9 +25,9 @@ pub struct FieldOutput<const D: usize> {
 }
 
 impl<const D: usize> FieldOutput<D> {
-    /// Creates the files in the output folder of the job with the mesh, or goes on with them behind this time; files that can't be
-    /// read are put aside. Refused where they hold a field that the job does not ask for, or the other way round, and where HDF5
-    /// can't compress though it is to. Collective.
+    /// Creates the files in the job's output folder with the mesh, or continues them after this time; files that can't be read are
+    /// renamed and kept. Refused if existing files and the job differ in a field that jobs ask for, and if compression is asked for
+    /// and HDF5 has none. Collective.
     pub fn open<const S: usize>(
         session: &Session,
         job: &Job,
@@ -101,7 +101,10 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// The figures of the fields of a state, by their names. Collective.
-    pub fn figures<const S: usize>(&self, at: Converged<D, S>) -> Result<BTreeMap<&'static str, f64>, Agreed> {
+    pub fn figures<const S: usize>(
+        &self,
+        at: Converged<D, S>,
+    ) -> Result<BTreeMap<&'static str, f64>, Agreed> {
         let computed = self.computed(at, |field| field.figures.is_some())?;
         let named = |(field, computed): (&OutputField, Computed)| {
             field.figures.into_iter().flat_map(|f| f.names).copied().zip(computed.figures)

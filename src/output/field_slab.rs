@@ -15,7 +15,7 @@ pub(super) struct Slab {
     pub(super) total: u64,
     /// First row this rank writes.
     pub(super) first: u64,
-    /// The way from the run's order of rows to the file's, where they differ.
+    /// Redistribution from the run's order of rows to the file's, where they differ.
     pub(super) reorder: Option<Redistribution>,
 }
 

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, path::Path};
 /// The body and its fields at the last time in the file.
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
-    /// Its time in s; 0 where the file has no steps yet.
+    /// Its time in s; 0 if the file has no steps yet.
     pub time: f64,
     /// Times in the file, in s.
     pub times: Vec<f64>,
@@ -46,7 +46,7 @@ impl Snapshot {
         self.corners - 1
     }
 
-    /// The body without what moves and stresses it.
+    /// The body without its fields.
     pub fn without_fields(self) -> Self {
         Self { fields: BTreeMap::new(), ..self }
     }

@@ -193,7 +193,8 @@ impl<const D: usize> FieldFile<D> {
         let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
         let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
         let start = if first { 0 } else { cells.first + 1 };
-        file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, *level)?.write(start, &offsets)?;
+        file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, *level)?
+            .write(start, &offsets)?;
         let kind: u8 = if D == 2 { 5 } else { 10 };
         file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, *level)?
             .write(cells.first, &vec![kind; cells.owned])?;

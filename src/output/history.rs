@@ -138,7 +138,7 @@ impl Totals {
 pub struct History(CsvFile);
 
 impl History {
-    /// Starts the file, or goes on with it behind this step.
+    /// Creates the file, or continues it after this step.
     pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
         let path = folder.join("history.csv");
         let energies = in_columns(Energy::COLUMNS, "energy_imbalance").join(",");
@@ -170,7 +170,7 @@ impl History {
         ))
     }
 
-    /// Brings all rows to the file.
+    /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
         self.0.flush()
     }

@@ -1,4 +1,4 @@
-//! What is in a checkpoint or a field file, in words; in one process, without MPI.
+//! Describes a checkpoint or a field file in text; in one process, without MPI.
 
 use super::seal::{CHECKPOINT, is_sealed, verify_alone};
 use crate::error::{Error, Result};

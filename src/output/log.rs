@@ -19,14 +19,14 @@ pub struct Log {
 }
 
 impl Log {
-    /// A log that speaks on rank 0 only and has no file yet; without `on_terminal` its lines go to the file alone.
+    /// A log that writes on rank 0 only and has no file yet; without `on_terminal` its lines go to the file only.
     pub fn new(speaks: bool, on_terminal: bool) -> Self {
         Self { speaks, on_terminal, file: None, bar: None, warnings: Vec::new() }
     }
 
-    /// Takes this file for the run alone, as long as the log lives; one that is not there is made if `create` says so.
+    /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
     ///
-    /// The system frees the lock of a process that was killed. Where files can't be locked, all runs are let in.
+    /// The system releases the lock of a process that was killed. Where files can't be locked, nothing is refused.
     pub fn claim(&mut self, path: &Path, create: bool) -> Result<()> {
         if !self.speaks || self.file.is_some() || !(create || path.exists()) {
             return Ok(());
@@ -43,7 +43,7 @@ impl Log {
         Ok(())
     }
 
-    /// Writes to the file from now on, behind what it holds if the run goes on.
+    /// Writes to the file from now on; appends to it if the run continues an earlier one.
     pub fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
         match &self.file {
             Some(file) if !goes_on => file.set_len(0).map_err(|e| Error::unwritable(path, e)),

@@ -1,4 +1,4 @@
-//! What a run leaves on disk.
+//! The files that a run writes.
 
 pub mod checkpoint;
 pub mod checkpoint_file;

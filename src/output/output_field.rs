@@ -1,5 +1,5 @@
-//! What a field is that runs write: how field files, restarts, the summary, the log, the report and studies speak of it, and the
-//! state it is computed of.
+//! A field that runs write, as field files, restarts, the summary, the log, the report and studies use it, and the state it is
+//! computed from.
 
 use super::field::{Place, Shape, file_width};
 use crate::{body::Body, job::Output, session::Session, state::State, tensor::Mandel};
@@ -16,11 +16,11 @@ pub struct OutputField {
     pub shape: Shape,
     /// Its unit in the plane and in space.
     pub units: [&'static str; 2],
-    /// Whether a job asks for it; absent: runs that have it write it without being asked.
+    /// Whether a job asks for it; absent: every run that has it writes it.
     pub is_asked_for: Option<fn(&Output) -> bool>,
     /// The report's picture of it.
     pub picture: Option<FieldPicture>,
-    /// Numbers that sum it up at the end of a run.
+    /// Numbers that summarise it at the end of a run.
     pub figures: Option<Figures>,
 }
 
@@ -38,13 +38,13 @@ pub struct FieldPicture {
 /// How values of a field become colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shading {
-    /// In equal distances, from the smallest to the largest value.
+    /// Linear, from the smallest to the largest value.
     Linear,
-    /// Of errors: by powers of ten, down to a hundredth of the largest; the root of the sum of their squares is told.
+    /// Of errors: logarithmic, down to a hundredth of the largest; the caption has the root of the sum of their squares.
     Errors,
 }
 
-/// Numbers that sum up a field at the end of a run.
+/// Numbers that summarise a field at the end of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
     /// Their names in `summary.json`.
@@ -56,12 +56,12 @@ pub struct Figures {
 }
 
 impl OutputField {
-    /// A field that is written without being asked for, with one unit, no picture and no figures.
+    /// A field that every run writes, with the same unit in the plane and in space, no picture and no figures.
     pub(super) const fn plain(name: &'static str, place: Place, shape: Shape, unit: &'static str) -> Self {
         Self { name, place, shape, units: [unit; 2], is_asked_for: None, picture: None, figures: None }
     }
 
-    /// The same with a picture of this name, whose values become colours in equal distances.
+    /// The same with a picture of this name, coloured linearly.
     pub(super) const fn with_picture(self, name: &'static str, quantity: &'static str) -> Self {
         Self { picture: Some(FieldPicture { name, quantity, shading: Shading::Linear }), ..self }
     }
@@ -82,7 +82,7 @@ impl OutputField {
     }
 }
 
-/// A converged state, of which fields are computed.
+/// A converged state, from which fields are computed.
 #[derive(Clone, Copy)]
 pub struct Converged<'a, const D: usize, const S: usize> {
     /// The ranks.

@@ -12,7 +12,7 @@ use crate::{
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 use std::path::Path;
 
-/// Barycentric coordinates down to this count as inside.
+/// Least barycentric coordinate of points that count as inside.
 const INSIDE: f64 = -1e-9;
 
 /// The probes of a job; each is evaluated by one rank.
@@ -49,12 +49,12 @@ impl<const D: usize> Probes<D> {
         })
     }
 
-    /// Whether there is none.
+    /// Whether there are no probes.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 
-    /// Opens the file on rank 0, if there are probes; behind this step if the run goes on.
+    /// Opens the file on rank 0, if there are probes; continues it after this step if one is given.
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
         if self.is_empty() {
             return Ok(());
@@ -100,7 +100,7 @@ impl<const D: usize> Probes<D> {
         Ok(())
     }
 
-    /// Brings all rows to the file.
+    /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
         self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }

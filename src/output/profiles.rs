@@ -54,7 +54,7 @@ impl<const D: usize> Profiles<D> {
         })
     }
 
-    /// Opens the file on rank 0, if there are profiles; behind this time if the run goes on.
+    /// Opens the file on rank 0, if there are profiles; continues it after this time if one is given.
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<f64>) -> Result<()> {
         if self.profiles.is_empty() {
             return Ok(());
@@ -99,7 +99,7 @@ impl<const D: usize> Profiles<D> {
         Ok(())
     }
 
-    /// Brings all rows to the file.
+    /// Flushes all rows to the file.
     pub fn flush(&mut self) -> Result<()> {
         self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }

@@ -1,4 +1,4 @@
-//! Moves rows known by global ids from the ranks that hold them to the ranks that want them.
+//! Moves rows identified by global ids from the ranks that hold them to the ranks that need them.
 //!
 //! A directory of all ids is spread over the ranks in equal blocks, so that no rank ever knows more than its share.
 
@@ -10,7 +10,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// A plan that moves rows; made once for a pair of row orders, applied to any number of tables.
+/// A plan to move rows, made once for a pair of row orders and applied to any number of tables.
 pub struct Redistribution {
     communicator: SimpleCommunicator,
     send_rows: Vec<usize>,

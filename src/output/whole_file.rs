@@ -1,17 +1,17 @@
-//! Small files that are there whole or not at all.
+//! Small files that are replaced atomically.
 
 use crate::agreement::pass;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Writes the text to a file; one of this name stays as it is until the new one is whole. On one rank.
+/// Writes the text to a file; an older file of this name is replaced only when the new one is complete. On one rank.
 pub fn write_whole(path: &Path, text: &str) -> Result<()> {
     pass()?;
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
     written.map_err(|error| {
-        // What could be written of it is of no use; the error that counts is the first.
+        // A partial file is useless; the first error is the one to report.
         let _ = std::fs::remove_file(&part);
         Error::unwritable(path, error)
     })

@@ -1,4 +1,4 @@
-//! The light XDMF file that tells other readers where the numbers of the field file are.
+//! The light XDMF file that refers other readers to the numbers of the field file.
 
 use super::field::{FieldKind, Place, Shape, data_group, file_width};
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write as _};
 use std::path::Path;
 
-/// What stands behind the last step.
+/// The text after the last step.
 const END: &str = "</Grid>\n</Domain>\n</Xdmf>\n";
 
 /// The size of the mesh.
@@ -18,7 +18,7 @@ pub(super) struct Mesh {
     pub(super) cells: u64,
 }
 
-/// Replaces the file at once, so that a reader never sees half of it. On one rank.
+/// Replaces the file atomically. On one rank.
 pub(super) fn write(path: &Path, mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> Result<()> {
     let part = path.with_extension("xdmf.part");
     std::fs::write(&part, document(mesh, kinds, times))

@@ -1,13 +1,12 @@
-//! From the job's tables to a body: a table that is absent leaves nothing behind.
+//! Builds a body from the tables of a job. A table that is absent creates nothing.
 
 use super::steps;
 use crate::{
     body::Body,
     contact::{Gap, NormalResponse},
     effect::{
-        self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia,
-        Load, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
-        fixed_components,
+        self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia, Load,
+        Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
     job::{self, Fix, Job, Material, Named, Scheme},
@@ -61,7 +60,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     Ok((body, state))
 }
 
-/// The materials that cells of the body are of, and for each region of the mesh the position of its own. Collective.
+/// The materials that cells of the body have, and for each region of the mesh the index of its material. Collective.
 fn materials<'a, const D: usize>(
     session: &Session,
     job: &'a Job,
@@ -104,7 +103,7 @@ fn effects<const D: usize, const S: usize>(
     Ok(effects)
 }
 
-/// What acts at nodes of boundaries beside contact. Collective.
+/// Effects at nodes of boundaries other than contact. Collective.
 fn surface_effects<const D: usize>(
     session: &Session,
     job: &Job,
@@ -148,7 +147,7 @@ fn flow_law<const S: usize>(material: &Material) -> Result<Option<FlowLaw>> {
     Ok(Some(law.prepare(elasticity, Hypothesis::of(S))))
 }
 
-/// The law of a contact, and the gap it is felt beyond.
+/// The law of a contact, and the gap beyond which it acts.
 pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     let law = contact.normal.response()?;
     if !law.depends_on_displacement() {
@@ -185,10 +184,7 @@ fn supports<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Vec<Support> {
 
 fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {
     let traction = |t: &job::Traction| Traction { facets: facets(mesh, &t.on), value: t.value.clone() };
-    Load {
-        tractions: job.traction.iter().map(traction).collect(),
-        body_forces: job.body_force.clone(),
-    }
+    Load { tractions: job.traction.iter().map(traction).collect(), body_forces: job.body_force.clone() }
 }
 
 /// Sets the initial values at owned nodes; held components keep the displacement and have no velocity.
@@ -220,7 +216,7 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     Ok(())
 }
 
-/// How the job has the equations of a step solved.
+/// The solver settings of a job.
 pub(super) fn settings(job: &Job) -> SolverSettings {
     SolverSettings {
         tolerance: job.solver.tolerance,

@@ -1,4 +1,4 @@
-//! Everything but the run: what a job would simulate, on which mesh, how and at what cost.
+//! `solver check`: what a job would simulate, on which mesh, how and at what cost.
 
 use super::{
     Inventory,
@@ -22,7 +22,7 @@ use crate::{
 };
 use serde::Serialize;
 
-/// What a job would be.
+/// What `solver check` reports about a job.
 ///
 /// The fields are the object that `solver check --json` prints; their names are part of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,7 +68,7 @@ struct CellQuality {
     poor_cells: usize,
 }
 
-/// Sets the problem up as a run does, and tells what it found. Collective.
+/// Sets the problem up as a run does, and reports on it. Collective.
 pub(super) fn check<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -78,12 +78,12 @@ pub(super) fn check<const D: usize, const S: usize>(
     let folder = loaded.job.output_folder();
     session.agree(if session.is_first() { refuse_unwritable(folder) } else { Ok(()) })?;
     let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
-    session.agree(try_loads(&loaded.job, &ready.body, &ready.state))?;
+    session.agree(check_loads(&loaded.job, &ready.body, &ready.state))?;
     session.agree(report(session, loaded, &ready, quality))
 }
 
-/// Evaluates the loads at the first and the last step: what is not finite there would end the run.
-fn try_loads<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>, state: &State) -> Result<()> {
+/// Evaluates the loads at the first and the last step. A value that is not finite is refused here: it would end the run.
+fn check_loads<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>, state: &State) -> Result<()> {
     if body.load.is_empty() {
         return Ok(());
     }
@@ -92,7 +92,7 @@ fn try_loads<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>, state
     tried.into_iter().collect::<Result<()>>().map_err(|error| Error::Refused(error.to_string()))
 }
 
-/// Collective.
+/// The report on a job that was set up. Collective.
 fn report<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -149,13 +149,13 @@ impl Report {
             .map_err(|e| Error::Internal(format!("the report can't be written: {e}")))
     }
 
-    /// Lines for a reader.
+    /// Lines for the terminal.
     pub fn text(&self) -> String {
         let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
         self.header.iter().cloned().chain(warnings).chain(self.lines()).collect::<Vec<_>>().join("\n")
     }
 
-    /// What the log of a run doesn't say.
+    /// Lines that the log of a run does not have.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![
             format!("unknowns   {} velocity components; supports hold the others", self.unknowns),
@@ -225,7 +225,7 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Two digits are more than an estimate is worth.
+/// Two digits: estimates are no more accurate.
 fn rounded(number: f64) -> String {
     if number < 10.0 { format!("{number:.1}") } else { format!("{number:.0}") }
 }

@@ -1,32 +1,32 @@
-//! When a run has to stop by itself: its own limit of wall time, and the end of the Slurm job it runs in.
+//! When a run has to stop before its end time: its limit of wall time, and the end of the Slurm job it runs in.
 
 use super::Clock;
 use crate::{job::Job, output::log::Log, session::Session};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Where Slurm tells the end of a job, in seconds since 1970.
+/// Environment variable of Slurm with the end of the job, in seconds since 1970.
 const SLURM_END: &str = "SLURM_JOB_END_TIME";
 /// Seconds kept free before the end of a Slurm job, unless `[checkpoint] margin` says how many.
 const MARGIN: f64 = 30.0;
 /// The largest share of the time left at the start that is kept free, unless the job says how much.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// What a run may spend, in s.
+/// Limits of wall time, in s.
 #[derive(Debug, Clone, Copy)]
 struct Limits {
-    /// From its launch on, by the job's own limit; infinite where there is none.
+    /// From the launch on, by `[checkpoint] wall_limit`; infinite without one.
     wall: f64,
-    /// From when the end of the Slurm job was learnt to that end; infinite where there is none.
+    /// From the start of the run to the end of the Slurm job; infinite outside of Slurm.
     slurm: f64,
     /// Kept free before that end.
     margin: f64,
 }
 
-/// What a run has spent, in s.
+/// Wall time that a run has used, in s.
 #[derive(Debug, Clone, Copy)]
 struct Spent {
     since_launch: f64,
-    since_learnt: f64,
+    since_start: f64,
     longest_round: f64,
     longest_save: f64,
 }
@@ -34,7 +34,7 @@ struct Spent {
 impl Limits {
     /// Whether the run's own limit is reached, and whether the Slurm job may end before another step is taken and saved.
     fn reached(self, spent: Spent) -> [bool; 2] {
-        let left = self.slurm - spent.since_learnt;
+        let left = self.slurm - spent.since_start;
         [spent.since_launch >= self.wall, left <= self.margin + spent.longest_round + spent.longest_save]
     }
 }
@@ -43,16 +43,16 @@ impl Limits {
 pub(super) struct Deadline {
     began: Instant,
     limits: Limits,
-    /// Seconds by which the Slurm job was over at the start, if it was: that end is not one of this run.
+    /// If the end of the Slurm job had passed at the start: by how many seconds. Such an end is ignored.
     over: Option<f64>,
-    learnt: Instant,
+    start: Instant,
     checked: Instant,
     longest_round: Duration,
     longest_save: Duration,
 }
 
 impl Deadline {
-    /// The limits of this job; a rank that Slurm told the end of the job tells the others. Collective.
+    /// The limits of this job. The end of the Slurm job, known to at least one rank, is shared with all. Collective.
     pub fn new(session: &Session, job: &Job, clock: Clock) -> Self {
         let own =
             slurm_end(std::env::var(SLURM_END).ok().as_deref()).map_or(f64::INFINITY, |end| end - now());
@@ -70,15 +70,15 @@ impl Deadline {
             began: clock.began,
             limits,
             over,
-            learnt: now,
+            start: now,
             checked: now,
             longest_round: zero,
             longest_save: zero,
         }
     }
 
-    /// Tells the log about the Slurm job, if there is one.
-    pub fn tell(&self, log: &mut Log) {
+    /// Logs the end of the Slurm job, if there is one.
+    pub fn log_limit(&self, log: &mut Log) {
         let Limits { slurm, margin, .. } = self.limits;
         if let Some(over) = self.over {
             log.warning(format!("{SLURM_END} is over by {over:.0} s; it is passed over"));
@@ -89,26 +89,26 @@ impl Deadline {
         }
     }
 
-    /// Learns how long a checkpoint took.
-    pub fn saved(&mut self, spent: Duration) {
+    /// Takes in how long a checkpoint took.
+    pub fn add_save(&mut self, spent: Duration) {
         self.longest_save = self.longest_save.max(spent);
     }
 
-    /// Learns how long a round of steps took.
-    fn took(&mut self, spent: Duration) {
+    /// Takes in how long a step and its output took.
+    fn add_round(&mut self, spent: Duration) {
         self.longest_round = self.longest_round.max(spent);
     }
 
-    /// Asked after each step: why the run has to stop now, the same on all ranks. Collective.
+    /// Called after each step: the reason why the run has to stop now, if it has to; the same on all ranks. Collective.
     pub fn passed(&mut self, session: &Session) -> Option<String> {
-        self.took(self.checked.elapsed());
+        self.add_round(self.checked.elapsed());
         self.checked = Instant::now();
         if self.limits.wall.is_infinite() && self.limits.slurm.is_infinite() {
             return None;
         }
         let reached = self.limits.reached(Spent {
             since_launch: self.began.elapsed().as_secs_f64(),
-            since_learnt: self.learnt.elapsed().as_secs_f64(),
+            since_start: self.start.elapsed().as_secs_f64(),
             longest_round: self.longest_round.as_secs_f64(),
             longest_save: self.longest_save.as_secs_f64(),
         });
@@ -120,7 +120,7 @@ impl Deadline {
     }
 }
 
-/// Seconds kept free where the job does not say how many, with so many left at the start.
+/// The default of `[checkpoint] margin` in s, for so many seconds left at the start.
 fn margin(left: f64) -> f64 {
     MARGIN.min(LARGEST_SHARE * left)
 }
@@ -129,7 +129,7 @@ fn now() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// Seconds since 1970; `None` where Slurm sets no end or one that is no time.
+/// Seconds since 1970; `None` if Slurm sets no end, or a text that is no time.
 fn slurm_end(value: Option<&str>) -> Option<f64> {
     value?.trim().parse().ok().filter(|end: &f64| end.is_finite() && *end > 0.0)
 }
@@ -150,7 +150,7 @@ mod tests {
     fn the_end_of_the_slurm_job_leaves_time_for_a_step_a_checkpoint_and_the_margin() {
         let limits = Limits { wall: f64::INFINITY, slurm: 100.0, margin: 30.0 };
         let spent =
-            |since_learnt| Spent { since_launch: 1e6, since_learnt, longest_round: 7.0, longest_save: 5.0 };
+            |since_start| Spent { since_launch: 1e6, since_start, longest_round: 7.0, longest_save: 5.0 };
         // 100 - 30 - 7 - 5 = 58.
         assert_eq!(limits.reached(spent(57.9)), [false, false]);
         assert_eq!(limits.reached(spent(58.0)), [false, true]);
@@ -164,7 +164,7 @@ mod tests {
     fn the_wall_time_limit_counts_from_the_launch() {
         let limits = Limits { wall: 60.0, slurm: f64::INFINITY, margin: 30.0 };
         let spent =
-            |since_launch| Spent { since_launch, since_learnt: 0.0, longest_round: 7.0, longest_save: 5.0 };
+            |since_launch| Spent { since_launch, since_start: 0.0, longest_round: 7.0, longest_save: 5.0 };
         assert_eq!([59.9, 60.0].map(|seconds| limits.reached(spent(seconds))[0]), [false, true]);
     }
 
@@ -181,14 +181,14 @@ mod tests {
             began: now,
             limits,
             over: None,
-            learnt: now,
+            start: now,
             checked: now,
             longest_round: zero,
             longest_save: zero,
         };
         for seconds in [2, 5, 3] {
-            deadline.saved(Duration::from_secs(seconds));
-            deadline.took(Duration::from_secs(2 * seconds));
+            deadline.add_save(Duration::from_secs(seconds));
+            deadline.add_round(Duration::from_secs(2 * seconds));
         }
         assert_eq!(deadline.longest_save, Duration::from_secs(5));
         assert_eq!(deadline.longest_round, Duration::from_secs(10));

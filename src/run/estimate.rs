@@ -1,4 +1,4 @@
-//! What a run will cost, roughly.
+//! Estimates of the memory and time of a run.
 //!
 //! Memory is counted where the run's arrays are known and modelled for the preconditioner. Times come from constants
 //! that were measured on one core of a common server, at 10^4 to 10^5 unknowns; they are divided by the number of ranks
@@ -13,7 +13,7 @@ use crate::{
 };
 use serde::Serialize;
 
-/// What a run will cost; an estimate.
+/// The estimated cost of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
     /// Bytes by part, over all ranks.
@@ -39,7 +39,7 @@ pub struct MemoryEstimate {
     pub preconditioner: u64,
     /// All of these.
     pub total: u64,
-    /// The whole mesh on rank 0, before it is handed out; gone afterwards. 0 where ranks make or read their own parts.
+    /// The whole mesh on rank 0 until it is distributed; 0 where ranks generate or read their own parts.
     pub whole_mesh_at_start: u64,
 }
 
@@ -48,17 +48,17 @@ pub struct MemoryEstimate {
 pub struct TimeEstimate {
     /// Assembly and preconditioner.
     pub set_up: f64,
-    /// A step.
+    /// One step.
     pub step: f64,
     /// Set-up and all steps.
     pub run: f64,
 }
 
-/// Bytes of a process before it has a mesh.
+/// Bytes of a process without a mesh.
 const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
-/// Seconds of stress, history, forces and energies, a cell and step.
+/// Seconds of stress, history, forces and energies per cell and step, in the plane and in space.
 const CELL: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {

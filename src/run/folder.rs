@@ -1,4 +1,4 @@
-//! The output folder: whose results it holds, and how a run takes it over.
+//! The output folder: which results it holds, and how a run locks and prepares it.
 
 use super::{Start, summary::SUMMARY};
 use crate::{
@@ -12,11 +12,11 @@ use std::{io::ErrorKind, path::Path};
 /// The file that every run writes, and locks while it does.
 const LOG: &str = "run.log";
 
-/// Keys of another job that a refusal names; the rest is only counted.
+/// How many differing keys a refusal names; the others are counted.
 const SHOWN: usize = 8;
 
-/// Takes the folder for this run alone if it is there, and refuses one in which the run must not begin. On one rank, before
-/// anything of it is read; touches nothing.
+/// Locks the folder for this run if it exists, and refuses one in which the run must not start. On one rank, before anything in it
+/// is read; changes no file.
 pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()> {
     let folder = job.output_folder();
     refuse_unwritable(folder)?;
@@ -25,7 +25,7 @@ pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()
     if *start == Start::Anew { refuse_unfinished(folder) } else { Ok(()) }
 }
 
-/// Refuses a folder that can't be written or made. On one rank; touches nothing.
+/// Refuses a folder that can't be written or created. On one rank; changes no file.
 pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
     let there = folder.ancestors().find(|path| path.symlink_metadata().is_ok()).unwrap_or(folder);
     let refuse = |why: String| {
@@ -41,7 +41,7 @@ pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
     }
 }
 
-/// Refuses a folder with a checkpoint that a new start would remove although its run has not come to its end.
+/// Refuses a folder with a checkpoint of an unfinished run, which a new start would remove.
 fn refuse_unfinished(folder: &Path) -> Result<()> {
     let saved = list(folder)?;
     let Some((newest, file)) = saved.first() else { return Ok(()) };
@@ -62,11 +62,11 @@ fn refuse_unfinished(folder: &Path) -> Result<()> {
     )))
 }
 
-/// Refuses a folder that holds the results of another job, or a job file that no run wrote.
+/// Refuses a folder with the results of another job, or with a job.toml that no run wrote.
 fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let folder = job.output_folder();
     let file = folder.join("job.toml");
-    // The newest checkpoint of the folder itself is held against the job when it is read.
+    // The newest checkpoint of the folder is compared with the job when it is read.
     if matches!(start, Start::Over | Start::Newest) || !file.exists() {
         return Ok(());
     }
@@ -106,8 +106,8 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     ))
 }
 
-/// Makes the output folder, takes it for this run alone, opens the log and removes the summary of an earlier run, which is
-/// not that of this one if it is killed; a new start removes the checkpoints, too. On one rank.
+/// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that it is never
+/// taken for that of this run; a new start removes the checkpoints, too. On one rank.
 pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);

@@ -1,4 +1,4 @@
-//! What the log says before the first and after the last step.
+//! The lines of the log before the first and after the last step.
 
 use super::{Summary, setup::Setup};
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// Versions, title, mesh, partition, effects, solver, output folder: a line each. Collective.
+/// Versions, title, mesh, partition, effects, solver and output folder, one line each. Collective.
 pub(super) fn lines<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -54,12 +54,12 @@ pub(super) fn lines<const D: usize, const S: usize>(
     Ok(lines)
 }
 
-/// What the user should know before the first step.
+/// Warnings about the job, its certificates and its initial state.
 pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
     loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned().collect()
 }
 
-/// Status, sums, times.
+/// Logs status, totals and times of a finished run.
 pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
     if let Some(error) = &summary.error {
         log.line(format!("error: {error}"));

@@ -1,4 +1,4 @@
-//! What a run allocated for its effects, as facts a test can hold against the job.
+//! What a run allocated for its effects, so that tests can compare it with the job.
 
 use crate::{body::Body, session::Session, stepping::Stepper};
 use serde::Serialize;
@@ -11,7 +11,7 @@ pub struct Inventory {
     pub history_bytes: BTreeMap<String, u64>,
     /// Quadrature points of all contacts.
     pub contact_points: u64,
-    /// Those of them with friction.
+    /// Quadrature points with friction.
     pub friction_points: u64,
     /// Whether steps are nonlinear, so that Newton's method exists.
     pub newton: bool,
@@ -20,7 +20,7 @@ pub struct Inventory {
 }
 
 impl Inventory {
-    /// Counts. Collective.
+    /// Counts what body and scheme hold. Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,

@@ -1,4 +1,4 @@
-//! From a job to results: builds only what the job calls for, then takes the steps.
+//! Runs a job: builds only what the job contains, then takes the steps.
 
 mod build;
 mod check;
@@ -47,7 +47,7 @@ pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_
 pub enum Start {
     /// The initial state.
     Anew,
-    /// The initial state, even over the results of another job.
+    /// The initial state, overwriting the results of another job.
     Over,
     /// The newest good checkpoint of the output folder.
     Newest,
@@ -56,18 +56,18 @@ pub enum Start {
 }
 
 impl Start {
-    /// Whether the run starts behind an earlier one.
+    /// Whether the run continues an earlier one.
     fn goes_on(&self) -> bool {
         matches!(self, Self::Newest | Self::From(_))
     }
 }
 
-/// When the process began, how long MPI and PETSc took to start, and who watches.
+/// The start of the process, and whether its log is shown.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
-    /// The beginning.
+    /// When the process started.
     pub began: Instant,
-    /// Time until MPI and PETSc were up.
+    /// Time that MPI and PETSc took to start.
     pub launched: Duration,
     /// Whether the run's log is shown on the terminal too.
     pub on_terminal: bool,
@@ -92,7 +92,7 @@ pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Re
     on_the_mesh!(session, loaded, time_loop::run, start, clock)
 }
 
-/// Everything but the run: sets a job up as a run does and tells what it would be; writes no file. Collective.
+/// Sets a job up as a run does and reports on it, without steps and without files. Collective.
 pub fn check(session: &Session, loaded: Loaded) -> Result<Report, Agreed> {
     on_the_mesh!(session, loaded, check::check)
 }

@@ -1,4 +1,4 @@
-//! Obstacles of a job: what gaps are measured to, and what is odd about where a body starts beside them.
+//! Warnings about the initial position of a body relative to its obstacles.
 
 use crate::{
     body::Body,
@@ -10,11 +10,11 @@ use crate::{
     tensor::{Vector, larger},
 };
 
-/// Share of the body's size beyond which it starts too deep in an obstacle.
+/// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
-/// Warnings of contacts that can touch nothing because the body lies behind the obstacle, and of bodies that start inside of
-/// one. Collective, with the same words on all ranks.
+/// Warnings about contacts that can never close because the body lies behind the obstacle, and about bodies that start inside of
+/// one. Collective, with the same warnings on all ranks.
 pub(super) fn warnings<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
@@ -63,7 +63,7 @@ fn size<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> f64 {
     (0..D).map(|axis| ends[0][axis] + ends[1][axis]).fold(0.0, larger)
 }
 
-/// Whether all of a body lies where the obstacle is. Collective.
+/// Whether the whole body lies inside of the obstacle. Collective.
 fn is_behind<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>], size: f64) -> bool {
     let depths = nodes.iter().filter_map(|node| gap.depth(0.0, node));
     let [least, most] =

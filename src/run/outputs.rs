@@ -1,4 +1,4 @@
-//! All files of a run, opened for a start or to go on.
+//! All files of a run, opened for a new start or to continue.
 
 use crate::{
     agreement::Agreed,
@@ -37,27 +37,28 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     fields: FieldOutput<D>,
     every: Option<Every>,
     keep: usize,
-    /// Bytes of the files that grow when the run began to write, and of checkpoints so far; on rank 0.
+    /// Bytes of the growing files when the run opened them, on rank 0.
     before: u64,
+    /// Bytes of the checkpoints so far, on rank 0.
     checkpoints: u64,
     /// Time spent writing.
     pub spent: Duration,
 }
 
-/// What files are to say and hold.
+/// What the files of a run contain.
 pub(super) struct Wanted<'a, const D: usize> {
-    /// What the job asks for.
+    /// The job.
     pub job: &'a Job,
-    /// Whose checkpoints they are.
+    /// The problem that checkpoints belong to.
     pub identity: Identity,
-    /// Where to look.
+    /// The probes, already located.
     pub probes: Probes<D>,
-    /// Whether files of an earlier run are gone on with.
+    /// Whether the files of an earlier run are continued.
     pub goes_on: bool,
 }
 
 impl<const D: usize, const S: usize> Outputs<D, S> {
-    /// Finds profiles and opens the files; behind the state's step if the run goes on. Collective.
+    /// Prepares the profiles and opens the files; those of a run that is continued are cut after the state's step. Collective.
     pub fn open(
         session: &Session,
         wanted: Wanted<D>,
@@ -127,13 +128,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         Ok(())
     }
 
-    /// Writes the state that the run starts from, where its fields are due and not there yet. Collective.
+    /// Writes the fields of the initial state, if they are due and not in the file yet. Collective.
     pub fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let missing = self.fields.last_time().is_none_or(|time| time < state.time);
         if missing && due(self.every, state) { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
-    /// Writes the last state unless it was just written, and brings all rows to the files. Collective.
+    /// Writes the fields of the last state unless the file has them, and flushes all tables. Collective.
     pub fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
         if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
@@ -155,7 +156,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         self.fields.figures(at)
     }
 
-    /// Brings all rows to the files.
+    /// Flushes all tables.
     fn flush(&mut self) -> Result<()> {
         self.history.as_mut().map_or(Ok(()), History::flush)?;
         self.probes.flush()?;
@@ -184,7 +185,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         Ok(path)
     }
 
-    /// Bytes that this run brought to files: what tables and fields grew by, and all checkpoints. On rank 0, elsewhere 0.
+    /// Bytes that this run wrote: the growth of tables and fields, and all checkpoints. On rank 0; 0 elsewhere.
     pub fn written(&self) -> u64 {
         let tables = if self.history.is_some() { length_of_all(&self.folder) } else { 0 };
         tables.saturating_sub(self.before) + self.checkpoints
@@ -196,25 +197,25 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 }
 
-/// Files that grow while a run goes on.
+/// Files that grow during a run.
 const GROWING: [&str; 5] = ["history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf"];
 
 fn length_of_all(folder: &Path) -> u64 {
     GROWING.iter().map(|name| length(&folder.join(name))).sum()
 }
 
-/// Bytes of a file; none where there is no such file.
+/// Bytes of a file; 0 if it does not exist.
 fn length(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |file| file.len())
 }
 
-/// Whether the fields of this state are to be written: of the initial one always, where fields are wanted along the way.
+/// Whether the fields of this state are due; those of the initial state always are, if the job has `[output] fields`.
 fn due(every: Option<Every>, state: &State) -> bool {
-    every.is_some_and(|every| has_come(every, state.step, [state.time - state.step_length, state.time]))
+    every.is_some_and(|every| is_due(every, state.step, [state.time - state.step_length, state.time]))
 }
 
-/// Whether this is the number of a step, or the times in s before and after it, at which something is written.
-fn has_come(every: Every, step: u64, [before, after]: [f64; 2]) -> bool {
+/// Whether output is due after this step, which went from the time `before` to `after` in s.
+fn is_due(every: Every, step: u64, [before, after]: [f64; 2]) -> bool {
     match every {
         _ if step == 0 => true,
         Every::Every(steps) => step.is_multiple_of(steps),
@@ -244,11 +245,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn multiples_of_an_interval_that_rounding_misses_have_come() {
-        let tenths = |times| has_come(Every::Interval(0.1), 5, times);
+    fn multiples_of_an_interval_that_rounding_misses_are_due() {
+        let tenths = |times| is_due(Every::Interval(0.1), 5, times);
         assert!(0.3 / 0.1 < 3.0 && tenths([0.2, 0.3]), "0.3 is a multiple of 0.1");
         assert!(!tenths([0.3, 0.35]) && tenths([0.35, 0.45]) && tenths([0.2, 0.75]));
-        assert!(has_come(Every::Interval(0.1), 0, [0.0; 2]) && has_come(Every::Every(3), 0, [0.0; 2]));
-        assert!(has_come(Every::Every(3), 6, [0.0; 2]) && !has_come(Every::Every(3), 7, [0.0; 2]));
+        assert!(is_due(Every::Interval(0.1), 0, [0.0; 2]) && is_due(Every::Every(3), 0, [0.0; 2]));
+        assert!(is_due(Every::Every(3), 6, [0.0; 2]) && !is_due(Every::Every(3), 7, [0.0; 2]));
     }
 }

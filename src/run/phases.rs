@@ -1,4 +1,4 @@
-//! What each phase of a run took, as `summary.json` has it.
+//! Time and memory traffic of each phase of a run, for `summary.json`.
 
 use super::Clock;
 use crate::{
@@ -30,8 +30,7 @@ pub(super) fn seconds(
     phases.iter().zip(seconds).map(|((name, _), s)| ((*name).to_owned(), s.into())).collect()
 }
 
-/// Bytes that the phases of steps moved through memory at the least, over all ranks, and that files grew by; `null` where that is not
-/// counted. Collective.
+/// Least memory traffic of each phase in bytes over all ranks, and bytes written to files; `null` where it is not counted. Collective.
 pub(super) fn traffic(session: &Session, steps: &StepTraffic, written: u64) -> Map<String, Value> {
     let phases = [
         ("assembly", None),

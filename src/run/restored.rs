@@ -1,4 +1,4 @@
-//! How a run finds the checkpoint that it goes on from.
+//! The checkpoint that a restarted run continues from.
 
 use super::Start;
 use crate::{
@@ -16,30 +16,31 @@ use crate::{
 use mpi::traits::{Communicator, Root};
 use std::path::{Path, PathBuf};
 
-/// Where a restarted run comes from.
+/// A checkpoint that was read.
 pub(super) struct Restored {
     pub file: String,
     pub totals: Totals,
-    /// Checkpoints that were passed over, and why.
+    /// Newer checkpoints that can't be read, and why.
     pub faults: Vec<String>,
-    /// What the log says about the one that was taken.
+    /// The line of the log about it.
     pub words: String,
 }
 
-/// The checkpoints that a run may go on from, the best first; none if it starts anew. Refused where there should be one. Collective.
+/// The checkpoints that a run may continue from, the newest first; none for a new start. Refused if a restart finds none. Collective.
 pub(super) fn candidates(session: &Session, start: &Start, folder: &Path) -> Result<Vec<PathBuf>, Agreed> {
     match start {
         Start::Anew | Start::Over => Ok(Vec::new()),
         Start::From(path) => Ok(vec![path.clone()]),
         Start::Newest => {
             let found = newest(session, folder)?;
-            let words = || format!("{}: no checkpoint to go on from; run without --restart", folder.display());
+            let words =
+                || format!("{}: no checkpoint to go on from; run without --restart", folder.display());
             session.agree(if found.is_empty() { Err(Error::Refused(words())) } else { Ok(found) })
         }
     }
 }
 
-/// Puts the first good one of some checkpoints into the state; nothing without any. Collective.
+/// Reads the first of these checkpoints that is sound into body and state; none without candidates. Collective.
 pub(super) fn restore<const D: usize, const S: usize>(
     session: &Session,
     candidates: &[PathBuf],
@@ -68,7 +69,8 @@ pub(super) fn restore<const D: usize, const S: usize>(
     ))))
 }
 
-/// The checkpoints of a folder as rank 0 finds them, the newest first: what a rank sees of a shared folder may be old. Collective.
+/// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.
+/// Collective.
 fn newest(session: &Session, folder: &Path) -> Result<Vec<PathBuf>, Agreed> {
     let found = if session.is_first() { list(folder) } else { Ok(Vec::new()) };
     let found = session.agree(found)?;

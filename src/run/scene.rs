@@ -1,4 +1,4 @@
-//! Each rank's part of a job's mesh, from wherever the job takes it.
+//! Each rank's part of a job's mesh, whether generated or read.
 
 use super::validate::validate;
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 use mpi::{topology::Communicator, traits::Root};
 use std::path::Path;
 
-/// Generated meshes of more cells than this are made in parts, each by its rank.
+/// Generated meshes with more cells than this are generated in parts, each by its rank.
 const MOST_CELLS_ON_ONE_RANK: usize = 200_000;
 
 /// This rank's part of a mesh of either dimension.
@@ -30,7 +30,7 @@ pub enum Scene {
 }
 
 impl Scene {
-    /// The mesh of a job, held against it; the job's warnings grow by those of the mesh. Collective.
+    /// The mesh of a job, checked against the job; adds warnings about the mesh to those of the job. Collective.
     pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self, Agreed> {
         let scene = match &loaded.job.mesh {
             job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
@@ -48,7 +48,7 @@ impl Scene {
     }
 }
 
-/// Splits a mesh that is whole on rank 0 (`None` elsewhere) and hands the parts out. Collective.
+/// Partitions a mesh that is whole on rank 0 (`None` elsewhere) and distributes the parts. Collective.
 pub(super) fn split<const D: usize>(
     session: &Session,
     whole: Option<GlobalMesh<D>>,
@@ -75,7 +75,7 @@ fn generated<const D: usize, G: Grid<D>>(
     split(session, session.agree(whole)?)
 }
 
-/// Refuses a mesh file that is not there, at its place in the job.
+/// Refuses a mesh file that does not exist, at its key in the job.
 fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     std::fs::metadata(path).map(drop).map_err(|error| {
         let help = "a relative path starts from the folder of the job file";
@@ -123,7 +123,7 @@ fn cuboid(of: &job::Cuboid) -> Result<Cuboid> {
     Cuboid::new(of.size, of.cells.map(|n| n as usize), gradings)
 }
 
-/// The grading along the axis between the sides `low` and `high`, if cells crowd toward these sides.
+/// The grading along the axis between the sides `low` and `high`, if cells are refined toward these sides.
 fn grading(power: f64, sides: &[String], low: &str, high: &str) -> Grading {
     let named = |side: &str| sides.iter().any(|name| name == side);
     let toward = match (named(low), named(high)) {

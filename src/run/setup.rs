@@ -1,4 +1,4 @@
-//! What a run starts from and a check describes: nothing of it touches the output folder.
+//! Sets a job up for a run or for `solver check`, without touching the output folder.
 
 use super::{build, obstacles, steps, validate::refuse_free_bodies};
 use crate::{
@@ -23,11 +23,11 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub probes: Probes<D>,
     pub certificates: Certificates,
     pub verdict: Verdict,
-    /// What is odd about the start.
+    /// Warnings about the initial state.
     pub warnings: Vec<String>,
 }
 
-/// Sets the problem of a job up on its mesh, which was held against it. Collective.
+/// Sets a job up on its mesh, which was checked against the job. Collective.
 pub(super) fn setup<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,

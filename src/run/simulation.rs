@@ -1,4 +1,4 @@
-//! A job in memory: set up and stepped without a file.
+//! A job that is set up and stepped without output files.
 
 use super::{
     scene::split,
@@ -27,7 +27,7 @@ pub struct Simulation<const D: usize, const S: usize> {
     pub state: State,
     /// The scheme.
     pub scheme: Stepper,
-    /// What adds up over the steps.
+    /// Sums and maxima over the steps.
     pub totals: Totals,
     time: Time,
     landings: Landings,
@@ -35,15 +35,15 @@ pub struct Simulation<const D: usize, const S: usize> {
 }
 
 impl<const D: usize, const S: usize> Simulation<D, S> {
-    /// Sets a job up on `mesh`, the whole mesh on rank 0 and nothing elsewhere; the job's warnings grow by those of the
-    /// mesh. `S` is the number of stress components that go with the job's hypothesis. Collective.
+    /// Sets a job up on `mesh`, the whole mesh on rank 0 and nothing elsewhere; adds warnings about the mesh to those of the
+    /// job. `S` is the number of stress components that go with the job's hypothesis. Collective.
     pub fn new(session: &Session, loaded: &mut Loaded, mesh: Option<GlobalMesh<D>>) -> Result<Self> {
         let mesh = split(session, mesh)?;
         validate(session, &mesh, loaded)?;
         Self::on(session, loaded, mesh)
     }
 
-    /// The same on this rank's part of a mesh that was held against the job. Collective.
+    /// The same on this rank's part of a mesh that was checked against the job. Collective.
     pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
         let totals = totals_at_start(session, &body, &state)?;
@@ -52,7 +52,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         Ok(Self { body, state, scheme, totals, time, landings, adaptive })
     }
 
-    /// Where adaptive steps are on their ladder, if there are any.
+    /// The state of the step size control, if steps are adaptive.
     pub fn pace(&self) -> Option<Pace> {
         self.adaptive.as_ref().map(|adaptive| adaptive.pace)
     }
@@ -72,13 +72,13 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             }
         };
         self.totals.add(&outcome);
-        watch_slip(session, &self.body, &self.state, &mut self.totals)?;
+        update_slip_pressure(session, &self.body, &self.state, &mut self.totals)?;
         Ok(Some(outcome))
     }
 }
 
-/// Takes in the contact pressure that the certificate of slip weakening is held against, if there is any. Collective.
-pub(super) fn watch_slip<const D: usize, const S: usize>(
+/// Updates the largest contact pressure under slip weakening, which the certificate bounds. Collective.
+pub(super) fn update_slip_pressure<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,

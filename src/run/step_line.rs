@@ -1,9 +1,9 @@
-//! The line that the log is given after a step.
+//! The line of the log after a step.
 
 use crate::stepping::StepOutcome;
 use std::fmt::{self, Display, Formatter};
 
-/// Writes itself without room of its own: runs log many steps.
+/// Formats itself without allocating: runs log many steps.
 pub(super) struct StepLine<'a> {
     pub step: u64,
     /// The last step of the run.
@@ -34,7 +34,7 @@ impl Display for StepLine<'_> {
     }
 }
 
-/// What happens at the contact points, where there is any to tell: `branches` counts them by branch of the normal law.
+/// Counts of contact points by state; `branches` counts them by branch of the normal law. Zero counts are left out.
 fn write_kinds(outcome: &StepOutcome, f: &mut Formatter<'_>) -> fmt::Result {
     let points = &outcome.points;
     if let Some(last) = points.branches.iter().rposition(|count| *count > 0) {
@@ -43,7 +43,7 @@ fn write_kinds(outcome: &StepOutcome, f: &mut Formatter<'_>) -> fmt::Result {
         }
         write!(f, "  ")?;
     }
-    let told = [
+    let counts = [
         ("open", points.open),
         ("held", points.held),
         ("sticking", points.sticking),
@@ -52,7 +52,7 @@ fn write_kinds(outcome: &StepOutcome, f: &mut Formatter<'_>) -> fmt::Result {
         ("indefinite", outcome.indefinite_solves),
         ("solutions", outcome.solutions),
     ];
-    told.iter().filter(|(_, count)| *count > 0).try_for_each(|(name, count)| write!(f, "{name} {count}  "))
+    counts.iter().filter(|(_, count)| *count > 0).try_for_each(|(name, count)| write!(f, "{name} {count}  "))
 }
 
 /// Seconds as `12 s`, `3 min 05 s` or `2 h 07 min`.

@@ -1,11 +1,11 @@
-//! From the job's tables to the steps that a run takes.
+//! The steps that a job asks for.
 
 use crate::{
     job::{Every, Job},
     stepping::{Adaptive, AdaptiveSettings, Landings},
 };
 
-/// How the job adapts its steps, if it does.
+/// The step size control of a job with adaptive steps.
 pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
     job.time.adaptive.as_ref().map(|adaptive| {
         Adaptive::new(AdaptiveSettings {
@@ -32,7 +32,7 @@ pub(super) fn landings(job: &Job) -> Landings {
     Landings { times: job.time.land_on.clone(), interval, end: job.time.end }
 }
 
-/// Steps that one matrix is for: adaptive steps change their length every other time.
+/// How many steps one matrix serves, about: adaptive steps are taken to change their length every other step.
 pub(super) fn steps_a_matrix(job: &Job) -> u64 {
     if job.time.adaptive.is_some() { 2 } else { landings(job).steps_after(0.0, job.time.step) }
 }

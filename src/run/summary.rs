@@ -1,4 +1,4 @@
-//! `summary.json`: what a run did, in one object.
+//! `summary.json`: the results of a run in one object.
 
 use super::{Inventory, VERSION};
 use crate::{
@@ -13,7 +13,7 @@ use std::{collections::BTreeMap, path::Path};
 /// The file in the output folder.
 pub(super) const SUMMARY: &str = "summary.json";
 
-/// The norm of the strain up to which the theory of small strains is taken to hold.
+/// Norm of the strain above which a warning about the theory of small strains is given.
 const LARGEST_STRAIN: f64 = 0.1;
 
 /// The object; names are part of the contract.
@@ -21,9 +21,9 @@ const LARGEST_STRAIN: f64 = 0.1;
 pub struct Summary {
     /// `completed`, `stopped` or `failed`.
     pub status: &'static str,
-    /// What went wrong, if something did.
+    /// Why the run failed; absent if it did not.
     pub error: Option<String>,
-    /// What the user should know of the job, its certificates and the run.
+    /// Warnings about the job, its certificates and the run.
     pub warnings: Vec<String>,
     /// Version of the solver with the id of its source.
     pub version: &'static str,
@@ -39,7 +39,7 @@ pub struct Summary {
     pub nodes: usize,
     /// Velocity components that are solved for.
     pub unknowns: usize,
-    /// What was simulated.
+    /// Names of the effects.
     pub effects: Vec<&'static str>,
     /// Time scheme.
     pub scheme: &'static str,
@@ -51,7 +51,7 @@ pub struct Summary {
     pub steps: u64,
     /// Time reached in s.
     pub time: f64,
-    /// Steps taken back.
+    /// Rejected adaptive steps.
     pub rejected_steps: u64,
     /// Matrices this run assembled, each with its preconditioner.
     pub set_ups: u64,
@@ -59,52 +59,52 @@ pub struct Summary {
     pub newton_iterations: u64,
     /// Linear iterations since time 0.
     pub linear_iterations: u64,
-    /// The checkpoint this run went on from.
+    /// The checkpoint that this run continued from.
     pub restarted_from: Option<String>,
     /// Largest von Mises norm of sigma at the end, in Pa.
     pub final_von_mises: f64,
     /// Largest stress and strain after any step.
     #[serde(flatten)]
     pub peaks: Peaks,
-    /// Figures of the fields that the run writes, at the end.
+    /// Numbers that sum up fields at the end, by name.
     #[serde(flatten)]
     pub of_fields: BTreeMap<&'static str, f64>,
     /// Largest scaled distance to a contact graph in any step.
     pub max_inclusion_residual: f64,
     /// Largest imbalance of energy in any step over the energy turned over.
     pub max_energy_imbalance: f64,
-    /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds: what
-    /// `certificates.slip_pressure_bound` is to be held against.
+    /// Largest contact pressure of any step in Pa, where friction weakens under a pressure that no law bounds; to be compared with
+    /// `certificates.slip_pressure_bound`.
     pub max_slip_pressure: Option<f64>,
-    /// What was found from other starts of steps; there if any were tried.
+    /// Solutions found from other start values; present if any were tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guesses: Option<Guesses>,
-    /// What is known about solvability and stability.
+    /// Certificates of solvability and stability.
     pub certificates: Certificates,
     /// Seconds by phase, of the slowest rank.
     pub wall_seconds: serde_json::Map<String, serde_json::Value>,
-    /// Bytes of memory traffic by phase, at the least, over all ranks; `null` where it is not counted.
+    /// Least memory traffic by phase in bytes, over all ranks; `null` where it is not counted.
     pub traffic_bytes: serde_json::Map<String, serde_json::Value>,
     /// Largest memory of all ranks together, in bytes.
     pub peak_memory_bytes: u64,
-    /// How the mesh was split.
+    /// Quality of the partition.
     pub partition: PartitionQuality,
     /// What was allocated for the effects.
     pub inventory: Inventory,
 }
 
-/// What other starts of steps found.
+/// Solutions found from other start values of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Guesses {
-    /// Steps that were solved from other starts, too.
+    /// Steps solved from other start values, too.
     pub steps: u64,
-    /// Steps with several solutions among these.
+    /// Of these, steps with several solutions.
     pub steps_with_several: u64,
     /// Most different solutions of a step.
     pub most_solutions: u64,
 }
 
-/// How the mesh was split.
+/// Quality of the partition.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PartitionQuality {
     /// Facets between ranks.
@@ -114,15 +114,15 @@ pub struct PartitionQuality {
 }
 
 impl Summary {
-    /// Writes the object to the folder, at once. On one rank.
+    /// Writes the object to the folder, atomically. On one rank.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::Internal(format!("the summary can't be written: {e}")))?;
         write_whole(&folder.join(SUMMARY), &(text + "\n"))
     }
 
-    /// What the theory or a certificate does not cover and the run came to, in words.
-    pub fn found_on_the_way(&self) -> impl Iterator<Item = String> {
+    /// Warnings where the run left the range of the theory or of a certificate.
+    pub fn range_warnings(&self) -> impl Iterator<Item = String> {
         let slip = self.certificates.slip_pressure_bound.zip(self.max_slip_pressure);
         let slip = slip.filter(|(bound, most)| most > bound).map(|(bound, most)| {
             format!(

@@ -1,4 +1,4 @@
-//! The run itself: set-up, steps, checkpoints, the end.
+//! A run: set-up, steps, checkpoints, closing.
 
 use super::{
     Clock, Inventory, Start,
@@ -9,7 +9,7 @@ use super::{
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
-    simulation::{totals_at_start, watch_slip},
+    simulation::{totals_at_start, update_slip_pressure},
     step_line::StepLine,
     steps,
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
@@ -33,15 +33,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Runs of more steps than this log only every so many, to keep logs readable.
+/// About how many steps are logged; of longer runs only every n-th step is.
 const LOGGED_STEPS: u64 = 1000;
 
-/// Room for the line of a step in the log.
+/// Bytes reserved for the line of a step in the log.
 const LINE: usize = 512;
 
-/// How many times the energy that was put in an explicit scheme may make by itself. In stable steps that dissipate, it makes
-/// `q / (1 - q)` times as much at most, at the share `q` of the bound.
-const MOST_MADE: f64 = 1e4;
+/// Largest ratio of the energy that an explicit scheme may produce to the energy supplied. Stable dissipative steps produce at most
+/// `q / (1 - q)` times the supplied energy, where `q` is the step over its bound.
+const LARGEST_GROWTH: f64 = 1e4;
 
 /// Sets the problem up on all ranks and runs it. Collective.
 pub(super) fn run<const D: usize, const S: usize>(
@@ -82,7 +82,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         adaptive.pace = pace;
     }
     let deadline = Deadline::new(session, job, clock);
-    deadline.tell(&mut log);
+    deadline.log_limit(&mut log);
     let mut run = Run {
         session,
         job,
@@ -96,7 +96,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         totals,
         outputs,
         log,
-        words: String::with_capacity(LINE),
+        line: String::with_capacity(LINE),
         clock,
         deadline,
         setup,
@@ -121,17 +121,17 @@ struct Run<'a, const D: usize, const S: usize> {
     certificates: Certificates,
     adaptive: Option<Adaptive<D>>,
     landings: Landings,
-    /// Lines of the log that told what a step landed on.
+    /// Logged lines about the times that steps landed on.
     landed: u64,
     totals: Totals,
     outputs: Outputs<D, S>,
     log: Log,
-    /// The line that the log is given after a step.
-    words: String,
+    /// The line of the log after a step, kept to reuse its memory.
+    line: String,
     clock: Clock,
     deadline: Deadline,
     setup: Duration,
-    /// When and from which step the steps began.
+    /// When the steps began, and the number of the step before them.
     stepping: (Instant, u64),
 }
 
@@ -146,20 +146,20 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         while self.state.time < end {
             let outcome = self.take_step(length).or_else(|error| self.explain(error))?;
             self.totals.add(&outcome);
-            watch_slip(self.session, &self.body, &self.state, &mut self.totals)?;
+            update_slip_pressure(self.session, &self.body, &self.state, &mut self.totals)?;
             self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
             let steps_left = self.landings.steps_after(self.state.time, self.state.step_length);
             let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
             self.report(&outcome, last);
             self.refuse_overflow()?;
             self.refuse_growth()?;
-            let wish = self.wish(saved_at);
-            if let Some(reason) = wish.stop
+            let request = self.pending_request(saved_at);
+            if let Some(reason) = request.stop
                 && self.state.time < end
             {
                 return Ok(Ended::Stopped(reason));
             }
-            if wish.save && self.state.time < end {
+            if request.save && self.state.time < end {
                 self.save()?;
                 saved_at = Instant::now();
             }
@@ -167,7 +167,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         Ok(Ended::Completed)
     }
 
-    /// Takes a step of the job's length, or of an adapted one, that ends where one has to. Collective.
+    /// Takes a step of the job's length or an adaptive one; shortened to land on required times. Collective.
     fn take_step(&mut self, length: f64) -> Result<StepOutcome, Agreed> {
         let (body, state) = (&mut self.body, &mut self.state);
         let target = self.landings.next(state.time);
@@ -182,7 +182,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         Ok(outcome)
     }
 
-    /// Adds what the certificates say to the words of a step that failed.
+    /// Adds to the error of a failed step that the certificates do not exclude several solutions.
     fn explain<T>(&self, error: Agreed) -> Result<T> {
         match self.certificates.theta_step {
             Some(theta) if !self.certificates.steps_are_unique() && error.is_failure() => {
@@ -195,7 +195,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
     }
 
-    /// Fails where a step has left what is no finite number.
+    /// Fails if energies, stresses or residuals are not finite.
     fn refuse_overflow(&self) -> Result<()> {
         if self.totals.are_finite() {
             return Ok(());
@@ -207,11 +207,12 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         )))
     }
 
-    /// Fails where the explicit scheme has made so much energy by itself that nothing of the answer is left.
+    /// Fails if the explicit scheme has produced so much energy that the solution is meaningless.
     fn refuse_growth(&self) -> Result<()> {
         let made = self.totals.made_by_scheme();
         let explicit = self.certificates.explicit_step_bound.is_some();
-        if !explicit || self.job.solver.accept.contains(&Accept::ExplicitStability) || made <= MOST_MADE {
+        if !explicit || self.job.solver.accept.contains(&Accept::ExplicitStability) || made <= LARGEST_GROWTH
+        {
             return Ok(());
         }
         Err(Error::Failed(format!(
@@ -233,7 +234,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
             return;
         }
-        let left = self.pace() * (last - step) as f64;
+        let left = self.seconds_per_step() * (last - step) as f64;
         let line = StepLine {
             step,
             last,
@@ -242,20 +243,20 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             imbalance: self.totals.energy_imbalance,
             left,
         };
-        self.words.clear();
-        let written = write!(self.words, "{line}");
+        self.line.clear();
+        let written = write!(self.line, "{line}");
         debug_assert!(written.is_ok(), "text can be written");
-        self.log.quiet_line(&self.words);
+        self.log.quiet_line(&self.line);
     }
 
-    /// Seconds a step took so far.
-    fn pace(&self) -> f64 {
+    /// Mean seconds per step so far.
+    fn seconds_per_step(&self) -> f64 {
         let taken = self.state.step - self.stepping.1;
         self.stepping.0.elapsed().as_secs_f64() / taken.max(1) as f64
     }
 
-    /// What the outside or the clock asks for, the same on all ranks. Collective.
-    fn wish(&mut self, saved_at: Instant) -> Wish {
+    /// Whether a signal, a limit of wall time or `[checkpoint]` requests a stop or a checkpoint now; the same on all ranks. Collective.
+    fn pending_request(&mut self, saved_at: Instant) -> Request {
         let signal = self.session.stop_requested().map(|signal| signal.to_string());
         let late = self.deadline.passed(self.session);
         let (mut by_steps, mut by_time) = (false, false);
@@ -266,18 +267,18 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
                 by_time = self.session.largest([f64::from(u8::from(due))])[0] > 0.0;
             }
         }
-        Wish { save: by_steps || by_time, stop: signal.or(late) }
+        Request { save: by_steps || by_time, stop: signal.or(late) }
     }
 
     fn save(&mut self) -> Result<()> {
         let start = Instant::now();
         let path = self.outputs.checkpoint(self.session, &self.body, &self.state, &self.totals)?;
-        self.deadline.saved(start.elapsed());
+        self.deadline.add_save(start.elapsed());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
     }
 
-    /// Writes the last files and the summary; gives the exit code or the first error. Collective.
+    /// Writes the last files and the summary; returns the exit code or the first error. Collective.
     fn finish(mut self, ended: Result<Ended>, restarted_from: Option<String>) -> Result<Exit, Agreed> {
         self.log.end_progress();
         let mut result = match self.session.agree(ended) {
@@ -309,7 +310,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         };
         let summary = self.summary(status, error, restarted_from);
         let written = self.session.agree(summary).and_then(|mut summary| {
-            summary.found_on_the_way().for_each(|warning| self.log.warning(warning));
+            summary.range_warnings().for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
             let mut written = Ok(());
             if self.session.is_first() {
@@ -323,7 +324,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         result.and_then(|exit| closed.map(|()| exit))
     }
 
-    /// A later error is logged, not lost, and does not hide the first.
+    /// Keeps the first error as the result; a later one is logged.
     fn keep_first<T>(&mut self, result: &mut Result<Exit, Agreed>, later: Result<T, Agreed>) {
         let Err(error) = later else { return };
         match result {
@@ -392,8 +393,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     }
 }
 
-/// What is asked for after a step.
-struct Wish {
+/// What is requested after a step.
+struct Request {
+    /// Whether a checkpoint is due.
     save: bool,
+    /// Why the run has to stop, if it has to.
     stop: Option<String>,
 }

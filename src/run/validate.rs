@@ -1,4 +1,4 @@
-//! A mesh held against its job, by all ranks together.
+//! Checks of a mesh against its job, by all ranks together.
 
 use crate::{
     agreement::Agreed,
@@ -10,7 +10,7 @@ use crate::{
     session::Session,
 };
 
-/// Refuses a mesh without what the job speaks of, and one on which it makes no sense; warns of bad cells. Collective.
+/// Refuses a mesh that lacks names of the job or contradicts it; warns about badly shaped cells. Collective.
 pub(super) fn validate<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
@@ -57,7 +57,7 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
         return Ok(());
     }
     let mut held: Vec<[bool; D]> = body.fixed.as_chunks().0.to_vec();
-    // What has mass moves by its inertia: no motion of it is free.
+    // Inertia determines the motion of cells with mass.
     for (cell, &region) in mesh.cell_regions.iter().enumerate() {
         if has_mass[usize::from(region)] {
             mesh.cell(cell).iter().for_each(|&node| held[node as usize] = [true; D]);
@@ -84,7 +84,7 @@ fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
     job.region.iter().find(|r| r.name == region).map_or(&job.material, |r| &r.material)
 }
 
-/// A fault if the scheme can't move some material at all.
+/// Refuses materials whose velocity the scheme can't determine.
 fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
     let scheme = loaded.job.time.scheme;
     if scheme.is_implicit() {

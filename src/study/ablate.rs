@@ -1,6 +1,6 @@
-//! The base job without one of its effects at a time: what each costs and changes.
+//! Ablation: the base job without one of its effects at a time, and what each effect costs and changes.
 //!
-//! The effects are found, not listed: every table of the job's physics that its schema lets be absent, and the density.
+//! Effects are found by the schema: every table of the job's physics that is optional, and the density.
 
 use super::{
     compare::Compared,
@@ -74,7 +74,7 @@ fn document(job: &Job) -> Result<Value> {
     })
 }
 
-/// The job without the table or key `path`; refused where it needs it.
+/// The job without the table or key `path`; refused if the job is not valid without it.
 pub fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
     let mut document = document(job)?;
     let parts: Vec<&str> = path.split('.').collect();
@@ -84,7 +84,7 @@ pub fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
     Job::from_text(&text, &format!("the job without {path}"), folder, &[])
 }
 
-/// Takes the part away, and a list that has become empty with it.
+/// Removes the part, and the list it was in if that has become empty.
 fn remove(value: &mut Value, parts: &[&str]) {
     let Some((part, rest)) = parts.split_first() else { return };
     match value {
@@ -110,7 +110,7 @@ fn remove(value: &mut Value, parts: &[&str]) {
     }
 }
 
-/// Runs the base job whole and without each effect; `None` where it was asked to stop. Collective.
+/// Runs the base job whole and without each effect; `None` if it was requested to stop. Collective.
 pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
     let folder = folder(plan);
     let Some(whole) = run(session, plan, "whole", plan.base.clone(), say)? else {
@@ -181,7 +181,7 @@ fn change(
     Ok(std::array::from_fn(relative))
 }
 
-/// Runs a job under this name, if it was not run before; `None` where it was asked to stop. Collective.
+/// Runs a job under this name, if it was not run before; `None` if it was requested to stop. Collective.
 fn run(
     session: &Session,
     plan: &Plan,
@@ -211,7 +211,7 @@ fn run(
     })
 }
 
-/// What an error says first.
+/// The first line of an error.
 fn first_line(words: &str) -> String {
     let line = words.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     line.trim_start_matches("error: ").to_owned()

@@ -1,12 +1,12 @@
-//! What is wrong with a study by itself and with its base job, before the jobs of its runs are loaded.
+//! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
 use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study};
 use crate::job::{Document, Job};
 
-/// Runs of one study.
+/// The most runs of a study.
 const MOST_RUNS: usize = 1000;
 
-/// Holds the keys of the study against each other and against its base job; `products` is the number of runs of [product].
+/// Checks the keys of the study against each other and against its base job; `products` is the number of runs of [product].
 pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document) {
     let count = study.run.len() + products;
     if count == 0 {

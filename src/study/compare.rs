@@ -1,4 +1,4 @@
-//! Runs held against the reference and against each other.
+//! Compares runs with the reference and with each other.
 
 use super::{
     Ran,
@@ -15,13 +15,13 @@ use crate::{
 };
 use std::path::Path;
 
-/// The fields of a run and what they are held against.
+/// A run and what its fields are compared with.
 pub struct Compared<'a> {
     /// 2 or 3.
     pub dimension: usize,
     /// The folder of the run.
     pub folder: &'a Path,
-    /// What it is held against.
+    /// What it is compared with.
     pub target: Target<'a>,
 }
 
@@ -82,7 +82,7 @@ pub fn add_errors(session: &Session, plan: &Plan, compared: &Compared, run: &mut
     Ok(())
 }
 
-/// Holds every run against the one that differs by the tightest tolerance only. Collective.
+/// Compares every run with the one that differs from it by the tightest tolerance only. Collective.
 pub fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut Results) -> Result<()> {
     let same = |a: &Planned, b: &Planned| {
         (&a.cells, a.step, a.adaptive, a.scheme, &a.set) == (&b.cells, b.step, b.adaptive, b.scheme, &b.set)

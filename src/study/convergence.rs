@@ -1,4 +1,4 @@
-//! Orders and what accuracy costs, from errors that are known.
+//! Orders of convergence and the cost of accuracy, from known errors.
 
 use super::{
     Ran,
@@ -14,7 +14,10 @@ fn sizes(plan: &Plan, ran: &[Ran]) -> Vec<Option<Size>> {
         record.is_complete().then(|| Size {
             family: format!(
                 "{} {:e} {:?} {:?}",
-                planned.scheme.name(), planned.tolerance, planned.adaptive, planned.set
+                planned.scheme.name(),
+                planned.tolerance,
+                planned.adaptive,
+                planned.set
             ),
             mesh: (record.cells as f64).powf(-1.0 / record.dimension.max(1) as f64),
             step: planned.step,

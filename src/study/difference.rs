@@ -34,7 +34,7 @@ impl Squares {
     }
 }
 
-/// What a run is held against.
+/// What a run is compared with.
 pub enum Against<'a, const D: usize> {
     /// The fields of another run.
     Run(&'a StoredFields<D>),
@@ -42,7 +42,7 @@ pub enum Against<'a, const D: usize> {
     Exact(&'a ExactFields),
 }
 
-/// A run beside what it is held against, on this rank's share of the cells.
+/// A run and what it is compared with, on this rank's share of the cells.
 pub struct Pair<'a, const D: usize> {
     run: &'a StoredFields<D>,
     against: Against<'a, D>,

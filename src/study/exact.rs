@@ -1,4 +1,4 @@
-//! A known solution, held against fields on a mesh by quadrature.
+//! A known solution, compared with fields on a mesh by quadrature.
 //!
 //! Gauss-Legendre points in each direction of the cell, collapsed toward a corner: four points, exact for polynomials
 //! of degree 6 in the plane and 5 in space. Strains of the solution come from fourth-order central differences over a
@@ -166,11 +166,7 @@ mod tests {
         study::stored::StoredMesh,
     };
 
-    fn squares<const D: usize>(
-        exact: &ExactFields,
-        space: Space,
-        field: FieldAt<D>,
-    ) -> Result<Squares> {
+    fn squares<const D: usize>(exact: &ExactFields, space: Space, field: FieldAt<D>) -> Result<Squares> {
         let mut sum = Squares::default();
         exact.visit(space, field, 0..field.mesh.count(), |_, squares| sum.add(squares))?;
         Ok(sum)

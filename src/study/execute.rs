@@ -13,16 +13,16 @@ use crate::{
 };
 use std::time::{Duration, Instant};
 
-/// What came of a run.
+/// The outcome of a run.
 pub enum Outcome {
     /// It was run now, or found as an earlier study left it.
     Ran {
-        /// What is known about it.
+        /// Its record.
         record: Box<Record>,
         /// Whether it was found.
         found: bool,
     },
-    /// It was asked to stop.
+    /// It was requested to stop.
     Stopped,
 }
 
@@ -67,7 +67,7 @@ pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Resu
     }
 }
 
-/// One run; the PETSc options it asks for are taken back, so that the next one starts like it. Collective.
+/// One run. Its PETSc options are cleared afterwards, so that they do not affect the next run. Collective.
 fn run_once(session: &Session, planned: &Planned) -> Result<Exit, Agreed> {
     let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
     let ended = run::run(session, planned.loaded.clone(), &Start::Over, clock);

@@ -28,7 +28,7 @@ pub struct Measured {
     pub size: f64,
 }
 
-/// What a run is held against, by where it is found.
+/// What a run is compared with.
 #[derive(Clone, Copy)]
 pub enum Target<'a> {
     /// The folder of another run; whether times between its steps are allowed.
@@ -44,7 +44,7 @@ pub struct Errors {
     pub measured: Vec<Measured>,
     /// Where each sits in time and space.
     pub places: Vec<Place>,
-    /// What the reader should know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
@@ -105,7 +105,7 @@ pub fn errors<const D: usize>(
     Ok(found)
 }
 
-/// What there is to say of a mesh that does not cover this share of the reference's body.
+/// Notes on a mesh that does not cover this share of the reference's body; refused if the share is large.
 fn covered(uncovered: f64) -> Result<Vec<String>> {
     let covers = 100.0 * (1.0 - uncovered);
     if uncovered.abs() > UNCOVERED {
@@ -145,7 +145,7 @@ fn over_time<const D: usize>(
     Ok((all, place))
 }
 
-/// What is made of the squares over time.
+/// The norm over time of these squares.
 fn measured(over: Over, all: &[Squares], times: &[[f64; 2]]) -> Measured {
     let mut sum = Squares::default();
     let mut before = 0.0;
@@ -207,7 +207,7 @@ pub fn probe_error(folder: &Path, target: Target, probe: &ProbeError, point: &[f
     Ok(sum)
 }
 
-/// The value at a time, between two rows on the straight line.
+/// The value at a time, interpolated linearly between two rows.
 fn value_at(rows: &[(f64, f64)], time: f64) -> Option<f64> {
     let behind = rows.partition_point(|(t, _)| *t < time * (1.0 - SAME_TIME));
     let (next, value) = *rows.get(behind)?;

@@ -134,7 +134,7 @@ fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
     Ok(Exit::Stopped)
 }
 
-/// What came of a run, and whether an earlier study left it.
+/// The record of a run, and whether an earlier study made it.
 struct Ran {
     record: Record,
     found: bool,

@@ -1,4 +1,4 @@
-//! From a study to the runs it asks for: every job is loaded before the first one runs.
+//! The runs of a study: every job is loaded before the first one runs.
 
 use super::{
     check::check,
@@ -11,7 +11,7 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-/// Multiples are whole up to this.
+/// Tolerance of whole multiples.
 const WHOLE: f64 = 1e-6;
 
 /// A run, ready to be started.
@@ -29,13 +29,13 @@ pub struct Planned {
     pub tolerance: f64,
     /// What else it overrides.
     pub set: Vec<String>,
-    /// Tolerance of steps that are chosen on the way.
+    /// Tolerance of adaptive steps.
     pub adaptive: Option<f64>,
     /// Its job.
     pub loaded: Loaded,
 }
 
-/// What runs are held against.
+/// What runs are compared with.
 #[derive(Debug)]
 pub enum PlannedReference {
     /// A run.
@@ -57,7 +57,7 @@ pub struct Plan {
     pub base: Loaded,
     /// The runs, in the order of the study.
     pub runs: Vec<Planned>,
-    /// What they are held against.
+    /// What they are compared with.
     pub reference: Option<PlannedReference>,
     /// The reference's steps on the meshes of the runs, if errors are split.
     pub split: Vec<Planned>,
@@ -217,7 +217,7 @@ impl Source<'_> {
         let mut name = match (fixed_name, &run.name) {
             (Some(fixed), _) => fixed.to_owned(),
             (None, Some(given)) => given.clone(),
-            (None, None) => made_name(job, &cells, run),
+            (None, None) => default_name(job, &cells, run),
         };
         if fixed_name.is_none() {
             let plain = name.clone();
@@ -281,7 +281,7 @@ fn by(cells: &[u32]) -> String {
     cells.iter().map(u32::to_string).collect::<Vec<_>>().join("x")
 }
 
-/// Leaves out what a study has no use for, and sends the files of the run to its own folder.
+/// Removes what a study does not use, and directs the files of the run to its own folder.
 pub fn trim(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
     job.output.profile.clear();
@@ -296,7 +296,7 @@ fn called(run: &Run, fixed_name: Option<&str>) -> String {
     format!("{name}{size}{step}")
 }
 
-fn made_name(job: &Job, cells: &[u32], run: &Run) -> String {
+fn default_name(job: &Job, cells: &[u32], run: &Run) -> String {
     let mut parts = vec![job.time.scheme.name().to_owned()];
     parts.extend((!cells.is_empty()).then(|| by(cells)));
     parts.push(run.adaptive.map_or(job.time.step.to_string(), |tolerance| format!("adaptive-{tolerance}")));

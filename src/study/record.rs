@@ -1,4 +1,4 @@
-//! `run.json`: what a study knows about a finished run, and whether its files are still the ones it left.
+//! `run.json`: the record of a finished run, with digests of its files.
 
 use super::plan::Planned;
 use crate::{

@@ -1,4 +1,4 @@
-//! Errors of the steps apart from those of the mesh.
+//! Splits errors into those of the steps and those of the mesh.
 
 use super::{
     Ran,
