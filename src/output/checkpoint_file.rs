@@ -10,8 +10,8 @@
 //! file with the final name is whole. It is read on any number of ranks, no rank ever holding more than its share.
 
 use super::checksum::table_checksum;
-use super::hyperslab::{Element, Rows};
-use super::parallel_file::ParallelFile;
+use super::hyperslab::Rows;
+use super::parallel_file::{Element, ParallelFile};
 use super::redistribution::{Redistribution, are_whole, first_of_part};
 use super::seal;
 use crate::agreement::{Agreed, agree};

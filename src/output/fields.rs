@@ -22,8 +22,7 @@ use super::field::{
     view_columns,
 };
 use super::field_slab::Slab;
-use super::hyperslab::Element;
-use super::parallel_file::ParallelFile;
+use super::parallel_file::{Element, ParallelFile};
 use super::xdmf;
 use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};

@@ -1,11 +1,14 @@
-//! Collective transfer of rows between memory and HDF5: each rank its own contiguous slab, possibly empty.
+//! Datasets of a parallel file, and the collective transfer of their rows: each rank its own contiguous slab, possibly empty.
 #![allow(unsafe_code)]
 
-use super::parallel_file::ParallelFile;
+use super::identifier::{Open, check};
+use super::parallel_file::{Element, ParallelFile};
+use super::stacked_view;
 use crate::agreement::Agreed;
 use crate::error::Result;
-use hdf5::{Dataset, Datatype};
-use hdf5_sys::h5::{herr_t, hsize_t};
+use hdf5::plist::dataset_create::{AllocTime, FillTime};
+use hdf5::{Dataset, Datatype, Extent, Selection};
+use hdf5_sys::h5::hsize_t;
 use hdf5_sys::h5d::{H5Dget_space, H5Dread, H5Dwrite};
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5p::{
@@ -18,14 +21,8 @@ use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::marker::PhantomData;
 
-/// A number that the files store in the machine's own representation.
-pub trait Element: hdf5::H5Type + Copy + Default {}
-impl Element for f64 {}
-impl Element for u64 {}
-impl Element for i64 {}
-impl Element for u32 {}
-impl Element for i32 {}
-impl Element for u8 {}
+/// Bytes of a chunk of a compressed dataset before it is compressed.
+const CHUNK_BYTES: usize = 1 << 20;
 
 /// A dataset of `rows x width` numbers of type `T` in a [`ParallelFile`].
 pub struct Rows<'file, T> {
@@ -36,7 +33,7 @@ pub struct Rows<'file, T> {
 }
 
 impl<'file, T: Element> Rows<'file, T> {
-    pub(super) fn new(file: &'file ParallelFile, dataset: Dataset, width: usize) -> Self {
+    fn new(file: &'file ParallelFile, dataset: Dataset, width: usize) -> Self {
         Self { file, dataset, width, number: PhantomData }
     }
 
@@ -163,6 +160,124 @@ impl<T> Drop for Rows<'_, T> {
     fn drop(&mut self) {}
 }
 
+impl ParallelFile {
+    /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would leave the others waiting.
+    fn new_dataset<T: Element>(&self) -> hdf5::DatasetBuilderEmpty {
+        self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).fill_time(FillTime::Never)
+    }
+
+    /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
+    pub fn create_rows<T: Element>(
+        &self,
+        name: &str,
+        rows: u64,
+        width: usize,
+    ) -> Result<Rows<'_, T>, Agreed> {
+        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
+        let rows = rows as usize;
+        let empty = self.new_dataset::<T>().no_chunk();
+        let made =
+            if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// As [`Self::create_rows`], compressed (bytes shuffled, then deflated) at a level from 1 to 9, in chunks of some
+    /// 1 MiB; level 0 is `create_rows`.
+    pub fn create_packed_rows<T: Element>(
+        &self,
+        name: &str,
+        rows: u64,
+        width: usize,
+        level: u8,
+    ) -> Result<Rows<'_, T>, Agreed> {
+        if level == 0 {
+            return self.create_rows(name, rows, width);
+        }
+        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
+        let rows = rows as usize;
+        let chunk = (CHUNK_BYTES / (width * size_of::<T>())).clamp(1, rows.max(1));
+        let empty = self.new_dataset::<T>().shuffle().deflate(level);
+        let made = if width == 1 {
+            empty.chunk(chunk).shape(rows).create(name)
+        } else {
+            empty.chunk((chunk, width)).shape((rows, width)).create(name)
+        };
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Makes an empty dataset of the given width to which rows can be added later, stored in chunks of
+    /// `chunk_rows` rows.
+    pub fn create_series<T: Element>(
+        &self,
+        name: &str,
+        width: usize,
+        chunk_rows: usize,
+    ) -> Result<Rows<'_, T>, Agreed> {
+        self.need_room((chunk_rows * width * size_of::<T>()) as u64)?;
+        let empty = self.new_dataset::<T>();
+        let growing = Extent { dim: 0, max: None };
+        let made = if width == 1 {
+            empty.chunk(chunk_rows).shape(growing).create(name)
+        } else {
+            let fixed = Extent { dim: width, max: Some(width) };
+            empty.chunk((chunk_rows, width)).shape((growing, fixed)).create(name)
+        };
+        let dataset = self.written(&format!("make dataset {name}"), made)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Makes a dataset of `rows` numbers that shows the numbers of the table `source` of the given shape, one row
+    /// after the other, without storing them again.
+    pub fn create_flat_view<T: Element>(
+        &self,
+        name: &str,
+        source: &str,
+        shape: (usize, usize),
+    ) -> Result<(), Agreed> {
+        let whole = Selection::All;
+        let made = self
+            .file
+            .new_dataset::<T>()
+            .virtual_map(".", source, shape, whole.clone(), shape.0 * shape.1, whole)
+            .shape(shape.0 * shape.1)
+            .create(name);
+        self.written(&format!("make view {name}"), made).map(drop)
+    }
+
+    /// Makes a dataset that shows the tables `{folder}/0`, `{folder}/1`, ... below each other without storing them
+    /// again; it grows as tables are added. All have `rows` rows and `columns.len()` columns; column `c` of the view is
+    /// column `columns[c]` of the tables.
+    pub fn create_stacked_view<T: Element>(
+        &self,
+        name: &str,
+        folder: &str,
+        rows: usize,
+        columns: &[usize],
+    ) -> Result<(), Agreed> {
+        let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
+        self.written(&format!("make view {name}"), made)
+    }
+
+    /// Opens a dataset of one or two dimensions.
+    pub fn rows<T: Element>(&self, name: &str) -> Result<Rows<'_, T>, Agreed> {
+        let opened = self.file.dataset(name).and_then(|dataset| {
+            let stored = dataset.dtype()?.to_descriptor()?;
+            if stored != T::type_descriptor() {
+                return Err(format!("it holds {stored}, {} expected", T::type_descriptor()).into());
+            }
+            match dataset.get_shape()?.as_slice() {
+                [_] => Ok((dataset, 1)),
+                [_, width] => Ok((dataset.clone(), *width)),
+                shape => Err(format!("it has shape {shape:?}, one or two dimensions expected").into()),
+            }
+        });
+        let (dataset, width) = self.agreed(&format!("open dataset {name}"), opened)?;
+        Ok(Rows::new(self, dataset, width))
+    }
+}
+
 fn collective_transfer() -> hdf5::Result<Open> {
     hdf5::sync::sync(|| {
         // SAFETY: makes a property list of a predefined class; the identifier is closed on drop.
@@ -171,21 +286,4 @@ fn collective_transfer() -> hdf5::Result<Open> {
         check(unsafe { H5Pset_dxpl_mpio(list.0, H5FD_MPIO_COLLECTIVE) })?;
         Ok(list)
     })
-}
-
-/// An HDF5 identifier and the call that closes it.
-pub(super) struct Open(pub(super) hid_t, pub(super) unsafe extern "C" fn(hid_t) -> herr_t);
-
-impl Drop for Open {
-    fn drop(&mut self) {
-        if self.0 >= 0 {
-            // SAFETY: the identifier is open, of the kind the call closes, and closed only here.
-            unsafe { (self.1)(self.0) };
-        }
-    }
-}
-
-/// Turns HDF5's status into a result with its words.
-pub(super) fn check(status: herr_t) -> hdf5::Result<()> {
-    if status < 0 { Err(hdf5::Error::query()?) } else { Ok(()) }
 }

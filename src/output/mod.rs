@@ -14,6 +14,7 @@ pub mod field_snapshot;
 pub mod fields;
 pub mod history;
 pub mod hyperslab;
+mod identifier;
 pub mod inspect;
 pub mod log;
 pub mod output_field;

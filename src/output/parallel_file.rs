@@ -1,7 +1,7 @@
 //! HDF5 files that all ranks of a communicator write and read together.
 //!
 //! A dataset is a table of `rows x width` numbers, one-dimensional where the width is 1; each rank transfers its
-//! own rows (see [`Rows`]). Every function is collective: all ranks call it in the same order with the same names and
+//! own rows (see [`Rows`](super::hyperslab::Rows)). Every function is collective: all ranks call it in the same order with the same names and
 //! shapes, and a failure on one rank is an error on all, so that no rank goes on alone.
 //!
 //! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
@@ -13,13 +13,10 @@
 //! a process that gave a file up leaves without (see [`given_up`]).
 
 use super::free_space;
-use super::hyperslab::{Element, Rows};
-use super::stacked_view;
 use crate::agreement::{Agreed, agree};
 use crate::error::{Error, Result};
-use hdf5::plist::dataset_create::{AllocTime, FillTime};
+use hdf5::Location;
 use hdf5::types::{FixedAscii, TypeDescriptor};
-use hdf5::{Extent, Location, Selection};
 use mpi::collective::SystemOperation;
 use mpi::raw::AsRaw;
 use mpi::topology::SimpleCommunicator;
@@ -39,15 +36,21 @@ pub fn given_up() -> bool {
     GIVEN_UP.load(Ordering::Relaxed)
 }
 
-/// Bytes of a chunk of a compressed dataset before it is compressed.
-const CHUNK_BYTES: usize = 1 << 20;
-
 /// The longest text an attribute holds, in bytes.
 const LONGEST_TEXT: usize = 256;
 
+/// A number that the files store in the machine's own representation.
+pub trait Element: hdf5::H5Type + Copy + Default {}
+impl Element for f64 {}
+impl Element for u64 {}
+impl Element for i64 {}
+impl Element for u32 {}
+impl Element for i32 {}
+impl Element for u8 {}
+
 /// An HDF5 file opened by all ranks of a communicator.
 pub struct ParallelFile {
-    file: hdf5::File,
+    pub(super) file: hdf5::File,
     broken: Cell<bool>,
     pub(super) communicator: SimpleCommunicator,
     path: PathBuf,
@@ -175,122 +178,6 @@ impl ParallelFile {
     /// Removes a dataset or group from the file; its space is not given back.
     pub fn remove(&self, name: &str) -> Result<(), Agreed> {
         self.written(&format!("remove {name}"), self.file.unlink(name))
-    }
-
-    /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would leave the others waiting.
-    fn new_dataset<T: Element>(&self) -> hdf5::DatasetBuilderEmpty {
-        self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).fill_time(FillTime::Never)
-    }
-
-    /// Makes a dataset of `rows x width` numbers, stored in one piece and allocated at once.
-    pub fn create_rows<T: Element>(
-        &self,
-        name: &str,
-        rows: u64,
-        width: usize,
-    ) -> Result<Rows<'_, T>, Agreed> {
-        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
-        let rows = rows as usize;
-        let empty = self.new_dataset::<T>().no_chunk();
-        let made =
-            if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
-        Ok(Rows::new(self, dataset, width))
-    }
-
-    /// As [`Self::create_rows`], compressed (bytes shuffled, then deflated) at a level from 1 to 9, in chunks of some
-    /// 1 MiB; level 0 is `create_rows`.
-    pub fn create_packed_rows<T: Element>(
-        &self,
-        name: &str,
-        rows: u64,
-        width: usize,
-        level: u8,
-    ) -> Result<Rows<'_, T>, Agreed> {
-        if level == 0 {
-            return self.create_rows(name, rows, width);
-        }
-        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
-        let rows = rows as usize;
-        let chunk = (CHUNK_BYTES / (width * size_of::<T>())).clamp(1, rows.max(1));
-        let empty = self.new_dataset::<T>().shuffle().deflate(level);
-        let made = if width == 1 {
-            empty.chunk(chunk).shape(rows).create(name)
-        } else {
-            empty.chunk((chunk, width)).shape((rows, width)).create(name)
-        };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
-        Ok(Rows::new(self, dataset, width))
-    }
-
-    /// Makes an empty dataset of the given width to which rows can be added later, stored in chunks of
-    /// `chunk_rows` rows.
-    pub fn create_series<T: Element>(
-        &self,
-        name: &str,
-        width: usize,
-        chunk_rows: usize,
-    ) -> Result<Rows<'_, T>, Agreed> {
-        self.need_room((chunk_rows * width * size_of::<T>()) as u64)?;
-        let empty = self.new_dataset::<T>();
-        let growing = Extent { dim: 0, max: None };
-        let made = if width == 1 {
-            empty.chunk(chunk_rows).shape(growing).create(name)
-        } else {
-            let fixed = Extent { dim: width, max: Some(width) };
-            empty.chunk((chunk_rows, width)).shape((growing, fixed)).create(name)
-        };
-        let dataset = self.written(&format!("make dataset {name}"), made)?;
-        Ok(Rows::new(self, dataset, width))
-    }
-
-    /// Makes a dataset of `rows` numbers that shows the numbers of the table `source` of the given shape, one row
-    /// after the other, without storing them again.
-    pub fn create_flat_view<T: Element>(
-        &self,
-        name: &str,
-        source: &str,
-        shape: (usize, usize),
-    ) -> Result<(), Agreed> {
-        let whole = Selection::All;
-        let made = self
-            .file
-            .new_dataset::<T>()
-            .virtual_map(".", source, shape, whole.clone(), shape.0 * shape.1, whole)
-            .shape(shape.0 * shape.1)
-            .create(name);
-        self.written(&format!("make view {name}"), made).map(drop)
-    }
-
-    /// Makes a dataset that shows the tables `{folder}/0`, `{folder}/1`, ... below each other without storing them
-    /// again; it grows as tables are added. All have `rows` rows and `columns.len()` columns; column `c` of the view is
-    /// column `columns[c]` of the tables.
-    pub fn create_stacked_view<T: Element>(
-        &self,
-        name: &str,
-        folder: &str,
-        rows: usize,
-        columns: &[usize],
-    ) -> Result<(), Agreed> {
-        let made = stacked_view::create::<T>(&self.file, name, folder, rows, columns);
-        self.written(&format!("make view {name}"), made)
-    }
-
-    /// Opens a dataset of one or two dimensions.
-    pub fn rows<T: Element>(&self, name: &str) -> Result<Rows<'_, T>, Agreed> {
-        let opened = self.file.dataset(name).and_then(|dataset| {
-            let stored = dataset.dtype()?.to_descriptor()?;
-            if stored != T::type_descriptor() {
-                return Err(format!("it holds {stored}, {} expected", T::type_descriptor()).into());
-            }
-            match dataset.get_shape()?.as_slice() {
-                [_] => Ok((dataset, 1)),
-                [_, width] => Ok((dataset.clone(), *width)),
-                shape => Err(format!("it has shape {shape:?}, one or two dimensions expected").into()),
-            }
-        });
-        let (dataset, width) = self.agreed(&format!("open dataset {name}"), opened)?;
-        Ok(Rows::new(self, dataset, width))
     }
 
     /// Sets an attribute of a group or dataset to one number.

@@ -2,7 +2,8 @@
 //! an unlimited number of tables.
 #![allow(unsafe_code)]
 
-use super::hyperslab::{Element, Open, check};
+use super::identifier::{Open, check};
+use super::parallel_file::Element;
 use hdf5::Datatype;
 use hdf5_sys::h5::hsize_t;
 use hdf5_sys::h5d::{H5Dclose, H5Dcreate2};

@@ -5,7 +5,11 @@ use crate::{
     agreement::{Agreed, agree},
     error::{Error, Result},
     mesh::{GlobalMesh, Mesh, piece::Piece},
-    output::{hyperslab::Element, parallel_file::ParallelFile, redistribution::first_of_part, seal},
+    output::{
+        parallel_file::{Element, ParallelFile},
+        redistribution::first_of_part,
+        seal,
+    },
     session::Session,
 };
 use mpi::{topology::SimpleCommunicator, traits::Communicator};

@@ -9,7 +9,10 @@ use crate::{
         partition::Partition,
         piece::{Cutter, Piece},
     },
-    output::{hyperslab::Element, parallel_file::ParallelFile, seal},
+    output::{
+        parallel_file::{Element, ParallelFile},
+        seal,
+    },
 };
 use mpi::traits::Communicator;
 use std::path::{Path, PathBuf};
