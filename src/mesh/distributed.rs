@@ -1,7 +1,7 @@
 //! One rank's part of a mesh, put together from pieces; and how rank 0 hands pieces of a whole mesh out.
 
 use super::{
-    Boundary, GlobalMesh, Tags,
+    Boundary, GlobalMesh, Names, Tags,
     partition::Partition,
     piece::{Cutter, Piece},
     surface::Topology,
@@ -111,15 +111,6 @@ impl<const D: usize> Mesh<D> {
     pub fn boundary(&self, name: &str) -> Option<&Boundary> {
         self.boundaries.iter().find(|b| b.name == name)
     }
-}
-
-/// Names of a mesh, the same on all ranks.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Names {
-    /// Regions.
-    pub regions: Vec<String>,
-    /// Boundaries.
-    pub boundaries: Vec<String>,
 }
 
 impl<const D: usize> Mesh<D> {

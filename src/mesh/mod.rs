@@ -5,57 +5,20 @@ pub mod check;
 mod digest;
 mod distributed;
 pub mod generate;
+mod global;
 pub mod gmsh;
 mod hanging;
 mod lookup;
 pub mod partition;
 pub mod piece;
-pub mod rigid;
+mod rigid;
 pub mod shape;
 mod skeleton;
 pub mod surface;
 mod tags;
 pub mod tree;
 
-pub use distributed::{Mesh, Names, distribute};
+pub use distributed::{Mesh, distribute};
+pub use global::{Boundary, GlobalMesh, Names};
+pub use skeleton::free_motions;
 pub use tags::Tags;
-
-use crate::tensor::Vector;
-
-/// Triangles in the plane (`D = 2`) or tetrahedra in space (`D = 3`), whole, as read or generated on rank 0.
-///
-/// Ids are positions: node `i` is `nodes[i]`, cell `c` has the nodes `cells[c*(D+1)..(c+1)*(D+1)]`, positively oriented.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct GlobalMesh<const D: usize> {
-    /// Coordinates in m, every node used by at least one cell.
-    pub nodes: Vec<Vector<D>>,
-    /// Node ids, `D + 1` a cell.
-    pub cells: Vec<u32>,
-    /// Index into `regions`, one a cell.
-    pub cell_regions: Vec<u16>,
-    /// Names of the regions; a generated mesh has the single region `body`.
-    pub regions: Vec<String>,
-    /// Facets on the outer surface, each with its node ids so ordered that the normal points outward.
-    pub facets: Vec<[u32; D]>,
-    /// The cell behind each facet.
-    pub facet_cells: Vec<u32>,
-    /// Named parts of the surface.
-    pub boundaries: Vec<Boundary>,
-}
-
-impl<const D: usize> GlobalMesh<D> {
-    /// Names of regions and boundaries.
-    pub fn names(&self) -> Names {
-        let boundaries = self.boundaries.iter().map(|boundary| boundary.name.clone()).collect();
-        Names { regions: self.regions.clone(), boundaries }
-    }
-}
-
-/// A named part of the surface.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Boundary {
-    /// The name jobs refer to.
-    pub name: String,
-    /// Positions in the mesh's facets, ascending.
-    pub facets: Vec<u32>,
-}

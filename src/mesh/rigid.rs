@@ -1,11 +1,6 @@
 //! Rigid motions that the supports leave free.
 
-use super::Mesh;
-use super::skeleton::skeleton;
 use super::tags::place;
-use crate::agreement::Agreed;
-use crate::error::Result;
-use crate::session::Session;
 use crate::tensor::{Vector, add_scaled, cross, dot, norm};
 
 /// A rigid motion: translation, then rotation about x, y, z through the body's centre, lengths in units of its radius.
@@ -13,21 +8,6 @@ pub(super) type Motion = [f64; 6];
 
 /// A unit row that adds less than this to the span of the others adds nothing.
 const INDEPENDENT: f64 = 1e-9;
-
-/// The rigid motions each body can still do when `held` components of its nodes are held, and nodes along the directions
-/// `along`, in words: one text for each body that can move, none when every body is held. Collective, with the same words on all
-/// ranks.
-///
-/// A node held at `x` along a direction is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
-/// A body that touches a held body in single nodes is held there.
-pub fn free_motions<const D: usize>(
-    session: &Session,
-    mesh: &Mesh<D>,
-    held: &[[bool; D]],
-    along: &[(usize, Vector<D>)],
-) -> Result<Vec<String>, Agreed> {
-    Ok(skeleton(session, mesh, held, along)?.free_motions())
-}
 
 /// What the bodies of a mesh are held by, and the points that bodies share.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -54,7 +34,8 @@ pub(super) struct Body<const D: usize> {
 }
 
 impl<const D: usize> Skeleton<D> {
-    fn free_motions(mut self) -> Vec<String> {
+    /// The motions that every body can still do, in words.
+    pub fn free_motions(mut self) -> Vec<String> {
         let mut loose: Vec<usize> = (0..self.bodies.len()).collect();
         loop {
             let before = loose.len();

@@ -15,9 +15,24 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
+/// The rigid motions each body can still do when `held` components of its nodes are held, and nodes along the directions
+/// `along`, in words: one text for each body that can move, none when every body is held. Collective, with the same words on all
+/// ranks.
+///
+/// A node held at `x` along a direction is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
+/// A body that touches a held body in single nodes is held there.
+pub fn free_motions<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    held: &[[bool; D]],
+    along: &[(usize, Vector<D>)],
+) -> Result<Vec<String>, Agreed> {
+    Ok(skeleton(session, mesh, held, along)?.free_motions())
+}
+
 /// The bodies; for each the rows that span all that its held nodes hold, at most six of every rank, and the points in
 /// which it touches others. Collective, the same on all ranks.
-pub(super) fn skeleton<const D: usize>(
+fn skeleton<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     held: &[[bool; D]],

@@ -6,7 +6,7 @@ use crate::{
     effect::Contact,
     error::Result,
     job::{Job, Loaded, Material, MeshNames},
-    mesh::{Mesh, rigid::free_motions},
+    mesh::{Mesh, free_motions},
     session::Session,
 };
 

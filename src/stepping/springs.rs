@@ -9,7 +9,7 @@ use crate::{
     body::Body,
     effect::contact_nodes,
     error::{Error, Result},
-    mesh::rigid::free_motions,
+    mesh::free_motions,
     petsc::BlockRows,
     session::Session,
 };

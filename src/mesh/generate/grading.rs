@@ -1,6 +1,6 @@
 //! Where the grid lines of a generated mesh lie along an axis.
 
-use super::room;
+use super::limits::room;
 use crate::error::{Error, Result};
 
 /// Which ends of an axis cells crowd toward.

@@ -1,6 +1,6 @@
 //! Grids of bricks cut into simplices: whole, or in parts that are each made where they are needed.
 
-use super::countable;
+use super::limits::countable;
 use crate::{
     error::{Error, Result},
     mesh::{GlobalMesh, Names, piece::Piece},

@@ -1,6 +1,7 @@
 //! Triangles on a rectangle with its low corner in the origin.
 
-use super::{Grading, Grid, countable, grading::axis, room};
+use super::limits::{countable, room};
+use super::{Grading, Grid, grading::axis};
 use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
 use std::ops::Range;
