@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::functions::{Meaning, meaning, names};
-use super::{Binary, Instruction, Unary};
+use super::program::{Binary, Instruction, Unary};
 use crate::nearest::nearest;
 
 /// Longest expression in bytes.

@@ -1,6 +1,6 @@
 //! The names an expression may use.
 
-use super::{Binary, Instruction, Unary, Variable};
+use super::program::{Binary, Instruction, Unary, Variable};
 
 /// What a name stands for.
 #[derive(Clone, Copy)]

@@ -6,10 +6,10 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::report::{Fault, Texts};
+use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
-use super::source::{Node, Place, parse};
+use super::source::{Node, parse};
 use super::{Job, Mesh, set, validate};
 use crate::error::{Error, Result};
 

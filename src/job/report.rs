@@ -4,12 +4,30 @@ use codespan_reporting::diagnostic::{Diagnostic, Label};
 use codespan_reporting::files::SimpleFiles;
 use codespan_reporting::term::termcolor::Buffer;
 use codespan_reporting::term::{Chars, Config, emit_to_write_style};
+use std::ops::Range;
 
-use super::source::Place;
 use crate::error::Error;
 
 /// Faults shown of one job; the rest is only counted.
 const SHOWN: usize = 60;
+
+/// A stretch of the job file or of an override.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// 0 for the job file, then one for each override.
+    pub file: usize,
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+impl Place {
+    /// The bytes `range` of `file`.
+    pub fn new(file: usize, range: Range<usize>) -> Self {
+        Self { file, start: range.start, end: range.end }
+    }
+}
 
 /// One thing that is wrong with a job.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -105,8 +123,7 @@ fn printable(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Fault, Texts};
-    use crate::job::source::Place;
+    use super::{Fault, Place, Texts};
 
     fn rendered(texts: &Texts, faults: Vec<Fault>) -> String {
         texts.refuse(faults).to_string()

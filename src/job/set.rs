@@ -2,8 +2,8 @@
 
 use toml_edit::Key;
 
-use super::report::Fault;
-use super::source::{Node, Place, Value, parse_value};
+use super::report::{Fault, Place};
+use super::source::{Node, Value, parse_value};
 use crate::expression::Expression;
 
 /// Writes the override `text`, which is file `file`, over the document.

@@ -7,25 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::report::Fault;
-
-/// A stretch of the job file or of an override.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place {
-    /// 0 for the job file, then one for each override.
-    pub file: usize,
-    /// First byte.
-    pub start: usize,
-    /// One past the last byte.
-    pub end: usize,
-}
-
-impl Place {
-    /// The bytes `range` of `file`.
-    pub fn new(file: usize, range: Range<usize>) -> Self {
-        Self { file, start: range.start, end: range.end }
-    }
-}
+use super::report::{Fault, Place};
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]

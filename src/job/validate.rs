@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::describe;
-use super::report::Fault;
+use super::report::{Fault, Place};
 use super::schema::{Kind, Schema};
-use super::source::{Node, Place, Value};
+use super::source::{Node, Value};
 use crate::{expression::Expression, nearest::nearest};
 
 /// What is wrong with the document by itself, before keys are held against each other.

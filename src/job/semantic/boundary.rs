@@ -1,6 +1,6 @@
 //! Boundaries: their names, and what several tables may say about the same one. Vectors: their components.
 
-use super::{Findings, MeshNames, items};
+use super::findings::{Findings, MeshNames, items};
 use crate::expression::{Scalar, Variable};
 use crate::job::document::{Axis, Fix, Named};
 use crate::job::source::{Node, Value};

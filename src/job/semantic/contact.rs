@@ -1,7 +1,7 @@
 //! Contact: what laws say of their parameters and of each other, and obstacles.
 
 use super::boundary::{check_flat, check_vector};
-use super::{Findings, MeshNames, items};
+use super::findings::{Findings, MeshNames, items};
 use crate::contact::{Adhesion, ContactTable, NormalLaw};
 use crate::expression::Scalar;
 use crate::job::document::Method;

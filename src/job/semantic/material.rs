@@ -1,6 +1,6 @@
 //! Materials: effects that need each other, and what depends on the dimension.
 
-use super::{Findings, MeshNames, items};
+use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
 

@@ -1,7 +1,7 @@
 //! Generated meshes: what they are called, and how large they may be.
 
 use super::boundary::{check_name, check_repeats};
-use super::{Findings, MeshNames, items};
+use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::job::source::Node;
 

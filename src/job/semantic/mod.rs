@@ -2,49 +2,15 @@
 
 mod boundary;
 mod contact;
+mod findings;
 mod material;
 mod mesh;
 mod output;
 mod time;
 
-use super::report::Fault;
+pub use findings::{Findings, MeshNames};
+
 use super::source::Node;
-
-/// What a mesh says about itself: known at once for generated ones, after reading for files.
-#[derive(Debug, Clone, Copy)]
-pub struct MeshNames<'a> {
-    /// 2 or 3.
-    pub dimension: usize,
-    /// Names of the boundaries.
-    pub boundaries: &'a [&'a str],
-    /// Names of the regions.
-    pub regions: &'a [&'a str],
-}
-
-/// Faults and warnings found so far.
-pub struct Findings<'a> {
-    root: &'a Node,
-    /// What the job is refused for.
-    pub faults: Vec<Fault>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
-}
-
-impl<'a> Findings<'a> {
-    fn new(root: &'a Node) -> Self {
-        Self { root, faults: Vec::new(), warnings: Vec::new() }
-    }
-
-    /// A fault at the key under `path`.
-    fn fault_at_key(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
-        self.faults.push(Fault::new(self.root.deepest(path).key.clone(), message, "").help(help));
-    }
-
-    /// A fault at the value under `path`.
-    fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
-        self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
-    }
-}
 
 /// What can be said without the mesh, and with it if it is a generated one.
 pub fn check(root: &Node) -> Findings<'_> {
@@ -74,9 +40,4 @@ fn check_with_mesh(findings: &mut Findings<'_>, names: MeshNames<'_>) {
     boundary::check_names(findings, names);
     contact::check_names(findings, names);
     output::check_names(findings, names);
-}
-
-/// `name.0`, `name.1`, ... for every item of the list under `name`.
-fn items(root: &Node, name: &str) -> Vec<String> {
-    (0..root.count(name)).map(|index| format!("{name}.{index}")).collect()
 }

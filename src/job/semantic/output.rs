@@ -1,7 +1,8 @@
 //! Probes, profiles and expected numbers.
 
 use super::boundary::check_name;
-use super::{Fault, Findings, MeshNames, items};
+use super::findings::{Findings, MeshNames, items};
+use crate::job::report::Fault;
 use crate::job::source::Value;
 
 /// Whatever the mesh.

@@ -1,7 +1,7 @@
 //! Time, solver and checkpoints.
 
-use super::Findings;
-use crate::job::source::Value;
+use super::findings::Findings;
+use crate::job::{report::Fault, source::Value};
 
 /// More fixed steps than any machine will do.
 const MOST_STEPS: f64 = 1e12;
@@ -16,7 +16,7 @@ pub fn check(findings: &mut Findings<'_>) {
             if key.is_empty() || key.starts_with('-') || key.contains(char::is_whitespace) {
                 let help = "write it as PETSc does, without the leading dash: snes_monitor = \"\"";
                 let message = format!("`{key}` is no PETSc option");
-                findings.faults.push(super::Fault::new(node.key.clone(), message, "").help(help));
+                findings.faults.push(Fault::new(node.key.clone(), message, "").help(help));
             }
         }
     }

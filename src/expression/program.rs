@@ -1,0 +1,186 @@
+//! The program of an expression: instructions of a stack machine.
+
+use std::fmt;
+use std::sync::Arc;
+
+/// Values on the stack that need no allocation to evaluate.
+const SMALL: usize = 32;
+
+/// What an expression may depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Variable {
+    /// Time in seconds.
+    T,
+    /// First coordinate in metres.
+    X,
+    /// Second coordinate.
+    Y,
+    /// Third coordinate.
+    Z,
+}
+
+/// A compiled program; clones share the instructions.
+#[derive(Debug, Clone)]
+pub(super) struct Program {
+    instructions: Arc<[Instruction]>,
+    depth: usize,
+}
+
+impl Program {
+    pub fn new(instructions: Vec<Instruction>) -> Self {
+        let depth = stack_depth(&instructions);
+        Self { instructions: instructions.into(), depth }
+    }
+
+    /// Whether `variable` occurs in it.
+    pub fn uses(&self, variable: Variable) -> bool {
+        self.instructions.contains(&Instruction::Variable(variable))
+    }
+
+    /// Whether one of its functions is made of pieces.
+    pub fn has_pieces(&self) -> bool {
+        self.instructions.iter().any(|instruction| match instruction {
+            Instruction::Unary(function) => function.piece.is_some(),
+            Instruction::Binary(function) => function.piece.is_some(),
+            _ => false,
+        })
+    }
+
+    /// Value at `time` and `point`.
+    pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
+        self.with_stack(|stack| self.run::<false>(stack, time, point).0)
+    }
+
+    /// A digest of the pieces that the value at `time` and `point` comes from.
+    pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
+        self.with_stack(|stack| self.run::<true>(stack, time, point).1)
+    }
+
+    fn with_stack<T>(&self, run: impl FnOnce(&mut [f64]) -> T) -> T {
+        if self.depth <= SMALL { run(&mut [0.0; SMALL]) } else { run(&mut vec![0.0; self.depth]) }
+    }
+
+    /// The value, and the digest of its pieces if that is wanted.
+    fn run<const PIECES: bool>(&self, stack: &mut [f64], time: f64, point: &[f64]) -> (f64, u64) {
+        let (mut top, mut digest) = (0, 0);
+        let mut note = |piece: f64| digest = mix(digest, piece);
+        for instruction in self.instructions.iter() {
+            match instruction {
+                Instruction::Number(number) => {
+                    stack[top] = *number;
+                    top += 1;
+                }
+                Instruction::Variable(variable) => {
+                    stack[top] = match variable {
+                        Variable::T => time,
+                        coordinate => point.get(*coordinate as usize - 1).copied().unwrap_or(0.0),
+                    };
+                    top += 1;
+                }
+                Instruction::Unary(function) => {
+                    let argument = stack[top - 1];
+                    if let (true, Some(piece)) = (PIECES, function.piece) {
+                        note(piece(argument));
+                    }
+                    stack[top - 1] = (function.value)(argument);
+                }
+                Instruction::Binary(function) => {
+                    top -= 1;
+                    let (left, right) = (stack[top - 1], stack[top]);
+                    if let (true, Some(piece)) = (PIECES, function.piece) {
+                        note(piece(left, right));
+                    }
+                    stack[top - 1] = (function.value)(left, right);
+                }
+            }
+        }
+        (stack[0], digest)
+    }
+}
+
+/// One step of the stack machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Instruction {
+    Number(f64),
+    Variable(Variable),
+    Unary(Unary),
+    Binary(Binary),
+}
+
+/// A function of the topmost value.
+#[derive(Clone, Copy)]
+pub(super) struct Unary {
+    value: fn(f64) -> f64,
+    /// Tells which piece holds, if it has several.
+    piece: Option<fn(f64) -> f64>,
+}
+
+impl Unary {
+    pub const fn smooth(value: fn(f64) -> f64) -> Self {
+        Self { value, piece: None }
+    }
+
+    pub const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
+        Self { value, piece: Some(piece) }
+    }
+}
+
+/// A function of the two topmost values.
+#[derive(Clone, Copy)]
+pub(super) struct Binary {
+    value: fn(f64, f64) -> f64,
+    /// Tells which piece holds, if it has several.
+    piece: Option<fn(f64, f64) -> f64>,
+}
+
+impl Binary {
+    pub const fn smooth(value: fn(f64, f64) -> f64) -> Self {
+        Self { value, piece: None }
+    }
+
+    pub const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
+        Self { value, piece: Some(piece) }
+    }
+}
+
+/// A digest with one more number in it.
+fn mix(digest: u64, number: f64) -> u64 {
+    (digest ^ number.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+}
+
+impl fmt::Debug for Unary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Unary")
+    }
+}
+
+impl fmt::Debug for Binary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Binary")
+    }
+}
+
+impl PartialEq for Unary {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::fn_addr_eq(self.value, other.value)
+    }
+}
+
+impl PartialEq for Binary {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::fn_addr_eq(self.value, other.value)
+    }
+}
+
+fn stack_depth(program: &[Instruction]) -> usize {
+    let (mut now, mut most) = (0_usize, 0);
+    for instruction in program {
+        match instruction {
+            Instruction::Number(_) | Instruction::Variable(_) => now += 1,
+            Instruction::Unary(_) => {}
+            Instruction::Binary(_) => now -= 1,
+        }
+        most = most.max(now);
+    }
+    most
+}
