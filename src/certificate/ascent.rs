@@ -63,22 +63,29 @@ impl Direction {
     }
 }
 
-/// Climbs from `start`, at first also toward `beside`, until the relative change falls below `tolerance` twice, or for so many
-/// iterations. Collective.
+/// When an ascent ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Relative change of the number wanted, below which two iterations in turn have to stay.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+}
+
+/// Climbs from `start`; the first iteration also searches along `beside`. Collective.
 pub(super) fn climb(
     session: &Session,
     quotient: &mut dyn Quotient,
     start: DistributedVector,
     beside: Option<DistributedVector>,
-    tolerance: f64,
-    iterations: usize,
+    limits: Limits,
 ) -> Result<Peak> {
     let mut current = Direction::new(quotient, start)?;
     let mut previous = beside.map(|vector| Direction::new(quotient, vector)).transpose()?;
     let mut values = diagonal(&grams(session, &[&current])?, 0);
     let mut peak = quotient.value(&values);
     let mut calm = 0;
-    for _ in 0..iterations {
+    for _ in 0..limits.iterations {
         let (numerator, denominator) = quotient.weights(&values);
         let ratio = weighted(&numerator, &values) / weighted(&denominator, &values);
         if !ratio.is_finite() {
@@ -107,7 +114,7 @@ pub(super) fn climb(
         let value = quotient.value(&values);
         let change = ((value - peak) / value).abs();
         peak = value;
-        calm = if change < tolerance { calm + 1 } else { 0 };
+        calm = if change < limits.tolerance { calm + 1 } else { 0 };
         if calm == 2 {
             break;
         }

@@ -35,9 +35,14 @@ fn bound_of_material<const D: usize, const S: usize>(
     // The square of the trace is at most D times that of the strain; what lies between follows from the two ends.
     let of = |share: f64| {
         let [e, a] = [elasticity, viscosity].map(|tensor| tensor.shear + share * tensor.volumetric);
-        if e > 0.0 { super::bound_of(&[e, mass, a]) } else { f64::INFINITY }
+        if e > 0.0 { stable_step(e, mass, a) } else { f64::INFINITY }
     };
     of(0.0).min(of(D as f64))
+}
+
+/// The `k` with `k^2 elasticity = 4 mass + 2 k viscosity`, given the values of the three forms.
+pub(super) fn stable_step(elasticity: f64, mass: f64, viscosity: f64) -> f64 {
+    (viscosity + (viscosity * viscosity + 4.0 * elasticity * mass).sqrt()) / elasticity
 }
 
 /// At least the largest eigenvalue, in 1/m^2, of the sum of `g g^T` over the gradients of the cell's shape functions: the

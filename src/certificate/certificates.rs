@@ -1,0 +1,52 @@
+//! The numbers of the certificates.
+
+use serde::{Deserialize, Serialize};
+
+/// Constants of the problem; null where they have no meaning.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Certificates {
+    /// `m_j sup |w_nu|^2 / (A e(w), e(w))`.
+    pub theta: Option<f64>,
+    /// The same with the matrix of a step, and with the sums over its quadrature points.
+    pub theta_step: Option<f64>,
+    /// `m_A` in Pa s.
+    pub viscosity_modulus: Option<f64>,
+    /// `m_j` in Pa s/m.
+    pub monotonicity_constant: Option<f64>,
+    /// `c0` in Pa and `c1` in Pa s/m with `|-sigma_nu| <= c0 + c1 |v_nu|`, whatever the contact; null where they are infinite.
+    pub growth_constants: Option<[f64; 2]>,
+    /// Why there are no growth constants although there is contact, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unbounded_growth: Option<String>,
+    /// `|gamma|^2` of the normal trace in m; null where it is infinite: the supports leave a rigid motion against the contact.
+    pub trace_norm_squared: Option<f64>,
+    /// Contact pressure in Pa up to which a step has one solution, if pressures are given, where friction weakens under a
+    /// pressure that no law bounds, with the margin; 0: at none.
+    pub slip_pressure_bound: Option<f64>,
+    /// Largest stable step in s.
+    pub explicit_step_bound: Option<f64>,
+    /// Whether the largest stable step may be longer than that: of a large mesh the bound of its cells is enough, where no step
+    /// is longer.
+    #[serde(skip)]
+    pub explicit_bound_is_least: bool,
+    /// Whether it holds for overstresses up to the yield stress only: there are power laws.
+    #[serde(skip)]
+    pub explicit_bound_follows_stress: bool,
+    /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
+    #[serde(skip)]
+    pub flowing_step_bound: Option<f64>,
+    /// What `theta` and `theta_step` say nothing of, in words; absent if there is nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_covered: Vec<String>,
+}
+
+impl Certificates {
+    /// How far below 1 `theta_step` has to be for steps to count as having one solution: suprema are approached from below.
+    pub const MARGIN: f64 = 1e-3;
+
+    /// Whether `theta_step`, if there is one, says that each step has one solution.
+    pub fn steps_are_unique(&self) -> bool {
+        self.theta_step.is_none_or(|theta| theta < 1.0 - Self::MARGIN)
+    }
+}
