@@ -15,7 +15,7 @@
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
 //! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
 
-use super::{ContactTable, Deserialize, JsonSchema, NormalLaw, Serialize};
+use super::{Deserialize, JsonSchema, NormalLaw, Serialize};
 use crate::law::LawFault;
 use crate::tensor::{Vector, add_scaled, dot, norm};
 
@@ -59,11 +59,12 @@ impl Adhesion {
         length.min(self.limit())
     }
 
-    /// What can't stand beside bonds, which are between what touches at first; keys are those of the contact's table.
-    pub fn faults(table: &ContactTable) -> Vec<LawFault> {
+    /// What can't stand beside bonds, which are between what touches at first; keys are those of the contact's table, whose
+    /// path in the job is given.
+    pub fn faults(path: &str, normal: Option<&NormalLaw>) -> Vec<LawFault> {
         let message = "adhesion binds what touches at first: there is no gap";
-        let help = format!("delete it, or [{}.adhesion]", table.path);
-        let gap = table.normal.as_ref().and_then(NormalLaw::gap_key);
+        let help = format!("delete it, or [{path}.adhesion]");
+        let gap = normal.and_then(NormalLaw::gap_key);
         gap.into_iter().map(|gap| LawFault::at_value(gap, message, help.as_str())).collect()
     }
 

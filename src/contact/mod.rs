@@ -4,6 +4,7 @@
 //! formula and derivative, and what it can't be combined with.
 
 mod adhesion;
+mod chosen;
 mod compliance;
 mod coulomb;
 mod damped_response;

@@ -44,8 +44,10 @@ impl ContactTable {
         if let Some(law) = &self.friction {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
-        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(self)));
-        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(self)));
+        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.path, self.normal.as_ref())));
+        let (normal, friction) = (self.normal.as_ref(), self.friction.as_ref());
+        let beside_memory = |_| Memory::faults(&self.path, normal, friction, self.has_obstacle);
+        faults.extend(self.memory.iter().flat_map(beside_memory));
         if self.quadrature == Quadrature::Gauss {
             let nodal = self.normal.as_ref().is_some_and(NormalLaw::needs_nodes);
             let not_there = [
