@@ -12,11 +12,8 @@ mod extrapolated;
 
 pub use extrapolated::Extrapolated;
 
-use super::{Flow, FlowLaw};
-use crate::tensor::{Mandel, add_scaled, normal_components};
-
-/// A square matrix over the components of a stress.
-pub type Tangent<const S: usize> = [[f64; S]; S];
+use super::{Flow, FlowLaw, Tangent};
+use crate::tensor::{Mandel, add_scaled};
 
 /// How a step ends where stress flows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,31 +40,6 @@ impl FlowLaw {
         let (flow, growth) = self.flow_to_end(trial, length, accumulated, tangent)?;
         let stress = add_scaled(trial, -1.0, &self.elasticity().apply(&flow));
         Some(Returned { stress, flow, accumulated: accumulated + growth })
-    }
-}
-
-/// Writes the tangent that is `along` on multiples of the identity and `across` on the rest.
-pub(super) fn write_isotropic<const S: usize>(tangent: &mut Tangent<S>, along: f64, across: f64) {
-    let normal = normal_components::<S>();
-    for i in 0..S {
-        for j in 0..S {
-            let shared = if i < normal && j < normal { (along - across) / normal as f64 } else { 0.0 };
-            tangent[i][j] = shared + if i == j { across } else { 0.0 };
-        }
-    }
-}
-
-/// Adds `factor * a b^T`.
-pub(super) fn add_product<const S: usize>(
-    tangent: &mut Tangent<S>,
-    factor: f64,
-    a: &Mandel<S>,
-    b: &Mandel<S>,
-) {
-    for i in 0..S {
-        for j in 0..S {
-            tangent[i][j] += factor * a[i] * b[j];
-        }
     }
 }
 

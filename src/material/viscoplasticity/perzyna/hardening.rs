@@ -6,7 +6,7 @@
 //! `(von Mises norm - h p) dp/dt >= yield stress dp/dt >= 0`, is dissipated.
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3.)
 
-use super::Perzyna;
+use super::overstress::Perzyna;
 use crate::material::{Elastic, viscoplasticity::Flow};
 
 impl Elastic<Perzyna> {

@@ -14,8 +14,14 @@
 //! does at the least. Nor does it feed energy, as `s*:m >= 0`. Of steady flow less than half is extrapolated, however long the
 //! steps are, `w / (1 + 2 w)` at the ratio `w` of two steps; so `phi` is 1 where flow is smooth, and the formula keeps its order.
 
-use super::{Flow, FlowLaw, Returned, Tangent, add_product};
-use crate::tensor::{Mandel, add_scaled, dot};
+use super::Returned;
+use crate::{
+    material::{
+        FlowLaw, Tangent,
+        viscoplasticity::flow::{Flow, add_product},
+    },
+    tensor::{Mandel, add_scaled, dot},
+};
 
 /// What a two-step formula extrapolates of the flow of the step before.
 #[derive(Debug, Clone, Copy, PartialEq)]
