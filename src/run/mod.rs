@@ -15,6 +15,7 @@ mod restored;
 mod scene;
 mod setup;
 mod simulation;
+mod start;
 mod step_line;
 mod steps;
 mod summary;
@@ -25,6 +26,7 @@ pub use check::Report;
 pub use inventory::Inventory;
 pub use scene::Scene;
 pub use simulation::Simulation;
+pub use start::{Clock, Start, VERSION};
 pub use summary::Summary;
 
 use crate::{
@@ -34,45 +36,6 @@ use crate::{
     material::Hypothesis,
     session::Session,
 };
-use std::{
-    path::PathBuf,
-    time::{Duration, Instant},
-};
-
-/// Version of the solver with the id of its source.
-pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
-
-/// Where a run starts from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Start {
-    /// The initial state.
-    Anew,
-    /// The initial state, overwriting the results of another job.
-    Over,
-    /// The newest good checkpoint of the output folder.
-    Newest,
-    /// This checkpoint.
-    From(PathBuf),
-}
-
-impl Start {
-    /// Whether the run continues an earlier one.
-    fn goes_on(&self) -> bool {
-        matches!(self, Self::Newest | Self::From(_))
-    }
-}
-
-/// The start of the process, and whether its log is shown.
-#[derive(Debug, Clone, Copy)]
-pub struct Clock {
-    /// When the process started.
-    pub began: Instant,
-    /// Time that MPI and PETSc took to start.
-    pub launched: Duration,
-    /// Whether the run's log is shown on the terminal too.
-    pub on_terminal: bool,
-}
-
 /// Calls a function of a submodule on a job's mesh, for its dimension and hypothesis.
 macro_rules! on_the_mesh {
     ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{

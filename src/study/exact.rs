@@ -4,8 +4,8 @@
 //! of degree 6 in the plane and 5 in space. Strains of the solution come from fourth-order central differences over a
 //! thousandth of the cell's size.
 
+use super::squares::{Squares, minus, mix, symmetric, tensor_square};
 use super::{
-    difference::{Squares, minus, mix, symmetric, tensor_square},
     document::{Exact, Quantity, Space},
     stored::{FieldAt, Values},
 };

@@ -1,7 +1,7 @@
 //! Errors of a finished run: norms over time, and values at points.
 
 use super::{
-    difference::{Against, Pair, Squares},
+    difference::{Against, Pair},
     document::{Norm, Over, ProbeError, Quantity, Space},
     exact::ExactFields,
     stored::StoredFields,

@@ -20,6 +20,7 @@ mod plot;
 mod record;
 mod results;
 mod split;
+mod squares;
 mod stored;
 mod table;
 mod targets;
@@ -39,7 +40,7 @@ use compare::Compared;
 use document::Take;
 use execute::{Outcome, execute};
 use plan::{Planned, PlannedReference};
-use record::{Record, Seconds};
+use record::{Ran, seconds_of};
 use results::RunResult;
 use std::io::Write;
 
@@ -134,12 +135,6 @@ fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
     Ok(Exit::Stopped)
 }
 
-/// The record of a run, and whether an earlier study made it.
-struct Ran {
-    record: Record,
-    found: bool,
-}
-
 fn announced(
     session: &Session,
     planned: &Planned,
@@ -155,16 +150,6 @@ fn announced(
     };
     say(&format!("run {count:<9} {:<40} {words}", planned.name));
     Ok(Some(Ran { record: *record, found }))
-}
-
-/// The repetition that counts.
-fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
-    let mut all = record.seconds.clone();
-    all.sort_by(|a, b| a.computing.total_cmp(&b.computing));
-    match take {
-        Take::Best => all.first().copied(),
-        Take::Median => all.get(all.len() / 2).copied(),
-    }
 }
 
 fn assembled(

@@ -1,6 +1,6 @@
 //! `run.json`: the record of a finished run, with digests of its files.
 
-use super::plan::Planned;
+use super::{document::Take, plan::Planned};
 use crate::{
     error::{Error, Result},
     run::VERSION,
@@ -72,6 +72,24 @@ pub struct Seconds {
     pub computing: f64,
     /// In solving the equations of the steps.
     pub solve: f64,
+}
+
+/// What came of a run.
+pub struct Ran {
+    /// What it left.
+    pub record: Record,
+    /// Whether an earlier study left it.
+    pub found: bool,
+}
+
+/// The repetition that counts.
+pub fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
+    let mut all = record.seconds.clone();
+    all.sort_by(|a, b| a.computing.total_cmp(&b.computing));
+    match take {
+        Take::Best => all.first().copied(),
+        Take::Median => all.get(all.len() / 2).copied(),
+    }
 }
 
 impl Record {

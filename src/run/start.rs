@@ -1,0 +1,40 @@
+//! What the command line says of a run beside its job.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+/// Version of the solver with the id of its source.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
+
+/// Where a run starts from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Start {
+    /// The initial state.
+    Anew,
+    /// The initial state, even over the results of another job.
+    Over,
+    /// The newest good checkpoint of the output folder.
+    Newest,
+    /// This checkpoint.
+    From(PathBuf),
+}
+
+impl Start {
+    /// Whether the run starts behind an earlier one.
+    pub(super) fn goes_on(&self) -> bool {
+        matches!(self, Self::Newest | Self::From(_))
+    }
+}
+
+/// When the process began, how long MPI and PETSc took to start, and who watches.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    /// The beginning.
+    pub began: Instant,
+    /// Time until MPI and PETSc were up.
+    pub launched: Duration,
+    /// Whether the run's log is shown on the terminal too.
+    pub on_terminal: bool,
+}
