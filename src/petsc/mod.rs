@@ -46,7 +46,7 @@ pub use matrix::{BlockRows, Matrix};
 pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
-pub use variational_inequality::{BoundedSnes, UNBOUNDED};
+pub use variational_inequality::{BoundedSnes, Limits, UNBOUNDED};
 pub use vector::{DistributedVector, Local, LocalRead, LocalWrite};
 
 use crate::error::{Error, Result};

@@ -20,6 +20,17 @@ pub struct BoundedSnes {
     residual: DistributedVector,
 }
 
+/// When the iterations of a nonlinear solver end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Norm of the residual that counts as zero.
+    pub absolute: f64,
+    /// The same as a share of the first norm.
+    pub relative: f64,
+    /// Most iterations.
+    pub iterations: usize,
+}
+
 /// `K x - b`.
 struct Linear<'a> {
     matrix: &'a Matrix,
@@ -52,17 +63,16 @@ impl BoundedSnes {
         Ok(Self { raw, residual: like.like()? })
     }
 
-    /// Solves from and into `x`, down to a norm of the residual of the free entries of `absolute`, or of `relative` times
-    /// the first one. Collective.
+    /// Solves from and into `x`; the norms are those of the residual of the entries that are not at their bounds. Collective.
     pub fn solve(
         &mut self,
         matrix: &Matrix,
         right_hand_side: &DistributedVector,
         [lower, upper]: [&DistributedVector; 2],
         x: &mut DistributedVector,
-        (absolute, relative): (f64, f64),
-        iterations: usize,
+        limits: Limits,
     ) -> Result<NonlinearOutcome> {
+        let Limits { absolute, relative, iterations } = limits;
         let mut linear = Linear { matrix, right_hand_side };
         let callback = Callback::new(&mut linear);
         let (raw, matrix, pointer) = (self.raw.get(), matrix.raw.get(), callback.pointer());

@@ -63,8 +63,17 @@ pub fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     ] {
         out.extend(sums(table, name, quantity, unit, &columns)?);
     }
-    let words = "Energy imbalance of each step: what is missing in its balance over the energy turned over";
-    out.extend(over_time(table, "energy_imbalance", "energy imbalance", "", words, true, None)?);
+    out.extend(over_time(
+        table,
+        Curve {
+            column: "energy_imbalance",
+            quantity: "energy imbalance",
+            unit: "",
+            caption: "Energy imbalance of each step: what is missing in its balance over the energy turned over",
+            is_logarithmic: true,
+            tolerance: None,
+        },
+    )?);
     Ok(out)
 }
 
@@ -95,43 +104,56 @@ fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str])
 /// How the steps went: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
 pub fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
     let mut out = Vec::new();
-    for (column, quantity, unit, words) in [
+    for (column, quantity, unit, caption) in [
         ("newton_iterations", "Newton iterations", "", "Newton iterations of each step"),
         ("linear_iterations", "linear iterations", "", "Iterations of the linear solver in each step"),
         ("dt", "step", "s", "Length of the steps"),
         ("active_changes", "nodes", "", "Contact points that changed their branch in each step"),
     ] {
-        out.extend(over_time(table, column, quantity, unit, words, false, None)?);
+        let curve = Curve { column, quantity, unit, caption, is_logarithmic: false, tolerance: None };
+        out.extend(over_time(table, curve)?);
     }
-    let words =
-        "Inclusion residual of each step: scaled distance of velocity and pressure to the contact law";
-    out.extend(over_time(table, "inclusion_residual", "inclusion residual", "", words, true, tolerance)?);
+    out.extend(over_time(
+        table,
+        Curve {
+            column: "inclusion_residual",
+            quantity: "inclusion residual",
+            unit: "",
+            caption: "Inclusion residual of each step: scaled distance of velocity and pressure to the contact law",
+            is_logarithmic: true,
+            tolerance,
+        },
+    )?);
     Ok(out)
 }
 
-/// A column over time; where it vanishes throughout there is nothing to draw.
-fn over_time(
-    table: &Table,
-    column: &str,
-    quantity: &str,
-    unit: &str,
-    words: &str,
-    logarithmic: bool,
+/// A column of the history, and how it is drawn.
+struct Curve<'a> {
+    column: &'a str,
+    quantity: &'a str,
+    unit: &'a str,
+    caption: &'a str,
+    is_logarithmic: bool,
+    /// A level that is drawn as a line.
     tolerance: Option<f64>,
-) -> Result<Option<Picture>> {
+}
+
+/// A column over time; nothing where all its values are 0.
+fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
+    let Curve { column, quantity, unit, caption, is_logarithmic, tolerance } = curve;
     let points = table.curve("time", column);
     let Some((low, high)) = extent(points.iter().map(|p| p[1])) else { return Ok(None) };
     if low == 0.0 && high == 0.0 {
         return Ok(None);
     }
-    let unseen = points.iter().filter(|p| logarithmic && p[1] <= 0.0).count();
+    let unseen = points.iter().filter(|p| is_logarithmic && p[1] <= 0.0).count();
     let look = if points.len() <= 200 { Look::Dotted } else { Look::Line };
     let series = Series::new(0, "", look, points);
     let levels =
         tolerance.map(|level| vec![(level, format!("tolerance {}", number(level)))]).unwrap_or_default();
     let chart = Chart {
-        logarithmic,
-        from_zero: !logarithmic,
+        logarithmic: is_logarithmic,
+        from_zero: !is_logarithmic,
         levels,
         ..Chart::new(TIME, Axis { quantity, unit }, vec![series])
     };
@@ -142,6 +164,6 @@ fn over_time(
     } else {
         String::new()
     };
-    let alt = format!("Chart over time. {words}; {most}");
-    Ok(Some(Picture::new(column, alt, format!("{words}; {most}.{unseen}"), chart.svg()?)))
+    let alt = format!("Chart over time. {caption}; {most}");
+    Ok(Some(Picture::new(column, alt, format!("{caption}; {most}.{unseen}"), chart.svg()?)))
 }

@@ -8,7 +8,7 @@ use crate::{
     body::Body,
     effect::Contact,
     error::{Error, Result},
-    petsc::{BoundedSnes, DistributedVector, NonlinearOutcome, UNBOUNDED},
+    petsc::{BoundedSnes, DistributedVector, Limits, NonlinearOutcome, UNBOUNDED},
 };
 
 /// PETSc's solver with its bounds.
@@ -40,12 +40,12 @@ impl Bounded {
             contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
         }
         let bounds = [&self.lower, &self.upper];
-        let iterations = task.settings.newton_iterations;
+        let (absolute, relative) = task.tolerances();
+        let limits = Limits { absolute, relative, iterations: task.settings.newton_iterations };
         let Some(matrix) = task.matrix.assembled() else {
             return Err(Error::Internal("bounds need the entries of the matrix".into()));
         };
-        let outcome =
-            self.snes.solve(matrix, task.right_hand_side, bounds, trial, task.tolerances(), iterations)?;
+        let outcome = self.snes.solve(matrix, task.right_hand_side, bounds, trial, limits)?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {
