@@ -1,8 +1,11 @@
 //! What a step asks of a body that is implicit in every stress.
 
-use super::Body;
+use super::{Body, Called};
 use crate::{
-    effect::{Blend, Contact, Effect, Energy, Step, SurfaceEffect, SurfaceStep, Tangents},
+    effect::{
+        Blend, Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, SurfaceStep,
+        Tangents, Term,
+    },
     mesh::Mesh,
     simd::Pack,
     space::{Batch, Geometry, Needs, Nodal},
@@ -17,25 +20,28 @@ pub struct Cells<'a, const D: usize, const S: usize> {
     surface_effects: &'a mut [Box<dyn SurfaceEffect<D>>],
     /// One flag a local component: held by a support.
     pub fixed: &'a [bool],
+    evaluation: Evaluation,
+    step: Step,
 }
 
 impl<const D: usize, const S: usize> Body<D, S> {
     /// Cells and contacts, to be used side by side.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
         let Self { mesh, geometry, effects, surface_effects, fixed, contacts, .. } = self;
-        (Cells { mesh, geometry, effects, surface_effects, fixed }, contacts)
+        let (evaluation, step) = (self.evaluation, self.step);
+        (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step }, contacts)
     }
 
     /// Whether implicit steps are nonlinear, contact apart: cells flow or are damaged, or something else acts at the surface.
     pub fn flows(&self) -> bool {
-        self.surface_effects.iter().any(|effect| effect.is_implicit())
-            || self.effects.iter().any(|effect| effect.flows())
+        !self.is_explicit() && (!self.surface_effects.is_empty() || !self.called(|p| p.end).is_empty())
     }
 
     /// Names of what may make the forces at the end of an implicit step fall with the displacement, contact apart.
     pub fn softening(&self) -> impl Iterator<Item = &'static str> {
-        let cells = self.effects.iter().filter(|e| e.flows() && e.phases().weakens).map(|e| e.name());
-        cells.chain(self.surface_effects.iter().filter(|e| e.is_implicit() && e.softens()).map(|e| e.name()))
+        let cells = self.called(|p| p.end && p.weakens).among(&self.effects).map(|e| e.name());
+        let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
+        cells.chain(surface.map(|e| e.name()))
     }
 
     /// Adds the forces of the state that a step starts from to `forces` (with ghosts): `nodal` has the blended displacement, and the
@@ -48,17 +54,19 @@ impl<const D: usize, const S: usize> Body<D, S> {
         step: Step,
         forces: &mut [f64],
     ) -> f64 {
-        self.effects.iter_mut().for_each(|effect| effect.begin(blend, step.length));
-        let before = nodal.previous_displacement;
-        self.surface_effects.iter_mut().for_each(|effect| effect.begin(blend, step.length, before));
-        let Some(needs) = self.needs(|p| p.explicit) else { return 0.0 };
+        (self.evaluation, self.step) = (Evaluation::End(blend), step);
+        let (start, mut outcome) = (Evaluation::Start(blend), Outcome::default());
+        for effect in &mut self.surface_effects {
+            effect.evaluate(start, step, nodal.previous_displacement, forces, &mut outcome);
+        }
+        let Some(needs) = self.needs(|p| p.start) else { return 0.0 };
+        let called = self.called(|p| p.start.is_some());
         let (mesh, effects) = (&self.mesh, &mut self.effects);
-        let start = Step { length: blend.length, ..step };
         let mut squares = 0.0;
         Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-            for effect in effects.iter_mut().filter(|e| e.phases().explicit.is_some()) {
+            for effect in called.among_mut(effects) {
                 let before = batch.stress;
-                effect.add_explicit(start, batch, &mut Energy::default());
+                effect.evaluate(start, step, batch, &mut outcome);
                 for lane in 0..batch.count {
                     let cell = batch.cells.simplex(lane);
                     let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
@@ -74,53 +82,57 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Energies of a solved step that is not yet committed; writes trial histories.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let Nodal { displacement: after, previous_displacement: before, velocity, .. } = nodal;
+        let evaluation = self.evaluation;
         for effect in &mut self.surface_effects {
-            effect.advance(after);
-            effect.add_implicit_energy(step, SurfaceStep { before, after, velocity }, energy);
+            effect.add_step_energy(evaluation, step, SurfaceStep { before, after, velocity }, energy);
         }
-        let needs =
-            Needs { strain: true, strain_before: true, strain_rate: true, ..flow_needs(&self.effects) };
-        let effects = &mut self.effects;
-        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+        let (mut cells, _) = self.cells_and_contacts();
+        let (called, needs) = cells.flowing();
+        let needs = Needs { strain_before: true, strain_rate: true, ..needs };
+        let mut outcome = Outcome::default();
+        Batch::for_all(cells.mesh, cells.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             if needs.elastic_stress {
                 std::mem::swap(&mut batch.strain, &mut batch.strain_before);
-                effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+                cells.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
                 std::mem::swap(&mut batch.strain, &mut batch.strain_before);
                 batch.elastic_stress_before = std::mem::replace(&mut batch.elastic_stress, Pack::ZERO);
             }
-            add_flow(effects, batch, needs, None);
-            effects.iter_mut().for_each(|effect| effect.add_implicit_energy(step, batch, energy));
+            cells.evaluate(called, needs, batch, &mut outcome);
+            let effects = cells.effects.iter();
+            effects.for_each(|effect| effect.add_step_energy(evaluation, step, batch, energy));
         });
     }
-}
-
-/// What flow and damage at the end of a step need.
-fn flow_needs<const D: usize, const S: usize>(effects: &[Box<dyn Effect<D, S>>]) -> Needs {
-    let elastic_stress = effects.iter().any(|effect| effect.flows() && effect.phases().weakens);
-    Needs { strain: true, elastic_stress, ..Needs::default() }
-}
-
-/// Lets the cells of a batch flow and be damaged; gives whether that changed their stress.
-fn add_flow<const D: usize, const S: usize>(
-    effects: &mut [Box<dyn Effect<D, S>>],
-    batch: &mut Batch<D, S>,
-    needs: Needs,
-    mut tangents: Option<&mut Tangents>,
-) -> bool {
-    if needs.elastic_stress {
-        effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
-    }
-    let mut any = false;
-    for effect in effects.iter_mut().filter(|e| e.flows()) {
-        any |= effect.add_flow(batch, tangents.as_deref_mut());
-    }
-    any
 }
 
 impl<const D: usize, const S: usize> Cells<'_, D, S> {
     /// Whether the derivative of the flow is symmetric in all cells.
     pub fn has_symmetric_tangent(&self) -> bool {
-        self.effects.iter().all(|effect| effect.has_symmetric_tangent())
+        let is_skew = |term| matches!(term, Term::Flow(flow) if !flow.has_symmetric_tangent);
+        !self.effects.iter().any(|effect| is_skew(effect.term()))
+    }
+
+    /// What flows or is damaged at the end of a step, and what that needs.
+    fn flowing(&self) -> (Called, Needs) {
+        let called = |holds: fn(Phases) -> bool| Called::of(&*self.effects, self.evaluation, holds);
+        let elastic_stress = !called(|p| p.end && p.weakens).is_empty();
+        (called(|p| p.end), Needs { strain: true, elastic_stress, ..Needs::default() })
+    }
+
+    /// Lets the cells of a batch flow and be damaged at the end of a step.
+    fn evaluate(
+        &mut self,
+        called: Called,
+        needs: Needs,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        if needs.elastic_stress {
+            self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+        }
+        outcome.has_flowed = false;
+        for effect in called.among_mut(self.effects) {
+            effect.evaluate(self.evaluation, self.step, batch, outcome);
+        }
     }
 
     /// Adds the forces of what flow and damage take from the stress at this displacement, and minus the forces at the surface, to
@@ -131,26 +143,21 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         mut tangents: Option<&mut Tangents>,
         forces: &mut [f64],
     ) {
-        let nodal = Nodal {
-            displacement,
-            previous_displacement: displacement,
-            velocity: displacement,
-            previous_velocity: displacement,
-        };
-        let needs = flow_needs(self.effects);
-        let (mesh, effects) = (self.mesh, &mut self.effects);
         if let Some(tangents) = &mut tangents {
-            tangents.restart::<S>(mesh.cell_count());
+            tangents.restart::<S>(self.mesh.cell_count());
         }
+        let mut outcome = Outcome { tangents, ..Outcome::default() };
         for effect in self.surface_effects.iter_mut() {
-            effect.advance(displacement);
-            effect.add_forces(displacement, tangents.as_deref_mut(), forces);
+            effect.evaluate(self.evaluation, self.step, displacement, forces, &mut outcome);
         }
-        if !effects.iter().any(|effect| effect.flows()) {
+        let (called, needs) = self.flowing();
+        if called.is_empty() {
             return;
         }
+        let (mesh, nodal) = (self.mesh, Nodal::all(displacement));
         Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-            if add_flow(effects, batch, needs, tangents.as_deref_mut()) {
+            self.evaluate(called, needs, batch, &mut outcome);
+            if outcome.has_flowed {
                 batch.scatter(mesh, forces);
             }
         });

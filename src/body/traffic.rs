@@ -2,7 +2,7 @@
 
 use super::Body;
 use crate::{
-    effect::Effect,
+    effect::{Effect, Phases},
     space::{Needs, Simplex},
 };
 
@@ -18,57 +18,55 @@ pub struct PassBytes {
     pub energy: u64,
 }
 
+impl PassBytes {
+    /// Counts the passes of a step.
+    pub fn of<const D: usize, const S: usize>(body: &Body<D, S>) -> Self {
+        let cells = body.mesh.cell_count() * ((D + 1) * size_of::<u32>() + size_of::<Simplex<D>>());
+        let field = body.mesh.nodes.len() * D * size_of::<f64>();
+        // Histories, of each effect as far as `moved` says.
+        let histories = |moved: fn(Phases) -> Moved| -> usize {
+            body.effects.iter().map(|effect| moved(effect.phases(body.evaluation)).bytes(&**effect)).sum()
+        };
+        let explicit = body.needs(|p| p.start).map_or(0, |needs| {
+            let histories = histories(|p| match p {
+                Phases { start: None, .. } => Moved::Nothing,
+                Phases { end: true, .. } => Moved::Converged,
+                _ => Moved::All,
+            });
+            cells + (fields(needs) + 2) * field + histories
+        });
+        let energy = body.needs_of_energy().map_or(0, |needs| {
+            let histories = histories(|p| match p.energy.or(p.stress) {
+                Some(_) => Moved::Converged,
+                None => Moved::Nothing,
+            });
+            cells + fields(needs) * field + histories
+        });
+        let finish = cells + 3 * field + histories(|p| if p.end { Moved::All } else { Moved::Nothing });
+        Self { explicit: explicit as u64, finish: finish as u64, energy: energy as u64 }
+    }
+}
+
 /// Parts of a history that a pass moves.
 #[derive(Clone, Copy)]
 enum Moved {
+    Nothing,
     Converged,
     /// With the values of the step before, where a scheme keeps them; the trial values are written.
     All,
 }
 
-impl<const D: usize, const S: usize> Body<D, S> {
-    /// Counts the passes of a step.
-    pub fn pass_bytes(&self) -> PassBytes {
-        let explicit = self.needs(|p| p.explicit).map(|needs| {
-            let histories = self.moved(|effect| {
-                let moved = if effect.flows() { Moved::Converged } else { Moved::All };
-                effect.phases().explicit.map(|_| moved)
-            });
-            self.pass(fields(needs) + 2) + histories
-        });
-        let energy = self.needs_of_energy().map(|needs| {
-            let histories = self.moved(|effect| {
-                let phases = effect.phases();
-                phases.energy.or(phases.stress).map(|_| Moved::Converged)
-            });
-            self.pass(fields(needs)) + histories
-        });
-        let finish = self.pass(3) + self.moved(|effect| effect.flows().then_some(Moved::All));
-        PassBytes {
-            explicit: explicit.unwrap_or(0) as u64,
-            finish: finish as u64,
-            energy: energy.unwrap_or(0) as u64,
+impl Moved {
+    /// Bytes of an effect's histories, which count themselves with converged and trial values.
+    fn bytes<const D: usize, const S: usize>(self, effect: &dyn Effect<D, S>) -> usize {
+        let stores = effect.histories();
+        let both: usize = stores.iter().map(|store| store.history().bytes).sum();
+        let earlier = stores.iter().filter_map(|store| store.earlier_history());
+        match self {
+            Self::Nothing => 0,
+            Self::Converged => both / 2,
+            Self::All => both + earlier.map(|history| history.bytes).sum::<usize>(),
         }
-    }
-
-    /// Cells, and so many nodal fields.
-    fn pass(&self, fields: usize) -> usize {
-        let cell = (D + 1) * size_of::<u32>() + size_of::<Simplex<D>>();
-        self.mesh.cell_count() * cell + self.mesh.nodes.len() * D * size_of::<f64>() * fields
-    }
-
-    /// Histories, of each effect as far as `moved` says. They count themselves with converged and trial values.
-    fn moved(&self, moved: impl Fn(&dyn Effect<D, S>) -> Option<Moved>) -> usize {
-        let of = |effect: &dyn Effect<D, S>| {
-            let Some(moved) = moved(effect) else { return 0 };
-            let both: usize = effect.histories().iter().map(|history| history.bytes).sum();
-            let earlier: usize = effect.earlier_histories().iter().map(|history| history.bytes).sum();
-            match moved {
-                Moved::Converged => both / 2,
-                Moved::All => both + earlier,
-            }
-        };
-        self.effects.iter().map(|effect| of(&**effect)).sum()
     }
 }
 
@@ -85,23 +83,15 @@ fn fields(needs: Needs) -> usize {
 mod tests {
     use super::*;
     use crate::{
-        effect::{Load, ViscoplasticFlow},
+        effect::{Evaluation, ViscoplasticFlow},
         material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Viscoplasticity},
         mesh::Mesh,
         space::Geometry,
     };
 
     /// Two triangles on four nodes.
-    fn body(effects: Vec<Box<dyn Effect<2, 3>>>, geometry: Geometry<2>, mesh: Mesh<2>) -> Body<2, 3> {
-        Body {
-            fixed: vec![false; 8],
-            mesh,
-            geometry,
-            effects,
-            contacts: Vec::new(),
-            surface_effects: Vec::new(),
-            load: Load::default(),
-        }
+    fn passes(effects: Vec<Box<dyn Effect<2, 3>>>, geometry: Geometry<2>, mesh: Mesh<2>) -> PassBytes {
+        PassBytes::of(&Body::new(mesh, geometry, effects, vec![false; 8], Evaluation::Converged))
     }
 
     fn square() -> (Geometry<2>, Mesh<2>) {
@@ -125,14 +115,13 @@ mod tests {
         let elasticity = Elasticity { youngs_modulus: 10.0, poisson_ratio: 0.3 };
         let law = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None };
         let law = Viscoplasticity::Maxwell(law).prepare(&elasticity, Hypothesis::PlaneStress);
-        let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry.runs, false);
-        let with_history = body(vec![Box::new(history)], geometry.clone(), mesh.clone());
-        let passes = with_history.pass_bytes();
+        let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry.runs);
+        let with_history = passes(vec![Box::new(history)], geometry.clone(), mesh.clone());
         // Displacement and velocity are read, forces read and written, three stresses of each cell read and written.
-        assert_eq!(passes.explicit, cells + 4 * field + 2 * 2 * 3 * 8);
+        assert_eq!(with_history.explicit, cells + 4 * field + 2 * 2 * 3 * 8);
         // The energy of the elastic stress needs the displacement and the stresses.
-        assert_eq!(passes.energy, cells + field + 2 * 3 * 8);
-        let nothing = body(Vec::new(), geometry, mesh).pass_bytes();
+        assert_eq!(with_history.energy, cells + field + 2 * 3 * 8);
+        let nothing = passes(Vec::new(), geometry, mesh);
         assert_eq!([nothing.explicit, nothing.energy], [0, 0]);
     }
 }

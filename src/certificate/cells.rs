@@ -12,7 +12,7 @@ pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
 ) -> Option<f64> {
-    if body.surface_effects.iter().any(|effect| effect.is_elastic()) {
+    if !body.surface_effects.is_empty() {
         return None;
     }
     let mut least = f64::INFINITY;
@@ -30,7 +30,7 @@ fn bound_of_material<const D: usize, const S: usize>(
 ) -> f64 {
     let [elasticity, viscosity] =
         [Form::Elasticity, Form::Viscosity].map(|form| body.tensor(form, material).unwrap_or_default());
-    let density = body.effects.iter().find_map(|effect| effect.density(material)).unwrap_or(0.0);
+    let density = body.density(material).unwrap_or(0.0);
     let mass = density / ((D + 1) * (D + 2)) as f64 / steepness;
     // The square of the trace is at most D times that of the strain; what lies between follows from the two ends.
     let of = |share: f64| {

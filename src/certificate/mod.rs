@@ -99,7 +99,7 @@ impl Certificates {
         }
         known.not_covered = not_covered(body, known.theta_step, known.slip_pressure_bound);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
-            let flow = body.flow_step_bound();
+            let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
             let is_large = body.unknowns(session) > SMALL;
             let least = cells::explicit_step_bound(session, body).filter(|waves| is_large && decides(waves));
@@ -110,7 +110,7 @@ impl Certificates {
             let bound = flow.map_or(waves, |flow| waves.min(flow));
             known.explicit_step_bound = Some(bound);
             known.explicit_bound_is_least = least == Some(bound);
-            known.explicit_bound_follows_stress = body.has_power_law();
+            known.explicit_bound_follows_stress = body.flow_properties().any(|flow| flow.has_power_law);
             known.flowing_step_bound = flow.map(|flow| 1.0 / (1.0 / waves + 1.0 / flow));
         }
         Ok(known)

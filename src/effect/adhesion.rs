@@ -1,6 +1,13 @@
 use super::{
-    Blend, Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, SurfaceStep, Tangents,
-    evolution::Evolution, node_history::NodeHistory,
+    energy::Energy,
+    evolution::Evolution,
+    history::HistoryStore,
+    node_history::NodeHistory,
+    outcome::Outcome,
+    step::{Evaluation, Step},
+    step_error::{Curvature, StressError},
+    surface::{SurfaceEffect, SurfaceState, SurfaceStep},
+    tangents::Tangents,
 };
 use crate::{
     contact,
@@ -35,8 +42,6 @@ pub struct Adhesion<const D: usize> {
     /// Points of each node that is bonded.
     counts: Vec<usize>,
     bonding: NodeHistory,
-    /// How a step advances the bonding, if it is an implicit one.
-    evolution: Option<Evolution>,
     /// Derivatives of the bonding by the drives of nodes at the end of an implicit step, in 1/J.
     slopes: Vec<f64>,
 }
@@ -51,8 +56,8 @@ pub struct Bonded<const D: usize> {
 }
 
 impl<const D: usize> Adhesion<D> {
-    /// Whole bonds at the points, which follow the displacement before steps or at their end; the rank owns so many nodes.
-    pub fn new(bonded: Vec<Bonded<D>>, owned: usize, is_implicit: bool) -> Self {
+    /// Whole bonds at the points; the rank owns so many nodes.
+    pub fn new(bonded: Vec<Bonded<D>>, owned: usize) -> Self {
         let (mut laws, mut points) = (Vec::new(), Vec::new());
         for Bonded { law, points: own } in bonded {
             points.extend(own.into_iter().map(|point| (laws.len(), point)));
@@ -66,8 +71,7 @@ impl<const D: usize> Adhesion<D> {
             laws,
             counts,
             points,
-            bonding: NodeHistory::new("bonding", nodes, owned, 1.0),
-            evolution: is_implicit.then_some(Evolution { blend: Blend::euler(0.0), length: 0.0 }),
+            bonding: NodeHistory::new(["bonding", "previous_bonding"], nodes, owned, 1.0),
             slopes: Vec::new(),
         }
     }
@@ -101,51 +105,24 @@ impl<const D: usize> Adhesion<D> {
             group
         })
     }
-}
 
-fn at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
-    std::array::from_fn(|i| nodal[point.node as usize * D + i])
-}
-
-fn push<const D: usize>(point: &SurfacePoint<D>, factor: f64, value: &Vector<D>, forces: &mut [f64]) {
-    let target = &mut forces[point.node as usize * D..][..D];
-    target.iter_mut().zip(value).for_each(|(force, value)| *force += factor * value);
-}
-
-impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
-    fn name(&self) -> &'static str {
-        "adhesion"
-    }
-
-    fn add_explicit(&mut self, step: Step, state: SurfaceState<'_>, forces: &mut [f64], energy: &mut Energy) {
+    /// Debonds by the converged displacement and adds the forces of the bonds.
+    fn add_explicit(&mut self, step: Step, displacement: &[f64], forces: &mut [f64], energy: &mut Energy) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
-            let [drive, threshold, viscosity] = self.drive(group, state.displacement);
+            let [drive, threshold, viscosity] = self.drive(group, displacement);
             [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
-            energy.debonding +=
-                (before * before - *after * *after) * self.potential(group, state.displacement);
+            energy.debonding += (before * before - *after * *after) * self.potential(group, displacement);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&at(state.displacement, point), &point.normal);
+                let traction = self.laws[*law].traction(&at(displacement, point), &point.normal);
                 push(point, point.weight * *after * *after, &traction, forces);
             }
         }
         self.bonding.trial = trial;
     }
 
-    fn is_implicit(&self) -> bool {
-        self.evolution.is_some()
-    }
-
-    fn softens(&self) -> bool {
-        true
-    }
-
-    fn begin(&mut self, blend: Blend, length: f64, _: &[f64]) {
-        self.evolution = Some(Evolution { blend, length });
-    }
-
-    fn advance(&mut self, displacement: &[f64]) {
-        let Some(evolution) = self.evolution else { return };
+    /// Debonds by the displacement at the end of a step.
+    fn advance(&mut self, evolution: Evolution, displacement: &[f64]) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         let mut slopes = std::mem::take(&mut self.slopes);
         slopes.clear();
@@ -160,8 +137,15 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         (self.bonding.trial, self.slopes) = (trial, slopes);
     }
 
-    fn add_forces(&self, displacement: &[f64], mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
-        let Some(evolution) = self.evolution else { return };
+    /// Adds minus the forces at the end of a step in which the displacement changes by `length` in s times its rate, for the
+    /// displacement that the bonding was last advanced to.
+    fn add_forces(
+        &self,
+        length: f64,
+        displacement: &[f64],
+        mut tangents: Option<&mut Tangents>,
+        forces: &mut [f64],
+    ) {
         for ((group, bonding), slope) in self.groups().zip(&self.bonding.trial).zip(&self.slopes) {
             let square = bonding * bonding;
             let (mut pull, mut gradient, mut tangent) = ([0.0; D], [0.0; D], [[0.0; D]; D]);
@@ -184,7 +168,6 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             target.iter_mut().zip(&pull).for_each(|(force, pull)| *force -= square * pull);
             if let Some(tangents) = &mut tangents {
                 // The bonding falls with the displacement. Traction and gradient of the drive are parallel as far as nothing is cut.
-                let length = evolution.blend.length;
                 let tangent = std::array::from_fn(|i| {
                     add_scaled(&tangent[i], -2.0 * bonding * slope * pull[i], &gradient).map(|t| length * t)
                 });
@@ -192,8 +175,71 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             }
         }
     }
+}
 
-    fn add_implicit_energy(&self, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy) {
+fn at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
+    std::array::from_fn(|i| nodal[point.node as usize * D + i])
+}
+
+fn push<const D: usize>(point: &SurfacePoint<D>, factor: f64, value: &Vector<D>, forces: &mut [f64]) {
+    let target = &mut forces[point.node as usize * D..][..D];
+    target.iter_mut().zip(value).for_each(|(force, value)| *force += factor * value);
+}
+
+impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
+    fn name(&self) -> &'static str {
+        "adhesion"
+    }
+
+    fn softens(&self) -> bool {
+        true
+    }
+
+    fn evaluate(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        displacement: &[f64],
+        forces: &mut [f64],
+        outcome: &mut Outcome<'_>,
+    ) {
+        match evaluation {
+            Evaluation::Converged => self.add_explicit(step, displacement, forces, &mut outcome.energy),
+            Evaluation::Start(_) => {}
+            Evaluation::End(blend) => {
+                self.advance(Evolution { blend, length: step.length }, displacement);
+                self.add_forces(blend.length, displacement, outcome.tangents.as_deref_mut(), forces);
+            }
+        }
+    }
+
+    fn add_energy(&self, evaluation: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+        for (group, bonding) in self.groups().zip(&self.bonding.converged) {
+            for (law, point) in group {
+                let (law, normal) = (&self.laws[*law], &point.normal);
+                let displacement = at(state.displacement, point);
+                let share = point.weight * bonding * bonding;
+                let potential = law.potential(&displacement, normal);
+                energy.stored_in_bonds += share * potential;
+                if evaluation == Evaluation::Converged {
+                    let change = at(state.velocity, point).map(|v| step.length * v);
+                    let before = std::array::from_fn(|i| displacement[i] - change[i]);
+                    let gain = potential - law.potential(&before, normal);
+                    energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
+                }
+            }
+        }
+    }
+
+    fn add_step_energy(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        ends: SurfaceStep<'_>,
+        energy: &mut Energy,
+    ) {
+        let Evaluation::End(blend) = evaluation else { return };
+        self.advance(Evolution { blend, length: step.length }, ends.after);
         let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
         for (group, (before, after)) in self.groups().zip(bondings) {
             let (before, after) = (before * before, after * after);
@@ -209,43 +255,17 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
-        for (group, bonding) in self.groups().zip(&self.bonding.converged) {
-            for (law, point) in group {
-                let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = at(state.displacement, point);
-                let share = point.weight * bonding * bonding;
-                let potential = law.potential(&displacement, normal);
-                energy.stored_in_bonds += share * potential;
-                if self.evolution.is_none() {
-                    let change = at(state.velocity, point).map(|v| step.length * v);
-                    let before = std::array::from_fn(|i| displacement[i] - change[i]);
-                    let gain = potential - law.potential(&before, normal);
-                    energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
-                }
-            }
-        }
-    }
-
     /// Bonds count as springs: an error `e` of `b^2` is one of `e` times the force of whole bonds.
-    fn add_error(&self, curvature: Curvature, state: SurfaceState<'_>, error: &mut StressError) {
+    fn add_error(&self, curvature: Curvature, displacement: &[f64], error: &mut StressError) {
         for (group, bonding) in self.groups().zip(self.bonding.last_three()) {
             let off = curvature.error(bonding.map(|b| b * b));
             for (law, point) in group {
-                let potential = self.laws[*law].potential(&at(state.displacement, point), &point.normal);
+                let potential = self.laws[*law].potential(&at(displacement, point), &point.normal);
                 let twice = 2.0 * point.weight * potential;
                 error.error += off * off * twice;
                 error.size += bonding[0] * bonding[0] * twice;
             }
         }
-    }
-
-    fn keep_earlier(&mut self) {
-        self.bonding.keep_earlier("previous_bonding");
-    }
-
-    fn is_elastic(&self) -> bool {
-        true
     }
 
     fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
@@ -258,19 +278,11 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn commit(&mut self) {
-        self.bonding.commit();
+    fn histories(&self) -> Vec<&dyn HistoryStore> {
+        vec![&self.bonding]
     }
 
-    fn histories(&self) -> Vec<History<'_>> {
-        vec![self.bonding.history()]
-    }
-
-    fn earlier_histories(&self) -> Vec<History<'_>> {
-        self.bonding.earlier_history().into_iter().collect()
-    }
-
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        self.bonding.restore(name, values);
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.bonding);
     }
 }

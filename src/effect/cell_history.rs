@@ -1,4 +1,7 @@
-use super::History;
+use super::{
+    history::{History, HistoryStore},
+    step::Evaluation,
+};
 use crate::{simd::Pack, space::CellRun};
 use std::borrow::Cow;
 
@@ -7,18 +10,26 @@ use std::borrow::Cow;
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
     name: &'static str,
+    earlier_name: &'static str,
+    /// Whether only laws evaluated at the end of steps need the values before the last step.
+    is_earlier_for_end: bool,
     runs: Vec<CellRun>,
     /// The position of the pack of each run, if its material keeps any.
     places: Vec<Option<u32>>,
     converged: Vec<Pack<W>>,
     trial: Vec<Pack<W>>,
-    /// Name and values before the last step.
-    earlier: Option<(&'static str, Vec<Pack<W>>)>,
+    /// Values before the last step.
+    earlier: Option<Vec<Pack<W>>>,
 }
 
 impl<const W: usize> CellHistory<W> {
-    /// Zeros for the cells of materials that `keeps`; nothing if there is no such material here or elsewhere.
-    pub fn new(name: &'static str, runs: &[CellRun], keeps: impl Fn(usize) -> bool) -> Self {
+    /// Zeros for the cells of the materials for which `keeps` holds. The names are those of the converged values and of the values
+    /// before the last step.
+    pub fn new(
+        [name, earlier_name]: [&'static str; 2],
+        runs: &[CellRun],
+        keeps: impl Fn(usize) -> bool,
+    ) -> Self {
         let mut kept = 0;
         let place = |run: &CellRun| {
             let place = keeps(run.material).then_some(kept);
@@ -27,18 +38,28 @@ impl<const W: usize> CellHistory<W> {
         };
         let places = runs.iter().map(place).collect();
         let zeros = vec![Pack::ZERO; kept as usize];
-        Self { name, runs: runs.to_vec(), places, converged: zeros.clone(), trial: zeros, earlier: None }
+        Self {
+            name,
+            earlier_name,
+            is_earlier_for_end: false,
+            runs: runs.to_vec(),
+            places,
+            converged: zeros.clone(),
+            trial: zeros,
+            earlier: None,
+        }
     }
 
-    /// Keeps the values before the last step, too, under this name, if they are not kept yet.
-    pub fn keep_earlier(&mut self, name: &'static str) {
-        self.earlier.get_or_insert_with(|| (name, self.converged.clone()));
+    /// The same history, which makes no error in the stress: only laws evaluated at the end of steps need its values before the last
+    /// step.
+    pub fn without_error(self) -> Self {
+        Self { is_earlier_for_end: true, ..self }
     }
 
     /// What the last step added in a cell; zeros where that is not kept.
     #[inline]
     pub fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
-        let (Some(place), Some((_, earlier))) = (self.place(run), &self.earlier) else { return [0.0; W] };
+        let (Some(place), Some(earlier)) = (self.place(run), &self.earlier) else { return [0.0; W] };
         std::array::from_fn(|i| self.converged[place].0[i][lane] - earlier[place].0[i][lane])
     }
 
@@ -61,42 +82,36 @@ impl<const W: usize> CellHistory<W> {
 
     /// Converged and trial values of a run of cells, if it keeps any; asks for those of the next run.
     #[inline]
-    pub fn both(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
-        if let Some(next) = self.place(run + 1) {
-            self.converged[next].prefetch();
-            self.trial[next].prefetch();
-        }
+    pub fn both(&self, run: usize) -> Option<[&Pack<W>; 2]> {
+        self.prefetch(run + 1);
+        self.place(run).map(|place| [&self.converged[place], &self.trial[place]])
+    }
+
+    /// The same, with trial values that may be written.
+    #[inline]
+    pub fn both_mut(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
+        self.prefetch(run + 1);
         self.place(run).map(|place| (&self.converged[place], &mut self.trial[place]))
+    }
+
+    #[inline]
+    fn prefetch(&self, run: usize) {
+        if let Some(place) = self.place(run) {
+            self.converged[place].prefetch();
+            self.trial[place].prefetch();
+        }
     }
 
     /// Trial and converged values of a run of cells and those before the last step, if all are kept.
     #[inline]
     pub fn last_three(&self, run: usize) -> Option<[&Pack<W>; 3]> {
-        let (place, (_, earlier)) = (self.place(run)?, self.earlier.as_ref()?);
+        let (place, earlier) = (self.place(run)?, self.earlier.as_ref()?);
         Some([&self.trial[place], &self.converged[place], &earlier[place]])
     }
 
     #[inline]
     fn place(&self, run: usize) -> Option<usize> {
         self.places.get(run).copied().flatten().map(|place| place as usize)
-    }
-
-    /// Makes the trial values the converged ones.
-    pub fn commit(&mut self) {
-        if let Some((_, earlier)) = &mut self.earlier {
-            std::mem::swap(earlier, &mut self.converged);
-        }
-        std::mem::swap(&mut self.converged, &mut self.trial);
-    }
-
-    /// The converged values for files.
-    pub fn history(&self) -> History<'_> {
-        self.written(self.name, &self.converged, 2)
-    }
-
-    /// The values before the last step for checkpoints, if they are kept.
-    pub fn earlier_history(&self) -> Option<History<'_>> {
-        self.earlier.as_ref().map(|(name, values)| self.written(name, values, 1))
     }
 
     fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
@@ -117,12 +132,34 @@ impl<const W: usize> CellHistory<W> {
         let runs = self.runs.iter().zip(&self.places);
         runs.filter_map(|(run, place)| Some((run, &values[(*place)? as usize])))
     }
+}
 
-    /// Takes values over, if they are of this name.
-    pub fn restore(&mut self, name: &str, values: &[f64]) {
+impl<const W: usize> HistoryStore for CellHistory<W> {
+    fn history(&self) -> History<'_> {
+        self.written(self.name, &self.converged, 2)
+    }
+
+    fn earlier_history(&self) -> Option<History<'_>> {
+        self.earlier.as_ref().map(|values| self.written(self.earlier_name, values, 1))
+    }
+
+    fn keep_earlier(&mut self, evaluation: Evaluation) {
+        if !(self.is_earlier_for_end && evaluation == Evaluation::Converged) {
+            self.earlier.get_or_insert_with(|| self.converged.clone());
+        }
+    }
+
+    fn commit(&mut self) {
+        if let Some(earlier) = &mut self.earlier {
+            std::mem::swap(earlier, &mut self.converged);
+        }
+        std::mem::swap(&mut self.converged, &mut self.trial);
+    }
+
+    fn restore(&mut self, name: &str, values: &[f64]) {
         let target = match &mut self.earlier {
             _ if name == self.name => &mut self.converged,
-            Some((earlier, kept)) if name == *earlier => kept,
+            Some(earlier) if name == self.earlier_name => earlier,
             _ => return,
         };
         let (values, _) = values.as_chunks::<W>();
@@ -143,23 +180,23 @@ mod tests {
     fn values_are_kept_where_needed_and_written_for_all_cells() {
         let run = |first, count, material| CellRun { first, count, material };
         let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
-        let mut history = CellHistory::<2>::new("h", &runs, |material| material == 0);
+        let mut history = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
         assert_eq!(history.converged(1), None);
-        history.both(2).expect("values").1.set(1, [7.0, 8.0]);
+        history.both_mut(2).expect("values").1.set(1, [7.0, 8.0]);
         history.set_trial(1, 0, [9.0, 9.0]);
         history.commit();
         let written = history.history();
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
         assert_eq!(written.bytes, 2 * 4 * 2 * 8);
         let values = written.values.into_owned();
-        let mut other = CellHistory::<2>::new("h", &runs, |material| material == 0);
+        let mut other = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
         other.restore("another", &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
         other.restore("h", &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [7.0, 8.0]);
         assert_eq!(other.last_change(2, 1), [0.0; 2], "not kept");
-        other.keep_earlier("before");
-        other.both(2).expect("values").1.set(1, [7.5, 6.0]);
+        other.keep_earlier(Evaluation::Converged);
+        other.both_mut(2).expect("values").1.set(1, [7.5, 6.0]);
         other.commit();
         assert_eq!(other.last_change(2, 1), [0.5, -2.0]);
         assert_eq!(other.last_change(1, 0), [0.0; 2], "no such cell");

@@ -1,6 +1,12 @@
 use super::{
-    Blend, Curvature, Energy, History, Step, StressError, SurfaceEffect, SurfaceState, SurfaceStep, Tangents,
+    energy::Energy,
+    history::HistoryStore,
     node_history::NodeHistory,
+    outcome::Outcome,
+    step::{Blend, Evaluation, Step},
+    step_error::{Curvature, StressError},
+    surface::{SurfaceEffect, SurfaceState, SurfaceStep},
+    tangents::Tangents,
 };
 use crate::{
     contact::Memory,
@@ -19,23 +25,15 @@ pub struct ContactMemory<const D: usize> {
     /// One a node, in the order of nodes.
     points: Vec<(Memory, SurfacePoint<D>)>,
     pressure: NodeHistory,
-    is_implicit: bool,
-    /// How an implicit step starts, its length in s, and the normal displacements before it in m.
-    blend: Blend,
-    length: f64,
+    /// Normal displacements before an implicit step in m.
     before: Vec<f64>,
     /// Derivatives of the pressures by the normal displacements at the end of an implicit step, in Pa/m.
     slopes: Vec<f64>,
 }
 
 impl<const D: usize> ContactMemory<D> {
-    /// Foundations that remember nothing yet, each with its points at owned nodes, and follow the displacement before steps or at
-    /// their end. Refuses edges: a node has one memory.
-    pub fn new(
-        foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>,
-        mesh: &Mesh<D>,
-        is_implicit: bool,
-    ) -> Result<Self> {
+    /// Foundations that remember nothing yet, each with its points at owned nodes. Refuses edges: a node has one memory.
+    pub fn new(foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>, mesh: &Mesh<D>) -> Result<Self> {
         let of_each = foundations.into_iter();
         let mut points: Vec<(Memory, SurfacePoint<D>)> =
             of_each.flat_map(|(law, points)| points.into_iter().map(move |point| (law, point))).collect();
@@ -50,13 +48,42 @@ impl<const D: usize> ContactMemory<D> {
         let nodes = points.iter().map(|(_, point)| point.node).collect();
         Ok(Self {
             points,
-            pressure: NodeHistory::new("memory_pressure", nodes, mesh.owned, 0.0),
-            is_implicit,
-            blend: Blend::euler(0.0),
-            length: 0.0,
+            pressure: NodeHistory::new(
+                ["memory_pressure", "previous_memory_pressure"],
+                nodes,
+                mesh.owned,
+                0.0,
+            ),
             before: Vec::new(),
             slopes: Vec::new(),
         })
+    }
+
+    /// Finds the pressures at the end of an implicit step and their derivatives.
+    fn advance(&mut self, step: Step, displacement: &[f64]) {
+        self.slopes.clear();
+        let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
+        for (((law, point), (before, after)), start) in self.points.iter().zip(pressures).zip(&self.before) {
+            let slope;
+            [*after, slope] = law.follow(*before, [*start, along(displacement, point)], step.length);
+            self.slopes.push(slope);
+        }
+    }
+
+    /// Adds minus the forces of the pressures that were found last.
+    fn add_forces(&self, blend: Blend, mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
+        for (((_, point), pressure), slope) in self.points.iter().zip(&self.pressure.trial).zip(&self.slopes)
+        {
+            push(point, point.weight * pressure, forces);
+            if let Some(tangents) = &mut tangents {
+                let stiffness = blend.length * point.weight * slope;
+                tangents.push_node(
+                    point.node,
+                    &point.normal.map(|n| point.normal.map(|m| stiffness * n * m)),
+                    true,
+                );
+            }
+        }
     }
 }
 
@@ -76,60 +103,46 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         "contact_memory"
     }
 
-    fn add_explicit(&mut self, step: Step, state: SurfaceState<'_>, forces: &mut [f64], _: &mut Energy) {
-        let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
-        for ((law, point), (before, after)) in self.points.iter().zip(pressures) {
-            *after = law.advance(*before, along(state.displacement, point), step.length);
-            push(point, -point.weight * *after, forces);
-        }
-    }
-
-    fn is_implicit(&self) -> bool {
-        self.is_implicit
-    }
-
-    fn begin(&mut self, blend: Blend, length: f64, displacement: &[f64]) {
-        (self.blend, self.length) = (blend, length);
-        self.before.clear();
-        self.before.extend(self.points.iter().map(|(_, point)| along(displacement, point)));
-    }
-
-    fn advance(&mut self, displacement: &[f64]) {
-        self.slopes.clear();
-        let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
-        for (((law, point), (before, after)), start) in self.points.iter().zip(pressures).zip(&self.before) {
-            let slope;
-            [*after, slope] = law.follow(*before, [*start, along(displacement, point)], self.length);
-            self.slopes.push(slope);
-        }
-    }
-
-    fn add_forces(&self, _: &[f64], mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
-        for (((_, point), pressure), slope) in self.points.iter().zip(&self.pressure.trial).zip(&self.slopes)
-        {
-            push(point, point.weight * pressure, forces);
-            if let Some(tangents) = &mut tangents {
-                let stiffness = self.blend.length * point.weight * slope;
-                tangents.push_node(
-                    point.node,
-                    &point.normal.map(|n| point.normal.map(|m| stiffness * n * m)),
-                    true,
-                );
+    fn evaluate(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        displacement: &[f64],
+        forces: &mut [f64],
+        outcome: &mut Outcome<'_>,
+    ) {
+        match evaluation {
+            Evaluation::Converged => {
+                let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
+                for ((law, point), (before, after)) in self.points.iter().zip(pressures) {
+                    *after = law.advance(*before, along(displacement, point), step.length);
+                    push(point, -point.weight * *after, forces);
+                }
+            }
+            Evaluation::Start(_) => {
+                self.before.clear();
+                self.before.extend(self.points.iter().map(|(_, point)| along(displacement, point)));
+            }
+            Evaluation::End(blend) => {
+                self.advance(step, displacement);
+                self.add_forces(blend, outcome.tangents.as_deref_mut(), forces);
             }
         }
     }
 
-    /// Nothing: what the pressure takes up is counted with that of the normal law.
-    fn add_implicit_energy(&self, _: Step, _: SurfaceStep<'_>, _: &mut Energy) {}
-
-    fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+    fn add_energy(&self, _: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
         for ((_, point), pressure) in self.points.iter().zip(&self.pressure.converged) {
             energy.contact += point.weight * pressure * step.length * along(state.velocity, point);
         }
     }
 
+    /// No energies: what the pressure takes up is counted with that of the normal law.
+    fn add_step_energy(&mut self, _: Evaluation, step: Step, ends: SurfaceStep<'_>, _: &mut Energy) {
+        self.advance(step, ends.after);
+    }
+
     /// The foundation counts as the spring that it is against what is held for long.
-    fn add_error(&self, curvature: Curvature, _: SurfaceState<'_>, error: &mut StressError) {
+    fn add_error(&self, curvature: Curvature, _: &[f64], error: &mut StressError) {
         for ((law, point), pressure) in self.points.iter().zip(self.pressure.last_three()) {
             let stiffness = law.stiffness();
             if stiffness > 0.0 {
@@ -140,33 +153,17 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         }
     }
 
-    fn keep_earlier(&mut self) {
-        self.pressure.keep_earlier("previous_memory_pressure");
-    }
-
-    fn is_elastic(&self) -> bool {
-        true
-    }
-
     fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
         for (law, point) in &self.points {
             push(point, point.weight * law.stiffness() * along(x, point), forces);
         }
     }
 
-    fn commit(&mut self) {
-        self.pressure.commit();
+    fn histories(&self) -> Vec<&dyn HistoryStore> {
+        vec![&self.pressure]
     }
 
-    fn histories(&self) -> Vec<History<'_>> {
-        vec![self.pressure.history()]
-    }
-
-    fn earlier_histories(&self) -> Vec<History<'_>> {
-        self.pressure.earlier_history().into_iter().collect()
-    }
-
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        self.pressure.restore(name, values);
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.pressure);
     }
 }

@@ -1,6 +1,12 @@
 use super::{
-    Blend, Curvature, Effect, Energy, History, Phases, Step, StressError, Tangents,
-    cell_history::CellHistory, evolution::Evolution,
+    cell_history::CellHistory,
+    energy::Energy,
+    evolution::Evolution,
+    history::HistoryStore,
+    interior::{Effect, Phases},
+    outcome::Outcome,
+    step::{Evaluation, Step},
+    step_error::{Curvature, StressError},
 };
 use crate::{
     material::{self, ByMaterial, Elastic},
@@ -22,24 +28,85 @@ use crate::{
 pub struct Damage {
     laws: ByMaterial<Elastic<material::Damage>>,
     damage: CellHistory<1>,
-    /// How a step advances the damage, if it is an implicit one.
-    evolution: Option<Evolution>,
 }
 
 impl Damage {
-    /// Sound cells, for the runs whose material has a law; damaged by the stress before a step or, in implicit steps, at its end.
-    pub fn new(laws: ByMaterial<Elastic<material::Damage>>, runs: &[CellRun], is_implicit: bool) -> Self {
-        let damage = CellHistory::new("damage", runs, |material| laws.get(material).is_some());
-        let evolution = is_implicit.then_some(Evolution { blend: Blend::euler(0.0), length: 0.0 });
-        Self { laws, damage, evolution }
+    /// Sound cells, for the runs whose material has a law.
+    pub fn new(laws: ByMaterial<Elastic<material::Damage>>, runs: &[CellRun]) -> Self {
+        let names = ["damage", "previous_damage"];
+        let damage = CellHistory::new(names, runs, |material| laws.get(material).is_some());
+        Self { laws, damage }
     }
+
+    /// Damages the cells of a batch by the converged stress, and weakens the batch.
+    fn advance_explicitly<const D: usize, const S: usize>(
+        &mut self,
+        step: Step,
+        batch: &mut Batch<'_, D, S>,
+        energy: &mut Energy,
+    ) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some((Pack([before]), Pack([after]))) = self.damage.both_mut(batch.number) else { return };
+        for lane in 0..batch.count {
+            let release_rate = law.release_rate(&batch.elastic_stress.lane(lane));
+            after[lane] = law.advance(before[lane], release_rate, step.length);
+            energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
+        }
+        batch.integrity.weaken(left(after));
+    }
+
+    /// Damages the cells of a batch by the sound stress at the end of a step, takes from their stress what they no longer bear, and
+    /// weakens the batch.
+    fn advance_implicitly<const D: usize, const S: usize>(
+        &mut self,
+        evolution: Evolution,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(&Pack([before])) = self.damage.converged(batch.number) else { return };
+        let mut left = [1.0; LANES];
+        for lane in 0..batch.count {
+            let sound = batch.elastic_stress.lane(lane);
+            let release_rate = law.release_rate(&sound);
+            let [last] = self.damage.last_change(batch.number, lane);
+            let relax = |start, length| law.relax(start, release_rate, length);
+            let [damage, slope] = evolution.advance(before[lane], last, relax);
+            self.damage.set_trial(batch.number, lane, [damage]);
+            left[lane] = 1.0 - damage;
+            if damage == 0.0 {
+                continue;
+            }
+            batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
+            if let Some(tangents) = &mut outcome.tangents {
+                let (tangent, flows) = tangents.entry::<S>(batch.first + lane);
+                let growth = Growth { damage, slope, length: evolution.blend.length };
+                weaken_tangent(law, growth, &sound, tangent);
+                if flows && slope != 0.0 {
+                    tangents.mark_skew();
+                }
+            }
+        }
+        batch.integrity.weaken(left);
+        outcome.has_flowed |= left != [1.0; LANES];
+    }
+}
+
+/// Damage of a cell at the end of an implicit step.
+#[derive(Clone, Copy)]
+struct Growth {
+    damage: f64,
+    /// Its derivative by the energy release rate, in m^d/J.
+    slope: f64,
+    /// `k'` of the step in s.
+    length: f64,
 }
 
 /// Writes the change of the derivative of a cell's stress by its strain rate, beyond `k' E`, where the cell bears `1 - damage` of the
 /// sound stress: `(1 - d) C - dd/dY S (x) C^T E^-1 S` with the derivative `C` of the sound stress `S`.
 fn weaken_tangent<const S: usize>(
     law: &Elastic<material::Damage>,
-    (damage, slope, length): (f64, f64, f64),
+    Growth { damage, slope, length }: Growth,
     sound: &Mandel<S>,
     beyond: &mut [f64],
 ) {
@@ -72,69 +139,37 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         "damage"
     }
 
-    fn phases(&self) -> Phases {
+    fn phases(&self, evaluation: Evaluation) -> Phases {
         let stress = Needs { strain: true, elastic_stress: true, ..Needs::default() };
-        let explicit = Some(stress).filter(|_| self.evolution.is_none());
-        Phases { explicit, error: Some(stress), weakens: true, ..Phases::default() }
-    }
-
-    fn is_everywhere(&self) -> bool {
-        self.laws.is_everywhere()
-    }
-
-    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
-        let Some(law) = self.laws.get(batch.material) else { return };
-        let Some((Pack([before]), Pack([after]))) = self.damage.both(batch.number) else { return };
-        for lane in 0..batch.count {
-            let release_rate = law.release_rate(&batch.elastic_stress.lane(lane));
-            after[lane] = law.advance(before[lane], release_rate, step.length);
-            energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
+        let is_explicit = evaluation == Evaluation::Converged;
+        Phases {
+            start: is_explicit.then_some(stress),
+            end: !is_explicit,
+            error: Some(stress),
+            weakens: true,
+            ..Phases::default()
         }
-        batch.integrity.weaken(left(after));
     }
 
-    fn begin(&mut self, blend: Blend, length: f64) {
-        self.evolution = Some(Evolution { blend, length });
-    }
-
-    fn flows(&self) -> bool {
-        self.evolution.is_some()
-    }
-
-    /// Given the sound stress in the batch; weakens the batch as well.
-    fn add_flow(&mut self, batch: &mut Batch<D, S>, mut tangents: Option<&mut Tangents>) -> bool {
-        let (Some(law), Some(evolution)) = (self.laws.get(batch.material), self.evolution) else {
-            return false;
-        };
-        let Some(&Pack([before])) = self.damage.converged(batch.number) else { return false };
-        let mut left = [1.0; LANES];
-        for lane in 0..batch.count {
-            let sound = batch.elastic_stress.lane(lane);
-            let release_rate = law.release_rate(&sound);
-            let [last] = self.damage.last_change(batch.number, lane);
-            let relax = |start, length| law.relax(start, release_rate, length);
-            let [damage, slope] = evolution.advance(before[lane], last, relax);
-            self.damage.set_trial(batch.number, lane, [damage]);
-            left[lane] = 1.0 - damage;
-            if damage == 0.0 {
-                continue;
-            }
-            batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
-            if let Some(tangents) = &mut tangents {
-                let (tangent, flows) = tangents.entry::<S>(batch.first + lane);
-                weaken_tangent(law, (damage, slope, evolution.blend.length), &sound, tangent);
-                if flows && slope != 0.0 {
-                    tangents.mark_skew();
-                }
+    fn evaluate(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        match evaluation {
+            Evaluation::Converged => self.advance_explicitly(step, batch, &mut outcome.energy),
+            Evaluation::Start(_) => {}
+            Evaluation::End(blend) => {
+                self.advance_implicitly(Evolution { blend, length: step.length }, batch, outcome);
             }
         }
-        batch.integrity.weaken(left);
-        left != [1.0; LANES]
     }
 
-    fn add_implicit_energy(&mut self, _step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+    fn add_step_energy(&self, _: Evaluation, _: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let Some((Pack([before]), Pack([after]))) = self.damage.both(batch.number) else { return };
+        let Some([Pack([before]), Pack([after])]) = self.damage.both(batch.number) else { return };
         for lane in 0..batch.count {
             let stresses = [&batch.elastic_stress_before, &batch.elastic_stress];
             let [first, last] = stresses.map(|stress| law.release_rate(&stress.lane(lane)));
@@ -144,14 +179,14 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
-    fn weaken(&self, batch: &mut Batch<D, S>) {
+    fn weaken(&self, batch: &mut Batch<'_, D, S>) {
         if let Some(Pack([damage])) = self.damage.converged(batch.number) {
             batch.integrity.weaken(left(damage));
         }
     }
 
     /// An error `e` of the damage is one of `e` times the stress of the sound cell.
-    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some([Pack([now]), Pack([before]), Pack([earlier])]) = self.damage.last_three(batch.number)
         else {
@@ -165,23 +200,11 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         batch.integrity.weaken(left(now));
     }
 
-    fn keep_earlier(&mut self) {
-        self.damage.keep_earlier("previous_damage");
+    fn histories(&self) -> Vec<&dyn HistoryStore> {
+        vec![&self.damage]
     }
 
-    fn commit(&mut self) {
-        self.damage.commit();
-    }
-
-    fn histories(&self) -> Vec<History<'_>> {
-        vec![self.damage.history()]
-    }
-
-    fn earlier_histories(&self) -> Vec<History<'_>> {
-        self.damage.earlier_history().into_iter().collect()
-    }
-
-    fn restore(&mut self, name: &str, values: &[f64]) {
-        self.damage.restore(name, values);
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.damage);
     }
 }

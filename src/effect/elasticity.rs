@@ -1,33 +1,25 @@
-use super::{Curvature, Effect, Energy, Form, Phases, Step, StressError, isotropic};
+use super::{
+    energy::Energy,
+    interior::{Effect, Phases},
+    isotropic,
+    outcome::Outcome,
+    step::{Evaluation, Step},
+    step_error::{Curvature, StressError},
+    term::{ElasticLaw, Term},
+};
 use crate::{
-    material::{ByMaterial, Isotropic},
+    material::ByMaterial,
     simd::Pack,
-    space::{Batch, CellMatrix, Integrity, Needs, Simplex},
+    space::{Batch, Integrity, Needs},
     tensor::{add_scaled, dot},
 };
 
-/// Elastic stress `E e(u)`: of the displacement before the step, `E e(u_{n-1})` in (24), or of that at its end, `u_n = u~ + k' v_n`, where
-/// `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.
+/// Elastic stress `E e(u)`: of the converged displacement, `E e(u_{n-1})` in (24), or of that at the end of the step, `u_n = u~ + k' v_n`,
+/// where `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.
 #[derive(Debug)]
 pub struct Elasticity {
-    law: ByMaterial<ElasticLaw>,
-    is_implicit: bool,
-}
-
-/// An elastic material.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ElasticLaw {
-    /// The elastic tensor `E` in Pa.
-    pub tensor: Isotropic,
-    /// Whether a history adds to the elastic stress, which then accounts for its energy.
-    pub with_history: bool,
-}
-
-impl Elasticity {
-    /// Elasticity of these materials, at the end of steps or before them.
-    pub fn new(law: ByMaterial<ElasticLaw>, is_implicit: bool) -> Self {
-        Self { law, is_implicit }
-    }
+    /// The elastic materials.
+    pub law: ByMaterial<ElasticLaw>,
 }
 
 impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
@@ -35,41 +27,53 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         "elasticity"
     }
 
-    fn phases(&self) -> Phases {
+    fn phases(&self, evaluation: Evaluation) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
-        let after = Needs { strain_rate: !self.is_implicit, ..strain };
+        let after = Needs { strain_rate: evaluation == Evaluation::Converged, ..strain };
         Phases {
-            matrix: self.is_implicit,
-            explicit: Some(strain),
+            start: Some(strain),
             energy: Some(after),
             stress: Some(after),
             error: Some(strain),
-            weakens: false,
+            ..Phases::default()
         }
     }
 
-    fn is_everywhere(&self) -> bool {
-        self.law.is_everywhere()
+    fn term(&self) -> Term<'_> {
+        Term::Elasticity(&self.law)
     }
 
-    fn add_matrix(&self, material: usize, cell: &Simplex<D>, length: f64, matrix: &mut CellMatrix<D>) {
-        if let Some(law) = self.law.get(material) {
-            matrix.add_isotropic(cell, length * law.tensor.volumetric, length * law.tensor.shear);
-        }
+    fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<'_, D, S>, _: &mut Outcome<'_>) {
+        let Some(law) = self.law.get(batch.material) else { return };
+        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
-    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+    fn add_elastic_stress(&self, batch: &mut Batch<'_, D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
         let sound = Integrity::default();
         isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &sound, &mut batch.elastic_stress);
     }
 
-    fn add_explicit(&mut self, _step: Step, batch: &mut Batch<D, S>, _energy: &mut Energy) {
+    fn add_stress(&self, evaluation: Evaluation, step: Step, batch: &mut Batch<'_, D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
-        isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
+        let before = |lane| add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane));
+        let is_lagged = evaluation == Evaluation::Converged;
+        let strain = if is_lagged { Pack::from_lanes(before) } else { batch.strain };
+        isotropic::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
     }
 
-    fn add_implicit_energy(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+    fn add_energy(&self, evaluation: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+        let Some(law) = self.law.get(batch.material) else { return };
+        let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
+        if !law.with_history {
+            energy.elastic += 0.5 * square(&batch.strain);
+        }
+        if evaluation == Evaluation::Converged {
+            energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
+        }
+    }
+
+    fn add_step_energy(&self, _: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
         let share = batch.integrity.shares();
         for lane in 0..batch.count {
@@ -82,39 +86,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         }
     }
 
-    fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
-        let Some(law) = self.law.get(batch.material) else { return };
-        let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
-        if !law.with_history {
-            energy.elastic += 0.5 * square(&batch.strain);
-        }
-        if !self.is_implicit {
-            energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
-        }
-    }
-
-    fn add_error(&self, _curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+    fn add_error(&self, _: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
         error.size += isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
-    }
-
-    fn form(&self) -> Option<Form> {
-        Some(Form::Elasticity)
-    }
-
-    fn tensor(&self, material: usize) -> Option<Isotropic> {
-        self.law.get(material).map(|law| law.tensor)
-    }
-
-    fn add_form(&self, batch: &mut Batch<D, S>) {
-        let Some(law) = self.law.get(batch.material) else { return };
-        isotropic::add_stresses(&law.tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
-    }
-
-    fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
-        let Some(law) = self.law.get(batch.material) else { return };
-        let before = |lane| add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane));
-        let strain = if self.is_implicit { batch.strain } else { Pack::from_lanes(before) };
-        isotropic::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
     }
 }

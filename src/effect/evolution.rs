@@ -1,4 +1,4 @@
-use super::Blend;
+use super::step::Blend;
 
 /// How an implicit step advances an internal variable of one number that changes in one direction only, such as damage or bonding.
 ///

@@ -1,13 +1,7 @@
 //! The error that a step makes in stresses and histories.
 
-use super::Step;
-use crate::{
-    material::Isotropic,
-    simd::Pack,
-    space::{Integrity, SimplexPack},
-};
-
-use super::isotropic;
+use super::{isotropic, step::Step};
+use crate::{material::Isotropic, simd::Pack, space::Batch};
 
 /// What no straight line through the last values has of the next one: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
 /// x_{n-2}))` with `w = k_n / k_{n-1}`, the local error of implicit Euler. In the first step values count as steady before it.
@@ -46,21 +40,21 @@ pub struct StressError {
 }
 
 impl StressError {
-    /// Adds a history of stresses of these cells and its error, given its values at the end of the step and before it, and the
-    /// strain at its end.
+    /// Adds a history of stresses of the cells of a batch and its error, given its values at the end of the step, before it and before
+    /// the step before it.
     pub(super) fn add_history<const D: usize, const S: usize>(
         &mut self,
         elasticity: &Isotropic,
-        (cells, integrity): (&SimplexPack<D>, &Integrity),
-        strain: &Pack<S>,
+        batch: &Batch<'_, D, S>,
         curvature: Curvature,
         [now, before, earlier]: [&Pack<S>; 3],
     ) {
         let error: Pack<S> = Pack::from_lanes(|lane| {
             std::array::from_fn(|c| curvature.error([now, before, earlier].map(|values| values.0[c][lane])))
         });
+        let (cells, integrity) = (batch.cells, &batch.integrity);
         self.error += isotropic::inverse_square(elasticity, cells, integrity, &Pack::ZERO, &error);
-        self.size += isotropic::inverse_square(elasticity, cells, integrity, strain, now);
+        self.size += isotropic::inverse_square(elasticity, cells, integrity, &batch.strain, now);
     }
 }
 

@@ -1,4 +1,10 @@
-use super::{Blend, Curvature, Energy, History, Step, StressError, Tangents};
+use super::{
+    energy::Energy,
+    history::HistoryStore,
+    outcome::Outcome,
+    step::{Evaluation, Step},
+    step_error::{Curvature, StressError},
+};
 
 /// Nodal fields of the converged state with ghosts, `D` values a node.
 #[derive(Debug, Clone, Copy)]
@@ -20,68 +26,53 @@ pub struct SurfaceStep<'a> {
     pub velocity: &'a [f64],
 }
 
-/// An effect at nodes of boundaries. Its force follows the displacement before the step or, in implicit steps, that at the end.
+/// An effect at nodes of boundaries whose force follows the displacement.
 pub trait SurfaceEffect<const D: usize> {
     /// Its name in logs and `summary.json`.
     fn name(&self) -> &'static str;
-
-    /// Adds its force in N at the nodes of this rank, from the converged state; may write its trial history. Adds what it
-    /// dissipates in the step, if that is known now.
-    fn add_explicit(&mut self, step: Step, state: SurfaceState<'_>, forces: &mut [f64], energy: &mut Energy);
-
-    /// Whether its force follows the displacement at the end of steps.
-    fn is_implicit(&self) -> bool;
 
     /// Whether its force may fall as the displacement grows.
     fn softens(&self) -> bool {
         false
     }
 
-    /// Takes in how an implicit step of this length in s starts, and the displacement before it.
-    fn begin(&mut self, blend: Blend, length: f64, displacement: &[f64]);
+    /// Evaluates its law at this displacement (`D` values a node, with ghosts) and writes its trial history.
+    ///
+    /// With the converged state it adds its force in N at the nodes of this rank to `forces`. At the start of an implicit step it is given
+    /// the converged displacement and adds nothing. At the end it adds minus its force, and the derivatives by the velocity, where
+    /// the outcome takes them.
+    fn evaluate(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        displacement: &[f64],
+        forces: &mut [f64],
+        outcome: &mut Outcome<'_>,
+    );
 
-    /// Finds its history at the end of an implicit step with this displacement and writes it as the trial history.
-    fn advance(&mut self, displacement: &[f64]);
+    /// Adds its energies after the commit.
+    fn add_energy(&self, evaluation: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
 
-    /// Adds minus its force in N at the end of an implicit step with the displacement that it was last advanced to and, where they are
-    /// wanted, the derivatives by the velocity.
-    fn add_forces(&self, displacement: &[f64], tangents: Option<&mut Tangents>, forces: &mut [f64]);
-
-    /// Adds the energies of an implicit step that need the histories before and after it: what it dissipates, and the terms of
-    /// the scheme.
-    fn add_implicit_energy(&self, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy);
-
-    /// Adds its energies after the step was committed.
-    fn add_energy(&self, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
+    /// Writes the trial history of a solved implicit step and adds the energies that need the histories before and after it: what it
+    /// dissipates, and the terms of the scheme.
+    fn add_step_energy(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        ends: SurfaceStep<'_>,
+        energy: &mut Energy,
+    );
 
     /// Adds the force at the end of a step that was solved and not yet committed, given the displacement there, and the error that
-    /// its trial history makes in it, beside those before: see [`super::Effect::add_error`].
-    fn add_error(&self, curvature: Curvature, state: SurfaceState<'_>, error: &mut StressError);
-
-    /// Keeps the histories before the last step from now on that [`SurfaceEffect::add_error`] needs.
-    fn keep_earlier(&mut self);
-
-    /// Whether its force follows the displacement, which bounds the step.
-    fn is_elastic(&self) -> bool {
-        false
-    }
+    /// its trial history makes in it, given those before.
+    fn add_error(&self, curvature: Curvature, displacement: &[f64], error: &mut StressError);
 
     /// Adds to `forces` the force against nodal values `x` of the largest stiffness it can have.
-    fn add_stiffness(&self, _x: &[f64], _forces: &mut [f64]) {}
+    fn add_stiffness(&self, x: &[f64], forces: &mut [f64]);
 
-    /// Makes the trial history the converged one.
-    fn commit(&mut self) {}
+    /// The histories that it keeps at nodes.
+    fn histories(&self) -> Vec<&dyn HistoryStore>;
 
-    /// The converged histories that it keeps at nodes.
-    fn histories(&self) -> Vec<History<'_>> {
-        Vec::new()
-    }
-
-    /// Histories before the last step that it keeps.
-    fn earlier_histories(&self) -> Vec<History<'_>> {
-        Vec::new()
-    }
-
-    /// Takes a saved history of this name over, laid out as [`SurfaceEffect::histories`] gives it.
-    fn restore(&mut self, _name: &str, _values: &[f64]) {}
+    /// Visits the same histories.
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore));
 }

@@ -24,8 +24,8 @@ impl Tangents {
         self.values.reserve(cells * S * S);
     }
 
-    /// Adds a cell by its local number; tells whether its matrix is as symmetric as that of
-    /// [`has_symmetric_tangent`](super::Effect::has_symmetric_tangent).
+    /// Adds the matrix of a cell by its local number; `symmetric` is whether it is symmetric, if
+    /// [`FlowProperties::has_symmetric_tangent`](super::FlowProperties::has_symmetric_tangent) says so of its effect.
     pub fn push<const S: usize>(&mut self, cell: usize, tangent: &Tangent<S>, symmetric: bool) {
         self.skew |= !symmetric;
         self.cells.push(cell as u32);

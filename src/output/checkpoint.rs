@@ -110,11 +110,8 @@ pub fn save<const D: usize, const S: usize>(
         width: D,
         values: p,
     }));
-    let kept = body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
-    let of_cells: Vec<History> = kept.collect();
-    let kept =
-        body.surface_effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
-    let of_nodes: Vec<History> = kept.collect();
+    let of_cells: Vec<History> = body.all_cell_histories().collect();
+    let of_nodes: Vec<History> = body.all_node_histories().collect();
     for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
         let table = |h| {
             let History { name, width, values, .. }: &History = h;
@@ -154,21 +151,15 @@ pub fn restore<const D: usize, const S: usize>(
         fill(previous, &values[0])?;
     }
     let cells = cell_ids(body);
-    for effect in &mut body.effects {
-        let kept: Vec<(&str, usize)> =
-            effect.histories().iter().chain(&effect.earlier_histories()).map(|h| (h.name, h.width)).collect();
-        let values = checkpoint.read("cells", body.mesh.total_cells as u64, &kept, &cells)?;
-        for ((name, _), values) in kept.iter().zip(&values) {
-            effect.restore(name, values);
-        }
-    }
-    for effect in &mut body.surface_effects {
-        let kept: Vec<(&str, usize)> =
-            effect.histories().iter().chain(&effect.earlier_histories()).map(|h| (h.name, h.width)).collect();
-        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &kept, &nodes)?;
-        for ((name, _), values) in kept.iter().zip(&values) {
-            effect.restore(name, values);
-        }
+    let kept = |history: History<'_>| (history.name, history.width);
+    let of_cells: Vec<(&str, usize)> = body.all_cell_histories().map(kept).collect();
+    let of_nodes: Vec<(&str, usize)> = body.all_node_histories().map(kept).collect();
+    let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
+    for (set, total, kept, ids) in
+        [("cells", total_cells, &of_cells, &cells), ("nodes", total_nodes, &of_nodes, &nodes)]
+    {
+        let values = checkpoint.read(set, total, kept, ids)?;
+        kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)

@@ -87,12 +87,16 @@ impl<const D: usize> FieldOutput<D> {
         for (OutputField { name, place, shape, .. }, computed) in &computed {
             fields.push(Field { name, place: *place, shape: *shape, values: &**computed.values });
         }
-        let of_cells: Vec<History> = at.body.effects.iter().flat_map(|e| e.histories()).collect();
+        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
+        if let Some(values) = traction.as_deref() {
+            fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
+        }
+        let of_cells: Vec<History> = at.body.cell_histories().collect();
         for history in &of_cells {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
         }
-        let of_nodes: Vec<History> = at.body.surface_effects.iter().flat_map(|e| e.histories()).collect();
+        let of_nodes: Vec<History> = at.body.node_histories().collect();
         for history in &of_nodes {
             let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
             fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });

@@ -30,7 +30,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let mut state = session.agree(State::at_rest(&mesh))?;
     let supports = supports(job, &mesh);
     let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry, job.time.scheme))?;
+    let effects = session.agree(effects(&materials, &geometry))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {
@@ -53,7 +53,8 @@ pub(super) fn body<const D: usize, const S: usize>(
     session.agree(initial(job, &mesh, &fixed, &mut state))?;
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
-    let mut body = Body { mesh, geometry, effects, contacts, surface_effects, load, fixed };
+    let mut body = Body::new(mesh, geometry, effects, fixed, evaluation(job.time.scheme));
+    (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
         body.keep_earlier();
     }
@@ -80,25 +81,24 @@ fn materials<'a, const D: usize>(
 fn effects<const D: usize, const S: usize>(
     materials: &[&Material],
     geometry: &Geometry<D>,
-    scheme: Scheme,
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
     if let Some(density) = by_material(materials, |m| m.density) {
         effects.push(Box::new(Inertia { density }));
     }
     if let Some(law) = by_material(materials, elastic_law::<S>) {
-        effects.push(Box::new(effect::Elasticity::new(law, scheme.is_implicit())));
+        effects.push(Box::new(effect::Elasticity { law }));
     }
     if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
         effects.push(Box::new(ViscousStress { tensor }));
     }
     let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
-        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs, scheme.is_implicit())));
+        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs)));
     }
     let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
-        effects.push(Box::new(Damage::new(laws, &geometry.runs, scheme.is_implicit())));
+        effects.push(Box::new(Damage::new(laws, &geometry.runs)));
     }
     Ok(effects)
 }
@@ -110,7 +110,6 @@ fn surface_effects<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
-    let is_implicit = job.time.scheme.is_implicit();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
     for contact in &job.contact {
         let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
@@ -122,10 +121,10 @@ fn surface_effects<const D: usize>(
         }
     }
     if !bonded.is_empty() {
-        effects.push(Box::new(Adhesion::new(bonded, mesh.owned, is_implicit)));
+        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
     }
     if !foundations.is_empty() {
-        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh, is_implicit))?));
+        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh))?));
     }
     Ok(effects)
 }

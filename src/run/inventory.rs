@@ -27,11 +27,7 @@ impl Inventory {
         scheme: &Stepper,
     ) -> Self {
         let mut history_bytes = BTreeMap::new();
-        let of_nodes =
-            body.surface_effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
-        let of_cells =
-            body.effects.iter().flat_map(|e| e.histories().into_iter().chain(e.earlier_histories()));
-        for history in of_cells.chain(of_nodes) {
+        for history in body.all_cell_histories().chain(body.all_node_histories()) {
             let bytes = session.total(history.bytes);
             history_bytes.insert(history.name.to_owned(), bytes as u64);
         }

@@ -13,7 +13,7 @@ pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_
 pub enum Start {
     /// The initial state.
     Anew,
-    /// The initial state, even over the results of another job.
+    /// The initial state, overwriting the results of another job.
     Over,
     /// The newest good checkpoint of the output folder.
     Newest,
@@ -22,13 +22,13 @@ pub enum Start {
 }
 
 impl Start {
-    /// Whether the run starts behind an earlier one.
+    /// Whether the run continues an earlier one.
     pub(super) fn goes_on(&self) -> bool {
         matches!(self, Self::Newest | Self::From(_))
     }
 }
 
-/// When the process began, how long MPI and PETSc took to start, and who watches.
+/// The start of the process, and whether its log is shown.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     /// The beginning.

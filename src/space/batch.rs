@@ -54,6 +54,18 @@ pub struct Nodal<'a> {
     pub previous_velocity: &'a [f64],
 }
 
+impl<'a> Nodal<'a> {
+    /// The same values for all fields, where a pass reads only one of them.
+    pub fn all(values: &'a [f64]) -> Self {
+        Self {
+            displacement: values,
+            previous_displacement: values,
+            velocity: values,
+            previous_velocity: values,
+        }
+    }
+}
+
 /// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Integrity(Option<[f64; LANES]>);

@@ -36,7 +36,7 @@ pub use linear_solver::{
     FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize, SolverSettings,
 };
 pub use outcome::StepOutcome;
-pub use scheme::Scheme;
+pub use scheme::{Scheme, evaluation};
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
 pub use step_length::{Landing, Landings, SNAP, next_step};

@@ -3,7 +3,7 @@
 use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
 use crate::{
     body::Body,
-    effect::{Energy, Peaks, Step},
+    effect::{Blend, Energy, Evaluation, Peaks, Step},
     error::Result,
     petsc::DistributedVector,
     session::Session,
@@ -11,6 +11,11 @@ use crate::{
 };
 
 pub use crate::job::Scheme;
+
+/// The state at which laws are evaluated under a scheme, before the first step.
+pub fn evaluation(scheme: Scheme) -> Evaluation {
+    if scheme.is_implicit() { Evaluation::End(Blend::euler(0.0)) } else { Evaluation::Converged }
+}
 
 /// A scheme with what it keeps from one part of a step to the next.
 pub(super) enum Method {

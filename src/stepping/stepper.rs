@@ -77,7 +77,7 @@ impl Stepper {
             set_ups: 0,
             clock: StepClock::default(),
             traffic: StepTraffic::default(),
-            passes: body.pass_bytes(),
+            passes: PassBytes::of(body),
         })
     }
 

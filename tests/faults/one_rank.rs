@@ -4,13 +4,14 @@
 use crate::mpirun;
 use clarke::{
     agreement::Agreed,
-    effect::{Effect, Energy, Phases, Step},
+    effect::{Effect, Evaluation, Outcome, Phases, Step, Term},
     error::Exit,
     job::Job,
+    material::ByMaterial,
     mesh::generate::{Diagonal, rectangle},
     run::Simulation,
     session::{Mpi, Session},
-    space::{Batch, CellMatrix, Needs, Simplex},
+    space::{Batch, Needs},
 };
 use std::path::Path;
 
@@ -26,7 +27,7 @@ enum Fault {
 struct Faulty {
     fault: Fault,
     here: bool,
-    calls: usize,
+    density: ByMaterial<f64>,
 }
 
 impl Effect<2, 3> for Faulty {
@@ -34,22 +35,15 @@ impl Effect<2, 3> for Faulty {
         "faulty"
     }
 
-    fn phases(&self) -> Phases {
-        Phases { matrix: true, explicit: Some(Needs::default()), ..Phases::default() }
+    fn phases(&self, _: Evaluation) -> Phases {
+        Phases { start: Some(Needs::default()), ..Phases::default() }
     }
 
-    fn is_everywhere(&self) -> bool {
-        true
+    fn term(&self) -> Term<'_> {
+        Term::Mass(&self.density)
     }
 
-    fn add_matrix(&self, _: usize, _: &Simplex<2>, _: f64, matrix: &mut CellMatrix<2>) {
-        if self.here && self.fault == Fault::Assembly {
-            matrix.blocks[0][0][0][0] = f64::NAN;
-        }
-    }
-
-    fn add_explicit(&mut self, step: Step, batch: &mut Batch<2, 3>, _: &mut Energy) {
-        self.calls += 1;
+    fn evaluate(&mut self, _: Evaluation, step: Step, batch: &mut Batch<'_, 2, 3>, _: &mut Outcome<'_>) {
         let now = self.here && step.time > 0.11;
         assert!(!now || self.fault != Fault::Panic, "this law panicked at t = {} s", step.time);
         if now && self.fault == Fault::Law {
@@ -81,7 +75,9 @@ pub fn fail(name: &str) -> Exit {
         session.is_first().then(|| rectangle([1.0, 1.0], [8, 8], Diagonal::Right, [1.0; 2]).expect("mesh"));
     let mut simulation = Simulation::<2, 3>::new(&session, &mut loaded, mesh).expect("set up");
     let here = session.rank() + 1 == session.ranks();
-    simulation.body.effects.push(Box::new(Faulty { fault, here, calls: 0 }));
+    let density = if here && fault == Fault::Assembly { f64::NAN } else { 0.0 };
+    let faulty = Faulty { fault, here, density: ByMaterial::uniform(density) };
+    simulation.body.effects.push(Box::new(faulty));
     let mut steps = 0;
     let ended = loop {
         match session.agree(simulation.advance(&session)) {

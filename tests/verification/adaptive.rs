@@ -143,7 +143,7 @@ fn fields(run: &Simulation<2, 3>) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = [&state.displacement, &state.velocity, &state.previous_velocity]
         .map(|field| field.owned().expect("values").to_vec())
         .into();
-    all.extend(run.body.effects.iter().flat_map(|e| e.histories()).map(|h| h.values.into_owned()));
+    all.extend(run.body.cell_histories().map(|h| h.values.into_owned()));
     all
 }
 

@@ -91,15 +91,13 @@ fn job<const D: usize>(
 /// The bonding at the nodes here that lie low, and whether all others have none.
 fn bonding<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     let mut found = Vec::new();
-    for effect in &run.body.surface_effects {
-        for history in effect.histories() {
-            assert_eq!((history.name, history.width), ("bonding", 1));
-            for (node, value) in history.values.iter().enumerate() {
-                if run.body.mesh.nodes[node][D - 1].abs() < 1e-12 {
-                    found.push(*value);
-                } else {
-                    assert_eq!(*value, 0.0, "no bonds off the boundary");
-                }
+    for history in run.body.node_histories() {
+        assert_eq!((history.name, history.width), ("bonding", 1));
+        for (node, value) in history.values.iter().enumerate() {
+            if run.body.mesh.nodes[node][D - 1].abs() < 1e-12 {
+                found.push(*value);
+            } else {
+                assert_eq!(*value, 0.0, "no bonds off the boundary");
             }
         }
     }
@@ -169,7 +167,7 @@ fn corner(session: &Session) {
     let mut run = simulation::<2, 4>(session, &job, &mesh);
     while run.advance(session).expect("a step").is_some() {}
     let mut values = [0.0; 4];
-    for history in run.body.surface_effects.iter().flat_map(|e| e.histories()) {
+    for history in run.body.node_histories() {
         for (node, value) in history.values.iter().enumerate() {
             values[run.body.mesh.node_ids[node] as usize] = *value;
         }

@@ -4,15 +4,15 @@ use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
     effect::{
-        Damage, Effect, ElasticLaw, Elasticity, Energy, Inertia, Phases, Step, ViscoplasticFlow,
-        ViscousStress,
+        Damage, Effect, ElasticLaw, Elasticity, Energy, Evaluation, Inertia, Outcome, Phases, Step, Term,
+        ViscoplasticFlow, ViscousStress,
     },
     job::Job,
     material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
     run::{Inventory, Simulation},
     session::Session,
     simd::LANES,
-    space::{Batch, CellMatrix, Geometry, Simplex},
+    space::{Batch, Geometry},
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
 
@@ -53,57 +53,53 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
         self.inner.name()
     }
 
-    fn phases(&self) -> Phases {
-        self.inner.phases()
+    fn phases(&self, evaluation: Evaluation) -> Phases {
+        self.inner.phases(evaluation)
     }
 
-    fn is_everywhere(&self) -> bool {
-        self.inner.is_everywhere()
+    fn term(&self) -> Term<'_> {
+        self.inner.term()
     }
 
-    fn add_matrix(
-        &self,
-        material: usize,
-        geometry: &Simplex<D>,
-        step_length: f64,
-        matrix: &mut CellMatrix<D>,
-    ) {
-        self.note("matrix");
-        self.inner.add_matrix(material, geometry, step_length, matrix);
-    }
-
-    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+    fn add_elastic_stress(&self, batch: &mut Batch<'_, D, S>) {
         self.note_batch("elastic stress", batch);
         self.inner.add_elastic_stress(batch);
     }
 
-    fn weaken(&self, batch: &mut Batch<D, S>) {
+    fn weaken(&self, batch: &mut Batch<'_, D, S>) {
         self.note("weaken");
         self.inner.weaken(batch);
     }
 
-    fn add_explicit(&mut self, step: Step, batch: &mut Batch<D, S>, energy: &mut Energy) {
+    fn evaluate(
+        &mut self,
+        evaluation: Evaluation,
+        step: Step,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
         self.note_batch("explicit", batch);
-        self.inner.add_explicit(step, batch, energy);
+        assert_eq!(evaluation, Evaluation::Converged);
+        self.inner.evaluate(evaluation, step, batch, outcome);
     }
 
-    fn add_energy(&self, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+    fn add_energy(&self, evaluation: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
         self.note_batch("energy", batch);
-        self.inner.add_energy(step, batch, energy);
+        self.inner.add_energy(evaluation, step, batch, energy);
     }
 
-    fn add_stress(&self, step: Step, batch: &mut Batch<D, S>) {
+    fn add_stress(&self, evaluation: Evaluation, step: Step, batch: &mut Batch<'_, D, S>) {
         self.note_batch("stress", batch);
-        self.inner.add_stress(step, batch);
+        self.inner.add_stress(evaluation, step, batch);
     }
 }
 
-/// What a body that feels these effects sees in all phases of a step, the number of its cells, and that of its batches.
+/// What a body that feels these effects sees in all phases of a step, and the number of its batches.
 fn seen_by<const D: usize, const S: usize>(
     session: &Session,
     whole: &clarke::mesh::GlobalMesh<D>,
     watch: impl Fn(&Rc<RefCell<Seen>>) -> Vec<Box<dyn Effect<D, S>>>,
-) -> (Seen, usize, usize) {
+) -> (Seen, usize) {
     let seen = Rc::default();
     let (mut body, state) = body::<D, S>(session, whole, &[], watch(&seen));
     let step = Step { time: 0.1, length: 0.1, previous_length: 0.1 };
@@ -112,45 +108,34 @@ fn seen_by<const D: usize, const S: usize>(
     body.add_explicit_forces(&state, step, &mut forces).expect("forces");
     body.energy(&state, step).expect("energy");
     body.stress(&state).expect("stress");
-    let cells = body.mesh.cell_count();
+    let batches = body.mesh.cell_count().div_ceil(LANES);
     drop(body);
-    (Rc::try_unwrap(seen).expect("the only one").into_inner(), cells, cells.div_ceil(LANES))
+    (Rc::try_unwrap(seen).expect("the only one").into_inner(), batches)
 }
 
 fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
-    let (seen, cells, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: Inertia { density: ByMaterial::uniform(1.0) }, seen: seen.clone() })]
     });
-    assert_eq!(
-        seen.calls,
-        BTreeMap::from([("matrix", cells), ("explicit", batches), ("energy", batches)]),
-        "inertia alone"
-    );
+    assert_eq!(seen.calls, BTreeMap::from([("explicit", batches), ("energy", batches)]), "inertia alone");
     assert_eq!(seen.gathered["explicit"], ["velocity"]);
     assert_eq!(seen.gathered["energy"], ["velocity", "velocity_change"]);
 
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
-    let (seen, cells, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched {
             inner: ViscousStress { tensor: ByMaterial::uniform(tensor) },
             seen: seen.clone(),
         })]
     });
-    assert_eq!(
-        seen.calls,
-        BTreeMap::from([("matrix", cells), ("energy", batches), ("stress", 2 * batches)]),
-        "viscosity alone"
-    );
+    assert_eq!(seen.calls, BTreeMap::from([("energy", batches), ("stress", 2 * batches)]), "viscosity alone");
     assert_eq!(seen.gathered["energy"], ["strain", "strain_rate"], "strain for the largest one of the run");
     assert_eq!(seen.gathered["stress"], ["strain_rate"]);
 
-    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
             Box::new(Watched {
-                inner: Elasticity::new(
-                    ByMaterial::uniform(ElasticLaw { tensor, with_history: false }),
-                    false,
-                ),
+                inner: Elasticity { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) },
                 seen: seen.clone(),
             }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
@@ -173,9 +158,9 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     };
     let laws = || ByMaterial::uniform(FlowLaw::Perzyna(Elastic { parameters, elasticity: tensor }));
     let runs = Geometry::new(&part(session, whole)).runs;
-    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
-            Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &runs, false), seen: seen.clone() }),
+            Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &runs), seen: seen.clone() }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
         ]
     });
@@ -186,17 +171,17 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     );
     assert_eq!(seen.gathered["explicit"], ["strain", "strain_rate"]);
 
-    let elastic = || Elasticity::new(ByMaterial::uniform(ElasticLaw { tensor, with_history: false }), false);
+    let elastic = || Elasticity { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) };
     let parameters = material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9 };
     let law = Elastic { parameters, elasticity: tensor };
-    let damage = || Damage::new(ByMaterial::uniform(law), &runs, false);
-    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let damage = || Damage::new(ByMaterial::uniform(law), &runs);
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
     });
     let calls =
         [("elastic stress", batches), ("explicit", batches), ("energy", batches), ("stress", 2 * batches)];
     assert_eq!(seen.calls, BTreeMap::from(calls), "elasticity with damage beside it");
-    let (seen, _, batches) = seen_by::<D, S>(session, whole, |seen| {
+    let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(elastic()), Box::new(Watched { inner: damage(), seen: seen.clone() })]
     });
     let calls = [("elastic stress", batches), ("explicit", batches), ("weaken", 2 * batches)];

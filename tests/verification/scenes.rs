@@ -3,7 +3,7 @@
 use crate::mpirun::scramble;
 use clarke::{
     body::Body,
-    effect::{Effect, Held, Load, Support, fixed_components},
+    effect::{Effect, Evaluation, Held, Support, fixed_components},
     job::Job,
     mesh::{
         GlobalMesh, Mesh, distribute,
@@ -72,15 +72,7 @@ pub fn body<const D: usize, const S: usize>(
         .collect();
     let fixed = fixed_components(&mesh, &supports, &state.velocity).expect("flags");
     let geometry = Geometry::new(&mesh);
-    let body = Body {
-        mesh,
-        geometry,
-        effects,
-        contacts: Vec::new(),
-        surface_effects: Vec::new(),
-        load: Load::default(),
-        fixed,
-    };
+    let body = Body::new(mesh, geometry, effects, fixed, Evaluation::Converged);
     (body, state)
 }
 

@@ -81,8 +81,8 @@ fn derivatives(session: &Session, softening: &Softening, scheme: &str) {
 
 /// The only values of a history here that differ from zero.
 fn values(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
-    let of_cells = run.body.effects.iter().flat_map(|e| e.histories());
-    let of_nodes = run.body.surface_effects.iter().flat_map(|e| e.histories());
+    let of_cells = run.body.cell_histories();
+    let of_nodes = run.body.node_histories();
     let all = of_cells.chain(of_nodes).filter(|h| h.name == name);
     all.flat_map(|h| h.values.into_owned()).filter(|value| *value != 0.0).collect()
 }

@@ -19,8 +19,8 @@ fn all<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<(&'static 
     let state = &run.state;
     let fields = [("velocity", &state.velocity), ("displacement", &state.displacement)];
     let fields = fields.map(|(name, field)| (name, field.owned().expect("values").to_vec()));
-    let inside = run.body.effects.iter().flat_map(|effect| effect.histories());
-    let surface = run.body.surface_effects.iter().flat_map(|effect| effect.histories());
+    let inside = run.body.cell_histories();
+    let surface = run.body.node_histories();
     let kept = inside.chain(surface).map(|history| (history.name, history.values.into_owned()));
     fields.into_iter().chain(kept).collect()
 }

@@ -103,8 +103,8 @@ fn creep(session: &Session, scheme: &str, bounds: [f64; 2]) {
 
 /// The values of a history of cells or nodes here.
 fn history(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
-    let of_cells = run.body.effects.iter().flat_map(|e| e.histories());
-    let of_nodes = run.body.surface_effects.iter().flat_map(|e| e.histories());
+    let of_cells = run.body.cell_histories();
+    let of_nodes = run.body.node_histories();
     of_cells.chain(of_nodes).filter(|h| h.name == name).flat_map(|h| h.values.into_owned()).collect()
 }
 

@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// The bits of all histories of the cells.
 fn histories<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<u64> {
-    let all = run.body.effects.iter().flat_map(|effect| effect.histories());
+    let all = run.body.cell_histories();
     all.flat_map(|history| history.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()).collect()
 }
 

@@ -4,7 +4,7 @@
 
 use super::ViscoplasticFlow;
 use crate::{
-    effect::{Energy, Step},
+    effect::{outcome::Outcome, step::Step},
     material::{Flow, FlowLaw},
     simd::{LANES, Pack, sum},
     space::{Batch, Integrity, SimplexPack},
@@ -68,17 +68,16 @@ fn advance<const D: usize, const S: usize>(
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {
-    /// Advances the histories of a batch and adds them to its stress; gives the fastest relaxation in 1/s of power laws at the stresses
-    /// that occur, 0 without any.
+    /// Advances the histories of a batch and adds them to its stress.
     pub(super) fn advance_explicitly<const D: usize>(
         &mut self,
         step: Step,
-        batch: &mut Batch<D, S>,
-        energy: &mut Energy,
-    ) -> f64 {
-        let Some(law) = self.laws.get(batch.material) else { return 0.0 };
-        let Some(histories) = self.stress.both(batch.number) else { return 0.0 };
-        let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both(batch.number));
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(histories) = self.stress.both_mut(batch.number) else { return };
+        let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both_mut(batch.number));
         let mut growths = [0.0; LANES];
         let given = Advance {
             law,
@@ -96,9 +95,11 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 after[lane] = before[lane] + step.length * growths[lane];
             }
         }
-        energy.viscoplastic += dissipated;
-        energy.numerical += numerical;
-        if overstress > 0.0 { law.fastest_rate::<S>(overstress) } else { 0.0 }
+        outcome.energy.viscoplastic += dissipated;
+        outcome.energy.numerical += numerical;
+        if overstress > 0.0 {
+            outcome.fastest_flow = outcome.fastest_flow.max(law.fastest_rate::<S>(overstress));
+        }
     }
 }
 
@@ -106,7 +107,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
 mod tests {
     use super::*;
     use crate::{
-        effect::Effect,
+        effect::{Effect, Evaluation},
         material::{ByMaterial, Elasticity, Hypothesis, Maxwell, Metric, Perzyna, Viscoplasticity},
         space::{
             Geometry, Needs, Nodal,
@@ -130,7 +131,7 @@ mod tests {
         let geometry = Geometry::with_materials(&mesh, material);
         let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
         let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
-        let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry.runs, false);
+        let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry.runs);
         let values = |shift: usize| -> Vec<f64> {
             (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
         };
@@ -138,10 +139,10 @@ mod tests {
         let nodal =
             Nodal { displacement: &u, previous_displacement: &u, velocity: &v, previous_velocity: &v };
         let needs = Needs { strain: true, strain_rate: true, ..Needs::default() };
-        let (mut forces, mut energy, mut flowing) = (vec![0.0; u.len()], Energy::default(), 0);
+        let (mut forces, mut outcome, mut flowing) = (vec![0.0; u.len()], Outcome::default(), 0);
         for step in STEPS {
             Batch::for_all(&mesh, &geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                effect.add_explicit(step, batch, &mut energy);
+                effect.evaluate(Evaluation::Converged, step, batch, &mut outcome);
                 batch.scatter(&mesh, &mut forces);
                 for lane in 0..batch.count {
                     let start = effect.stress.converged(batch.number).expect("a history").lane(lane);
@@ -156,19 +157,19 @@ mod tests {
                     let (rate, growth) = law.rate(&stress, before);
                     flowing += usize::from(rate != [0.0; S]);
                     let expected = add_scaled(&start, -step.length, &law.elasticity().apply(&rate));
-                    let (_, trial) = effect.stress.both(batch.number).expect("a history");
+                    let (_, trial) = effect.stress.both_mut(batch.number).expect("a history");
                     assert_eq!(trial.lane(lane), expected);
                     if let Some(accumulated) = &mut effect.accumulated {
-                        let (_, trial) = accumulated.both(batch.number).expect("a history");
+                        let (_, trial) = accumulated.both_mut(batch.number).expect("a history");
                         assert_eq!(trial.lane(lane), [before + step.length * growth]);
                     }
                 }
             });
-            Effect::<D, S>::commit(&mut effect);
+            Effect::<D, S>::visit_histories(&mut effect, &mut |history| history.commit());
         }
         let histories = Effect::<D, S>::histories(&effect);
-        let histories = histories.iter().flat_map(|history| history.values.to_vec()).collect();
-        (forces, histories, [energy.viscoplastic, energy.numerical], flowing)
+        let histories = histories.iter().flat_map(|store| store.history().values.into_owned()).collect();
+        (forces, histories, [outcome.energy.viscoplastic, outcome.energy.numerical], flowing)
     }
 
     fn check<const D: usize, const S: usize>(hypothesis: Hypothesis) {

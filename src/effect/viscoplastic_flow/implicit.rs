@@ -6,7 +6,11 @@
 
 use super::ViscoplasticFlow;
 use crate::{
-    effect::{Blend, Energy, Step, Tangents},
+    effect::{
+        energy::Energy,
+        outcome::Outcome,
+        step::{Blend, Step},
+    },
     material::{Extrapolated, Flow, FlowLaw, Tangent},
     simd::Pack,
     space::Batch,
@@ -14,16 +18,16 @@ use crate::{
 };
 
 impl<const S: usize> ViscoplasticFlow<S> {
-    /// Lets each cell of the batch flow and takes what flow releases from its stresses; gives whether any flowed.
+    /// Lets each cell of the batch flow and takes what flow releases from its stresses.
     pub(super) fn advance_implicitly<const D: usize>(
         &mut self,
-        (blend, step_length): (Blend, f64),
-        batch: &mut Batch<D, S>,
-        mut tangents: Option<&mut Tangents>,
-    ) -> bool {
-        let mut any = false;
-        let Some(law) = self.laws.get(batch.material) else { return any };
-        let Some(&converged) = self.stress.converged(batch.number) else { return any };
+        blend: Blend,
+        step: Step,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(&converged) = self.stress.converged(batch.number) else { return };
         let Blend { length, earlier, .. } = blend;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
         for lane in 0..batch.count {
@@ -33,9 +37,9 @@ impl<const S: usize> ViscoplasticFlow<S> {
             let before = before.map_or(0.0, |before| before.0[0][lane]);
             let change = if earlier == 0.0 { [0.0; S] } else { self.stress.last_change(batch.number, lane) };
             let mut tangent = [[0.0; S]; S];
-            let wanted = tangents.is_some().then_some(&mut tangent);
+            let wanted = outcome.tangents.is_some().then_some(&mut tangent);
             let found = if change == [0.0; S] {
-                law.return_stress(&elastic, step_length, before, wanted).map(|found| (found, true))
+                law.return_stress(&elastic, step.length, before, wanted).map(|found| (found, true))
             } else {
                 let flow = law.elasticity().solve(&change.map(|change| earlier * change));
                 let [growth] = accumulated.as_ref().map_or([0.0], |a| a.last_change(batch.number, lane));
@@ -49,8 +53,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 total = found.accumulated;
                 add_to(&mut batch.stress, lane, 1.0, &release);
                 add_to(&mut batch.elastic_stress, lane, -1.0, &release);
-                any = true;
-                if let Some(tangents) = &mut tangents {
+                outcome.has_flowed = true;
+                if let Some(tangents) = &mut outcome.tangents {
                     tangents.push(batch.first + lane, &loss(law, &tangent, length), *symmetric);
                 }
             }
@@ -59,18 +63,18 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 accumulated.set_trial(batch.number, lane, [total]);
             }
         }
-        any
     }
 
     /// Adds what flow takes up in a solved step, and the terms of the scheme.
     pub(super) fn add_energy_of_implicit_flow<const D: usize>(
-        &mut self,
-        (blend, step): (Blend, Step),
-        batch: &Batch<D, S>,
+        &self,
+        blend: Blend,
+        step: Step,
+        batch: &Batch<'_, D, S>,
         energy: &mut Energy,
     ) {
         let Some(elasticity) = self.laws.get(batch.material).map(FlowLaw::elasticity) else { return };
-        let Some((converged, trial)) = self.stress.both(batch.number) else { return };
+        let Some([converged, trial]) = self.stress.both(batch.number) else { return };
         let (share, two_steps) = (batch.integrity.shares(), blend.earlier != 0.0);
         for lane in 0..batch.count {
             let [history, after] = [converged.lane(lane), trial.lane(lane)];

@@ -1,0 +1,36 @@
+//! What effects keep from one step to the next.
+
+use super::step::Evaluation;
+use std::borrow::Cow;
+
+/// Values that an effect keeps for cells or nodes, as files hold them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History<'a> {
+    /// Name in checkpoints and field files.
+    pub name: &'static str,
+    /// Values a cell or node.
+    pub width: usize,
+    /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
+    pub values: Cow<'a, [f64]>,
+    /// Bytes of the values that are kept, trial values included. The lanes of packs that no cell fills are not counted: how many
+    /// they are depends on the ranks.
+    pub bytes: usize,
+}
+
+/// Storage of a history: converged values, trial values and, on request, the values before the last step.
+pub trait HistoryStore {
+    /// The converged values.
+    fn history(&self) -> History<'_>;
+
+    /// The values before the last step, if they are kept.
+    fn earlier_history(&self) -> Option<History<'_>>;
+
+    /// Keeps the values before the last step from now on, if step errors or laws evaluated at this state need them.
+    fn keep_earlier(&mut self, evaluation: Evaluation);
+
+    /// Makes the trial values the converged ones.
+    fn commit(&mut self);
+
+    /// Replaces the converged values, or those before the last step, if `name` is theirs; laid out as in [`History::values`].
+    fn restore(&mut self, name: &str, values: &[f64]);
+}

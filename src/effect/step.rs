@@ -1,0 +1,48 @@
+//! The step being taken, and the state at which its laws are evaluated.
+
+/// The step being taken, or the last one taken.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Step {
+    /// Time at its end in s.
+    pub time: f64,
+    /// Its length in s.
+    pub length: f64,
+    /// Length of the step before it in s; 0 for the first step.
+    pub previous_length: f64,
+}
+
+/// How a step that is implicit in every stress starts: it is one of implicit Euler of another length from a blend of the two
+/// states before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blend {
+    /// `k'` in s: displacement, stress and velocity change by `k'` times their rates at the end.
+    pub length: f64,
+    /// Share of the converged state.
+    pub recent: f64,
+    /// Share of the state before it.
+    pub earlier: f64,
+}
+
+impl Blend {
+    /// Implicit Euler.
+    pub fn euler(length: f64) -> Self {
+        Self { length, recent: 1.0, earlier: 0.0 }
+    }
+
+    /// The blend of two values.
+    #[inline(always)]
+    pub fn of(self, recent: f64, earlier: f64) -> f64 {
+        self.recent * recent + self.earlier * earlier
+    }
+}
+
+/// The state at which laws are evaluated. The time scheme chooses it; effects are told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Evaluation {
+    /// The converged state before the step, once a step.
+    Converged,
+    /// The blend of states from which an implicit step starts, once a step: the known part of the stress at its end.
+    Start(Blend),
+    /// The end of an implicit step, for each iterate: the part of the stress that is no linear function of the velocity.
+    End(Blend),
+}
