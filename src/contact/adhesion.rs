@@ -15,9 +15,13 @@
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
 //! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
 
-use super::{Deserialize, JsonSchema, NormalLaw, Serialize};
-use crate::law::LawFault;
-use crate::tensor::{Vector, add_scaled, dot, norm};
+use super::{interface::Interface, laws::NormalLaw};
+use crate::{
+    law::LawFault,
+    tensor::{Vector, add_scaled, dot, norm},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Adhesive bonds on a contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,13 +63,18 @@ impl Adhesion {
         length.min(self.limit())
     }
 
-    /// What can't stand beside bonds, which are between what touches at first; keys are those of the contact's table, whose
-    /// path in the job is given.
-    pub fn faults(path: &str, normal: Option<&NormalLaw>) -> Vec<LawFault> {
-        let message = "adhesion binds what touches at first: there is no gap";
-        let help = format!("delete it, or [{path}.adhesion]");
-        let gap = normal.and_then(NormalLaw::gap_key);
-        gap.into_iter().map(|gap| LawFault::at_value(gap, message, help.as_str())).collect()
+    /// What can't stand beside bonds, which hold what touches at first to an obstacle at rest; keys are those of the contact's table.
+    pub fn faults(beside: &Interface) -> Vec<LawFault> {
+        let help = format!("delete it, or [{}.adhesion]", beside.path);
+        let gap = beside.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
+            let message = "adhesion binds what touches at first: there is no gap";
+            LawFault::at_value(gap, message, help.as_str())
+        });
+        let obstacle = beside.obstacle_moves.then(|| {
+            let message = "bonds follow the displacement of the body alone: the obstacle must be at rest";
+            LawFault::at_key("obstacle", message, format!("keep it where it is, or {help}"))
+        });
+        gap.into_iter().chain(obstacle).collect()
     }
 
     /// What the user should know of the parameters.

@@ -4,8 +4,10 @@
 //! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
 //! constant is 0.
 
-use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
+use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{error::Result, expression::Scalar, law::increasing_root};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

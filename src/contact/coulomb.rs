@@ -1,6 +1,8 @@
 //! Coulomb friction: the bound is `coefficient p` with the positive part `p` of the contact pressure.
 
-use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
+use super::friction_law::FrictionBound;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Coulomb friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -4,9 +4,13 @@
 //! on. For `v < 0` it is mirrored: `even` as in (72), `odd` (dissipative in both directions), or zero (`one_sided`: the
 //! foundation does not pull).
 
-use super::{Deserialize, JsonSchema, NormalParameters, Polyline, Serialize};
-use crate::error::{Error, Result};
-use crate::law::LawFault;
+use super::{normal_law::NormalParameters, polyline::Polyline};
+use crate::{
+    error::{Error, Result},
+    law::LawFault,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Pressure as a continuous piecewise linear function of the normal velocity, zero at rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -5,8 +5,10 @@
 //! (Flows of materials with yield, J. Rheol. 31 (1987), 385-404). The law never falls and stores nothing: all that it takes is
 //! dissipated.
 
-use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
+use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{error::Result, law::increasing_root};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Pressure `limit * (1 - exp(-normal velocity / velocity))` on what approaches, none on what leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,8 +1,9 @@
 //! Any polyline of pressure over normal velocity.
 
-use super::{Deserialize, JsonSchema, NormalParameters, Polyline, Serialize};
-use crate::error::Result;
-use crate::law::LawFault;
+use super::{normal_law::NormalParameters, polyline::Polyline};
+use crate::{error::Result, law::LawFault};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Pressure over normal velocity as a polyline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

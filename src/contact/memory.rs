@@ -12,8 +12,10 @@
 //! that swings: damping in the normal law or in the body has to take it up. (M. Sofonea, F. Pătrulescu, Analysis of a
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
-use super::{Deserialize, FrictionLaw, JsonSchema, NormalLaw, Serialize};
+use super::{interface::Interface, laws::NormalLaw};
 use crate::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Memory of the foundation below a contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,29 +33,24 @@ pub struct Memory {
 
 impl Memory {
     /// What can't stand beside memory, which is of how far a foundation that touches at first was pressed in; friction sees the
-    /// normal law alone. Keys are those of the contact's table, whose path in the job is given.
-    pub fn faults(
-        path: &str,
-        normal: Option<&NormalLaw>,
-        friction: Option<&FrictionLaw>,
-        has_obstacle: bool,
-    ) -> Vec<LawFault> {
+    /// normal law alone. Keys are those of the contact's table.
+    pub fn faults(beside: &Interface) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut refuse = |key: String, message: &str, other: &str| {
-            let help = format!("delete it, or [{path}.memory]{other}");
+            let help = format!("delete it, or [{}.memory]{other}", beside.path);
             faults.push(LawFault::at_key(key, message, help));
         };
-        if let Some(wall) = normal.filter(|law| law.is_bound()) {
+        if let Some(wall) = beside.normal.as_ref().filter(|law| law.is_bound()) {
             let message = "a rigid obstacle is never pressed in: there is nothing to remember";
             refuse(wall.table(), message, "");
-        } else if let Some(gap) = normal.and_then(NormalLaw::gap_key) {
+        } else if let Some(gap) = beside.normal.as_ref().and_then(NormalLaw::gap_key) {
             refuse(gap, "memory is of what touches at first: there is no gap", "");
         }
-        if has_obstacle {
+        if beside.has_obstacle {
             let message = "memory is of what touches at first: there is no obstacle that moves";
             refuse("obstacle".into(), message, "");
         }
-        if let Some(friction) = friction.filter(|law| law.follows_pressure()) {
+        if let Some(friction) = beside.friction.as_ref().filter(|law| law.follows_pressure()) {
             let message = "this friction follows the pressure of the normal law, which memory is not part of";
             refuse(friction.table().into(), message, ", or use tresca");
         }

@@ -1,16 +1,17 @@
 //! Contact laws: pure functions at a point of the contact boundary, with their keys in the job file.
 //!
-//! A normal or friction law is a file here, and an entry in one of the lists below: its parameters, as the job file has them, its
-//! formula and derivative, and what it can't be combined with.
+//! A normal or friction law is a file here, and an entry in one of the lists in `laws.rs`: its parameters, as the job file has them,
+//! its formula and derivative, and what it can't be combined with.
 
 mod adhesion;
-mod chosen;
 mod compliance;
 mod coulomb;
 mod damped_response;
 mod exponential_damper;
 mod friction_law;
 mod graph;
+mod interface;
+mod laws;
 mod memory;
 mod normal_law;
 mod obstacle;
@@ -28,6 +29,8 @@ pub use damped_response::{DampedResponse, Symmetry};
 pub use exponential_damper::ExponentialDamper;
 pub use friction_law::{FrictionBound, Slip};
 pub use graph::Graph;
+pub use interface::Interface;
+pub use laws::{FrictionLaw, NormalLaw, NormalResponse};
 pub use memory::Memory;
 pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle::{Gap, Plane, Sphere};
@@ -37,29 +40,3 @@ pub use slip_weakening::SlipWeakening;
 pub use table::{ContactTable, Quadrature};
 pub use tresca::Tresca;
 pub use unilateral::{Bound, Unilateral};
-
-use crate::{error::Result, expression::Scalar};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-normal_law::normal_laws! {
-    /// A piecewise linear function of the normal velocity that may fall, equation (72).
-    DampedResponse = "damped_response",
-    /// A damper whose pressure rises with the normal velocity toward a limit.
-    ExponentialDamper = "exponential_damper",
-    /// Any polyline of pressure over normal velocity, with upward jumps.
-    Graph = "graph",
-    /// A spring that is felt beyond the gap.
-    Compliance = "compliance",
-    /// A rigid obstacle: the normal displacement never exceeds the gap.
-    Unilateral = "unilateral",
-}
-
-friction_law::friction_laws! {
-    /// A given bound on the friction traction.
-    Tresca = "tresca",
-    /// A bound proportional to the contact pressure.
-    Coulomb = "coulomb",
-    /// A coefficient that falls with the sliding velocity.
-    SlipWeakening = "slip_weakening",
-}

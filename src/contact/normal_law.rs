@@ -2,8 +2,7 @@
 //!
 //! A law is what a job says ([`NormalParameters`]) and what evaluates it at a point ([`Response`]), often the same type.
 
-use crate::law::LawFault;
-use crate::{error::Result, expression::Scalar};
+use crate::{error::Result, expression::Scalar, law::LawFault};
 
 /// What a step brings to a point of the contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -242,100 +241,3 @@ macro_rules! normal_laws {
     };
 }
 pub(super) use normal_laws;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::contact::{Bound, Compliance, Graph, NormalLaw, NormalResponse, Unilateral};
-
-    const NOWHERE: NodeContext = NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5 };
-
-    fn wall(bound: Bound) -> NormalResponse {
-        NormalResponse::Unilateral(Unilateral { bound, gap: None })
-    }
-
-    fn laws() -> [NormalResponse; 3] {
-        let springs =
-            |exponent| NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, gap: None });
-        [wall(Bound::Displacement), springs(1.0), springs(1.5)]
-    }
-
-    #[test]
-    fn where_there_is_nothing_to_touch_points_move_freely_without_pressure_or_energy() {
-        for law in laws() {
-            for s in [-4.0, 0.0, 6.0] {
-                let found = law.resolve(s, 2.0, NOWHERE);
-                assert_eq!(
-                    (found.velocity, found.pressure, found.derivative),
-                    (s / 2.0, 0.0, 0.5),
-                    "{law:?}"
-                );
-            }
-            assert_eq!(law.energy(NOWHERE.penetration).unwrap_or(0.0), 0.0);
-            assert_eq!(law.branch(3.0, NOWHERE), 0);
-        }
-    }
-
-    #[test]
-    fn a_grazing_point_touches_without_pressure() {
-        // 0.25 m away, 0.5 m/s, 0.5 s: it arrives as the step ends.
-        let node = NodeContext { penetration: -0.25, step_length: 0.5 };
-        for law in laws() {
-            let found = law.resolve(1.0, 2.0, node);
-            assert_eq!((found.velocity, found.pressure), (0.5, 0.0), "{law:?}");
-            assert_eq!(law.distance(0.5, 0.0, node, [1.0, 1.0]), 0.0);
-            // A hair less and it is open, a hair more and it pushes.
-            let less = law.resolve(1.0 - 1e-9, 2.0, node);
-            assert_eq!((less.pressure, less.derivative, less.branch), (0.0, 0.5, 0), "{law:?}");
-            let more = law.resolve(1.0 + 1e-3, 2.0, node);
-            assert!(more.pressure > 0.0 && more.pressure <= 1.1e-3 && more.branch == 1, "{law:?}: {more:?}");
-        }
-    }
-
-    #[test]
-    fn a_gap_that_is_closed_exactly_bears_pressure_at_rest() {
-        let node = NodeContext { penetration: 0.0, step_length: 0.5 };
-        let wall = wall(Bound::Displacement);
-        let held = wall.resolve(7.0, 2.0, node);
-        assert_eq!((held.velocity, held.pressure, held.derivative), (0.0, 7.0, 0.0));
-        assert_eq!(wall.distance(held.velocity, held.pressure, node, [1.0, 1.0]), 0.0);
-        let leaving = wall.resolve(-7.0, 2.0, node);
-        assert_eq!((leaving.velocity, leaving.pressure), (-3.5, 0.0));
-        // Springs need to be pressed: d + (k / c) p(d) = k s / c, 26 d = 1.75 with 100 Pa/m.
-        let springs = laws()[1].resolve(7.0, 2.0, node);
-        assert!((springs.velocity * 0.5 - 1.75 / 26.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn only_walls_are_pure_bounds() {
-        let node = NodeContext { penetration: -0.25, step_length: 0.5 };
-        let graph = |points, slope_before, slope_after| {
-            NormalLaw::Graph(Graph { points, slope_before, slope_after }).response().unwrap()
-        };
-        assert_eq!(wall(Bound::Velocity).velocity_bound(node), Some(0.0));
-        assert_eq!(wall(Bound::Displacement).velocity_bound(node), Some(0.5));
-        assert_eq!(wall(Bound::Displacement).velocity_bound(NOWHERE), Some(f64::INFINITY));
-        assert_eq!(graph(vec![[0.25, 0.0]], 0.0, f64::INFINITY).velocity_bound(node), Some(0.25));
-        assert_eq!(graph(vec![[0.0, 1.0]], 0.0, f64::INFINITY).velocity_bound(node), None);
-        assert_eq!(graph(vec![[0.0, 0.0]], 1.0, f64::INFINITY).velocity_bound(node), None);
-        assert_eq!(graph(vec![[0.0, 0.0]], 0.0, 1e9).velocity_bound(node), None);
-        assert_eq!(graph(vec![[0.0, 0.0], [0.0, 1.0]], 0.0, 0.0).velocity_bound(node), None);
-        assert_eq!(laws()[1].velocity_bound(node), None);
-    }
-
-    #[test]
-    fn laws_without_growth_constants_say_why() {
-        let damper = Graph { points: vec![[0.0, 1.0]], slope_before: 0.0, slope_after: 2.0 };
-        assert_eq!(damper.response().unwrap().growth_constants(), Ok([1.0, 2.0]));
-        let [wall, springs, _] = laws().map(|law| law.growth_constants().unwrap_err());
-        assert!(wall.contains("vertical ray") && springs.contains("displacement"), "{wall} {springs}");
-    }
-
-    #[test]
-    fn far_obstacles_take_no_digits_from_the_velocity() {
-        let node = NodeContext { penetration: -1e6, step_length: 1e-3 };
-        for law in laws() {
-            assert_eq!(law.resolve(0.1 * 3.0, 3.0, node).velocity, 0.1 * 3.0 / 3.0, "{law:?}");
-        }
-    }
-}

@@ -13,12 +13,13 @@
 //! negative where the point is inside the obstacle, infinite where the ray along the normal does not meet it: there is no
 //! contact then.
 
-use super::{Deserialize, JsonSchema, Serialize};
 use crate::{
     error::{Error, Result},
     expression::Scalar,
     tensor::{Vector, add_scaled, dot, norm},
 };
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Cosine between boundary and plane below which the ray counts as parallel to the plane.
 const PARALLEL: f64 = 1e-6;

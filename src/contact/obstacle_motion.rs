@@ -12,7 +12,7 @@
 //! that does. `x'` and `m'` are the rates by which a step changes displacements: what sticks in a step of implicit Euler moves
 //! as far as the obstacle does, `x' = (x_n - x_{n-1}) / k`. Everything else is taken at the end of the step, as the gap is.
 
-use super::{Gap, Plane, Sphere, obstacle::vector};
+use super::obstacle::{Gap, Plane, Sphere, vector};
 use crate::{
     error::{Error, Result},
     expression::Scalar,

@@ -8,7 +8,7 @@
 //! For any `c` above the steepest fall, `s = c v + p` grows along the graph: it is a parameter of the graph, and velocity
 //! and pressure are functions of it, Lipschitz continuous also where the graph is vertical ([`Polyline::resolve`]).
 
-use super::{Branch, NodeContext, Resolved, Response};
+use super::normal_law::{Branch, NodeContext, Resolved, Response};
 use crate::error::{Error, Result};
 
 /// A piecewise linear law that may fall, and jump upwards.

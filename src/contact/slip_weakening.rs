@@ -3,8 +3,10 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact
 //! pressure; it falls by at most `(static - dynamic) / decay_velocity p`.
 
-use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
+use super::friction_law::FrictionBound;
 use crate::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Friction whose coefficient falls from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

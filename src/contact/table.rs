@@ -1,7 +1,9 @@
 //! What the laws of one `[[contact]]` table say of their parameters and of each other.
 
-use super::{Adhesion, Deserialize, FrictionLaw, JsonSchema, Memory, NormalLaw, Serialize};
+use super::{adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory};
 use crate::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Where on a facet the contact laws hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -17,41 +19,34 @@ pub enum Quadrature {
 /// What stands in a `[[contact]]` table, as far as it can be read.
 #[derive(Debug, Clone)]
 pub struct ContactTable {
-    /// Its path in the job, for words: `contact.0`.
-    pub path: String,
+    /// Normal law, friction law and obstacle.
+    pub interface: Interface,
     /// Where on a facet the laws hold.
     pub quadrature: Quadrature,
-    /// The normal law.
-    pub normal: Option<NormalLaw>,
-    /// The friction law.
-    pub friction: Option<FrictionLaw>,
     /// Bonds to the obstacle.
     pub adhesion: Option<Adhesion>,
     /// Memory of the foundation.
     pub memory: Option<Memory>,
-    /// Whether an obstacle stands in for the gap.
-    pub has_obstacle: bool,
 }
 
 impl ContactTable {
     /// What is wrong with its laws, each alone and all together; keys are those of the table.
     pub fn faults(&self) -> Vec<LawFault> {
+        let Interface { normal, friction, has_obstacle, .. } = &self.interface;
         let mut faults = Vec::new();
-        if let Some(law) = &self.normal {
+        if let Some(law) = normal {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(&law.table())));
-            faults.extend(self.has_obstacle.then(|| law.faults_beside_obstacle()).into_iter().flatten());
+            faults.extend(has_obstacle.then(|| law.faults_beside_obstacle()).into_iter().flatten());
         }
-        if let Some(law) = &self.friction {
+        if let Some(law) = friction {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
-        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.path, self.normal.as_ref())));
-        let (normal, friction) = (self.normal.as_ref(), self.friction.as_ref());
-        let beside_memory = |_| Memory::faults(&self.path, normal, friction, self.has_obstacle);
-        faults.extend(self.memory.iter().flat_map(beside_memory));
+        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.interface)));
+        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
         if self.quadrature == Quadrature::Gauss {
-            let nodal = self.normal.as_ref().is_some_and(NormalLaw::needs_nodes);
+            let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);
             let not_there = [
-                (self.friction.is_some(), "friction does not act at Gauss points"),
+                (friction.is_some(), "friction does not act at Gauss points"),
                 (self.adhesion.is_some(), "adhesion does not act at Gauss points"),
                 (self.memory.is_some(), "memory does not act at Gauss points"),
                 (nodal, "this contact law does not act at Gauss points"),

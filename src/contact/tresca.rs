@@ -1,6 +1,8 @@
 //! Tresca friction: a bound on the friction traction that is given.
 
-use super::{Deserialize, FrictionBound, JsonSchema, Serialize};
+use super::friction_law::FrictionBound;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Tresca friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,9 +3,10 @@
 //! Within a step both are the graph of a wall over the normal velocity, zero and then vertical: at the velocity that closes the
 //! gap by the end of the step, or at rest.
 
-use super::{Branch, Deserialize, JsonSchema, NodeContext, NormalParameters, Resolved, Response, Serialize};
-use crate::law::LawFault;
-use crate::{error::Result, expression::Scalar, tensor::larger};
+use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::{error::Result, expression::Scalar, law::LawFault, tensor::larger};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Unilateral constraint: normal displacement <= gap, or normal velocity <= 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

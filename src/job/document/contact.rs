@@ -23,7 +23,7 @@ pub struct Contact {
     /// The friction traction; absent: sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,
-    /// Bonds to the obstacle, made at displacement zero: they pull back what moves away and give way. The bonding b at a node
+    /// Bonds to an obstacle at rest, made at displacement zero: they pull back what moves away and give way. The bonding b at a node
     /// falls from 1 as `viscosity b' = -max(b (stiffness R(opening)^2 + tangential_stiffness R(sliding)^2) - energy, 0)`, R
     /// the cut at `length`, and never comes back; the traction is `b^2 stiffness R(opening)` along the normal and
     /// `b^2 tangential_stiffness R(sliding)` against the sliding. `contact_pressure` is that of the normal law alone.

@@ -2,7 +2,7 @@
 
 use super::boundary::{check_flat, check_vector};
 use super::findings::{Findings, MeshNames, items};
-use crate::contact::{Adhesion, ContactTable, NormalLaw};
+use crate::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
 use crate::expression::Scalar;
 use crate::job::document::Method;
 use crate::job::source::Node;
@@ -15,7 +15,7 @@ pub fn check(findings: &mut Findings<'_>) {
     check_method(findings, &tables);
     for table in tables {
         for fault in table.faults() {
-            let key = format!("{}.{}", table.path, fault.key);
+            let key = format!("{}.{}", table.interface.path, fault.key);
             if fault.is_at_key {
                 findings.fault_at_key(&key, fault.message, fault.help);
             } else {
@@ -23,22 +23,28 @@ pub fn check(findings: &mut Findings<'_>) {
             }
         }
         let warning = table.adhesion.as_ref().and_then(Adhesion::warning);
-        findings.warnings.extend(warning.map(|warning| format!("{}.adhesion: {warning}", table.path)));
-        check_obstacle(findings, &table.path);
+        findings
+            .warnings
+            .extend(warning.map(|warning| format!("{}.adhesion: {warning}", table.interface.path)));
+        check_obstacle(findings, &table.interface.path);
     }
 }
 
 /// What can be read of the table at this path.
 fn table(root: &Node, path: String) -> ContactTable {
     let key = |key: &str| format!("{path}.{key}");
+    let obstacle: Option<Gap> = root.read(&key("obstacle"));
     ContactTable {
         quadrature: root.read(&key("quadrature")).unwrap_or_default(),
-        normal: root.read(&key("normal")),
-        friction: root.read(&key("friction")),
         adhesion: root.read(&key("adhesion")),
         memory: root.read(&key("memory")),
-        has_obstacle: root.find(&key("obstacle")).is_some(),
-        path,
+        interface: Interface {
+            normal: root.read(&key("normal")),
+            friction: root.read(&key("friction")),
+            has_obstacle: root.find(&key("obstacle")).is_some(),
+            obstacle_moves: obstacle.is_some_and(|obstacle| obstacle.may_drag()),
+            path,
+        },
     }
 }
 
@@ -48,7 +54,7 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
         return;
     }
     let is_bound = |table: &ContactTable| {
-        table.normal.as_ref().is_some_and(NormalLaw::is_bound) && table.friction.is_none()
+        table.interface.normal.as_ref().is_some_and(NormalLaw::is_bound) && table.interface.friction.is_none()
     };
     if tables.is_empty() || !tables.iter().all(is_bound) {
         let message = "this method solves frictionless contact whose every normal law is `unilateral`";
