@@ -13,7 +13,7 @@
 //! Problems with Adhesion or Damage, 2006. Without the gradient only the rate spreads damage: the slower the load, the
 //! thinner the band of cells in which it gathers.
 
-use super::{Elastic, Elasticity, Hypothesis};
+use super::elasticity::{Elastic, Elasticity, Hypothesis};
 use crate::{law::increasing_root, tensor::Mandel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

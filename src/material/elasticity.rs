@@ -1,6 +1,6 @@
 //! Linear isotropic elasticity, and what the plane stands for.
 
-use super::Isotropic;
+use super::isotropic::Isotropic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Linear viscosity `A(e) = volumetric tr(e) I + shear e`, section 5 of Wang and Cheng (2022).
 
-use super::Isotropic;
+use super::isotropic::Isotropic;
 use crate::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -15,7 +15,10 @@
 //! apex: E. de Souza Neto, D. Peric, D. Owen, Computational Methods for Plasticity, 2008, chapter 8; viscous
 //! regularisation: G. Duvaut, J.-L. Lions, Les inequations en mecanique et en physique, 1972, chapter 5.)
 
-use super::flow::{Flow, Parameters, Tangent, add_product, write_isotropic};
+use super::{
+    flow::{Flow, Parameters},
+    tangent::{Tangent, add_product, write_isotropic},
+};
 use crate::{
     material::{Elastic, Elasticity, Hypothesis, Isotropic},
     tensor::{Mandel, dot, normal_components, trace},

@@ -8,7 +8,10 @@
 //!
 //! Under `lagged_euler` a held deviatoric stress falls by the factor `1 - k / t_d` in a step of length `k`.
 
-use super::flow::{Flow, Parameters, Tangent, write_isotropic};
+use super::{
+    flow::{Flow, Parameters},
+    tangent::{Tangent, write_isotropic},
+};
 use crate::{
     material::{Elasticity, Hypothesis, Isotropic},
     tensor::{Mandel, normal_components, trace},

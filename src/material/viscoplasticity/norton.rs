@@ -19,7 +19,10 @@
 //! ln x = ln(k rate / reference stress^n) + (n - 1) ln q(x) - m ln(1 + (p + x q(x)) / p0)
 //! ```
 
-use super::flow::{Flow, Parameters, Tangent, add_product, write_isotropic};
+use super::{
+    flow::{Flow, Parameters},
+    tangent::{Tangent, add_product, write_isotropic},
+};
 use crate::{
     material::{Elastic, Elasticity, Hypothesis, Isotropic},
     tensor::{Mandel, normal_components, trace, von_mises},

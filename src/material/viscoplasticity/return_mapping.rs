@@ -12,7 +12,7 @@ mod extrapolated;
 
 pub use extrapolated::Extrapolated;
 
-use super::{Flow, FlowLaw, Tangent};
+use super::{flow::Flow, law::FlowLaw, tangent::Tangent};
 use crate::tensor::{Mandel, add_scaled};
 
 /// How a step ends where stress flows.

@@ -6,8 +6,8 @@
 //! `(von Mises norm - h p) dp/dt >= yield stress dp/dt >= 0`, is dissipated.
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3.)
 
-use super::overstress::Perzyna;
-use crate::material::{Elastic, viscoplasticity::Flow};
+use super::Perzyna;
+use crate::material::{Elastic, viscoplasticity::flow::Flow};
 
 impl Elastic<Perzyna> {
     /// The law after so much accumulated strain.

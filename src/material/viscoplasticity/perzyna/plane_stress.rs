@@ -11,10 +11,13 @@
 //! equation for `m`, the projection's own with other factors. For `n = 1` `eta` is known; else it is the root of an increasing
 //! equation around that one.
 
-use super::overstress::{NO_YIELD_STRESS, Perzyna};
+use super::{NO_YIELD_STRESS, Perzyna};
 use crate::{
     law::increasing_root,
-    material::{Elastic, Tangent, viscoplasticity::Flow},
+    material::{
+        Elastic,
+        viscoplasticity::{flow::Flow, tangent::Tangent},
+    },
     tensor::Mandel,
 };
 use std::f64::consts::FRAC_1_SQRT_2;

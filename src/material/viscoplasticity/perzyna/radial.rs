@@ -10,11 +10,14 @@
 //! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`. Else its logarithm is solved for that of
 //! `f`, so that neither large exponents nor overstresses far beyond the yield stress take many iterations or overflow.
 
-use super::overstress::Perzyna;
+use super::Perzyna;
 use crate::{
     material::{
-        Elastic, Tangent,
-        viscoplasticity::flow::{Flow, add_product, write_isotropic},
+        Elastic,
+        viscoplasticity::{
+            flow::Flow,
+            tangent::{Tangent, add_product, write_isotropic},
+        },
     },
     tensor::{Mandel, dot, normal_components, trace},
 };

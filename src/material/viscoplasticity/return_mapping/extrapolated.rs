@@ -16,9 +16,10 @@
 
 use super::Returned;
 use crate::{
-    material::{
-        FlowLaw, Tangent,
-        viscoplasticity::flow::{Flow, add_product},
+    material::viscoplasticity::{
+        flow::Flow,
+        law::FlowLaw,
+        tangent::{Tangent, add_product},
     },
     tensor::{Mandel, add_scaled, dot},
 };
@@ -62,7 +63,9 @@ impl FlowLaw {
                 *tangent = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
             }
             if let Some(gradient) = &share.gradient {
-                let by_share = self.by_share(last.growth, &release, before, &trial, &found, tangent);
+                let rise = self.hardening_modulus() * last.growth;
+                let by_strength = if rise > 0.0 { rise / self.strength(before) } else { 0.0 };
+                let by_share = by_share(by_strength, &release, &trial, &found.stress, tangent);
                 add_product(tangent, 1.0, &by_share, gradient);
             }
         }
@@ -102,23 +105,19 @@ impl FlowLaw {
         };
         Some(Share { value: value / below, gradient: Some(normal.map(|n| n / below)) })
     }
+}
 
-    /// The derivative of the stress at the end by `phi`. Stresses at the end grow by a factor with `s*` and the yield stress `Y*`
-    /// at `p*`, so that their derivative by `Y*` is `(s - T s*) / Y*` with the tangent `T`.
-    fn by_share<const S: usize>(
-        &self,
-        growth: f64,
-        release: &Mandel<S>,
-        before: f64,
-        trial: &Mandel<S>,
-        found: &Returned<S>,
-        tangent: &Tangent<S>,
-    ) -> Mandel<S> {
-        let rise = self.hardening_modulus() * growth;
-        let by_strength = if rise > 0.0 { rise / self.strength(before) } else { 0.0 };
-        std::array::from_fn(|i| {
-            let missing = found.stress[i] - dot(&tangent[i], trial);
-            by_strength * missing - dot(&tangent[i], release)
-        })
-    }
+/// The derivative by `phi` of the `stress` at the end, given the tangent `T` and the growth of the yield stress `Y*` at `p*` with `phi`,
+/// relative to it. Stresses at the end grow by a factor with `s*` and `Y*`, so that their derivative by `Y*` is `(s - T s*) / Y*`.
+fn by_share<const S: usize>(
+    growth: f64,
+    release: &Mandel<S>,
+    trial: &Mandel<S>,
+    stress: &Mandel<S>,
+    tangent: &Tangent<S>,
+) -> Mandel<S> {
+    std::array::from_fn(|i| {
+        let missing = stress[i] - dot(&tangent[i], trial);
+        growth * missing - dot(&tangent[i], release)
+    })
 }
