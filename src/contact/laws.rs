@@ -60,7 +60,7 @@ impl NormalLaw {
     }
 
     /// What is wrong with it beside an obstacle; keys are those of the contact's table.
-    pub fn faults_beside_obstacle(&self) -> Vec<LawFault> {
+    pub(super) fn faults_beside_obstacle(&self) -> Vec<LawFault> {
         let against =
             self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));
         let help = "give one of them: the obstacle says how far it is";

@@ -19,12 +19,12 @@ impl NodeContext {
     pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0 };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
-    pub fn penetration_at(&self, velocity: f64) -> f64 {
+    pub(super) fn penetration_at(&self, velocity: f64) -> f64 {
         self.penetration + self.step_length * velocity
     }
 
     /// The normal velocity in m/s that just closes the gap by the end of the step.
-    pub fn closing_velocity(&self) -> f64 {
+    pub(super) fn closing_velocity(&self) -> f64 {
         -self.penetration / self.step_length
     }
 }
@@ -44,7 +44,7 @@ pub struct Resolved {
 
 impl Resolved {
     /// No pressure, on the first branch.
-    pub fn free(s: f64, c: f64) -> Self {
+    pub(super) fn free(s: f64, c: f64) -> Self {
         Self { velocity: s / c, derivative: 1.0 / c, ..Self::default() }
     }
 }

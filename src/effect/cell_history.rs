@@ -25,7 +25,7 @@ pub(super) struct CellHistory<const W: usize> {
 impl<const W: usize> CellHistory<W> {
     /// Zeros for the cells of the materials for which `keeps` holds. The names are those of the converged values and of the values
     /// before the last step.
-    pub fn new(
+    pub(super) fn new(
         [name, earlier_name]: [&'static str; 2],
         runs: &[CellRun],
         keeps: impl Fn(usize) -> bool,
@@ -52,20 +52,20 @@ impl<const W: usize> CellHistory<W> {
 
     /// The same history, which makes no error in the stress: only laws evaluated at the end of steps need its values before the last
     /// step.
-    pub fn without_error(self) -> Self {
+    pub(super) fn without_error(self) -> Self {
         Self { is_earlier_for_end: true, ..self }
     }
 
     /// What the last step added in a cell; zeros where that is not kept.
     #[inline]
-    pub fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
+    pub(super) fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
         let (Some(place), Some(earlier)) = (self.place(run), &self.earlier) else { return [0.0; W] };
         std::array::from_fn(|i| self.converged[place].0[i][lane] - earlier[place].0[i][lane])
     }
 
     /// Writes the trial values of a cell, if its run keeps any.
     #[inline]
-    pub fn set_trial(&mut self, run: usize, lane: usize, values: [f64; W]) {
+    pub(super) fn set_trial(&mut self, run: usize, lane: usize, values: [f64; W]) {
         if let Some(place) = self.place(run) {
             self.trial[place].set(lane, values);
         }
@@ -73,7 +73,7 @@ impl<const W: usize> CellHistory<W> {
 
     /// Converged values of a run of cells, if it keeps any; asks for those of the next run.
     #[inline]
-    pub fn converged(&self, run: usize) -> Option<&Pack<W>> {
+    pub(super) fn converged(&self, run: usize) -> Option<&Pack<W>> {
         if let Some(next) = self.place(run + 1) {
             self.converged[next].prefetch();
         }
@@ -82,14 +82,14 @@ impl<const W: usize> CellHistory<W> {
 
     /// Converged and trial values of a run of cells, if it keeps any; asks for those of the next run.
     #[inline]
-    pub fn both(&self, run: usize) -> Option<[&Pack<W>; 2]> {
+    pub(super) fn both(&self, run: usize) -> Option<[&Pack<W>; 2]> {
         self.prefetch(run + 1);
         self.place(run).map(|place| [&self.converged[place], &self.trial[place]])
     }
 
     /// The same, with trial values that may be written.
     #[inline]
-    pub fn both_mut(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
+    pub(super) fn both_mut(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
         self.prefetch(run + 1);
         self.place(run).map(|place| (&self.converged[place], &mut self.trial[place]))
     }
@@ -104,7 +104,7 @@ impl<const W: usize> CellHistory<W> {
 
     /// Trial and converged values of a run of cells and those before the last step, if all are kept.
     #[inline]
-    pub fn last_three(&self, run: usize) -> Option<[&Pack<W>; 3]> {
+    pub(super) fn last_three(&self, run: usize) -> Option<[&Pack<W>; 3]> {
         let (place, earlier) = (self.place(run)?, self.earlier.as_ref()?);
         Some([&self.trial[place], &self.converged[place], &earlier[place]])
     }

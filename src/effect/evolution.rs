@@ -9,16 +9,16 @@ use super::step::Blend;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Evolution {
     /// How the step starts.
-    pub blend: Blend,
+    pub(super) blend: Blend,
     /// Length of the step in s.
-    pub length: f64,
+    pub(super) length: f64,
 }
 
 impl Evolution {
     /// The value at the end of the step and its derivative by the driving force, given the value before the step and what the last
     /// step added to it. `relax` gives both after a step of implicit Euler from a value over a length in s.
     #[inline]
-    pub fn advance(self, before: f64, last: f64, relax: impl Fn(f64, f64) -> [f64; 2]) -> [f64; 2] {
+    pub(super) fn advance(self, before: f64, last: f64, relax: impl Fn(f64, f64) -> [f64; 2]) -> [f64; 2] {
         let share = -self.blend.earlier * last;
         if share == 0.0 {
             return relax(before, self.length);

@@ -11,8 +11,8 @@ pub(super) struct NodeHistory {
     earlier_name: &'static str,
     nodes: Vec<u32>,
     owned: usize,
-    pub converged: Vec<f64>,
-    pub trial: Vec<f64>,
+    pub(super) converged: Vec<f64>,
+    pub(super) trial: Vec<f64>,
     /// Values before the last step.
     earlier: Option<Vec<f64>>,
 }
@@ -20,18 +20,23 @@ pub(super) struct NodeHistory {
 impl NodeHistory {
     /// The same value at each of these of the `owned` nodes. The names are those of the converged values and of the values before
     /// the last step.
-    pub fn new([name, earlier_name]: [&'static str; 2], nodes: Vec<u32>, owned: usize, value: f64) -> Self {
+    pub(super) fn new(
+        [name, earlier_name]: [&'static str; 2],
+        nodes: Vec<u32>,
+        owned: usize,
+        value: f64,
+    ) -> Self {
         let converged = vec![value; nodes.len()];
         Self { name, earlier_name, nodes, owned, trial: converged.clone(), converged, earlier: None }
     }
 
     /// What the last step added to the value of a node by its position; 0 where that is not kept.
-    pub fn last_change(&self, at: usize) -> f64 {
+    pub(super) fn last_change(&self, at: usize) -> f64 {
         self.earlier.as_ref().map_or(0.0, |earlier| self.converged[at] - earlier[at])
     }
 
     /// Trial and converged value of each node and the one before the last step, if they are kept.
-    pub fn last_three(&self) -> impl Iterator<Item = [f64; 3]> {
+    pub(super) fn last_three(&self) -> impl Iterator<Item = [f64; 3]> {
         let earlier = self.earlier.as_deref().unwrap_or_default();
         let values = self.trial.iter().zip(&self.converged).zip(earlier);
         values.map(|((now, before), earlier)| [*now, *before, *earlier])

@@ -26,14 +26,14 @@ impl Tangents {
 
     /// Adds the matrix of a cell by its local number; `symmetric` is whether it is symmetric, if
     /// [`FlowProperties::has_symmetric_tangent`](super::FlowProperties::has_symmetric_tangent) says so of its effect.
-    pub fn push<const S: usize>(&mut self, cell: usize, tangent: &Tangent<S>, symmetric: bool) {
+    pub(super) fn push<const S: usize>(&mut self, cell: usize, tangent: &Tangent<S>, symmetric: bool) {
         self.skew |= !symmetric;
         self.cells.push(cell as u32);
         self.values.extend_from_slice(tangent.as_flattened());
     }
 
     /// The matrix of this cell, zero if it had none, and whether it had one: for effects that change what others made of the stress.
-    pub fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
+    pub(super) fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
         // Cells come in their order.
         let found = self.cells.binary_search(&(cell as u32));
         let at = found.unwrap_or_else(|at| {
@@ -45,12 +45,12 @@ impl Tangents {
     }
 
     /// Says that a matrix is not symmetric.
-    pub fn mark_skew(&mut self) {
+    pub(super) fn mark_skew(&mut self) {
         self.skew = true;
     }
 
     /// Adds the matrix of a node of this rank.
-    pub fn push_node<const D: usize>(&mut self, node: u32, tangent: &[[f64; D]; D], symmetric: bool) {
+    pub(super) fn push_node<const D: usize>(&mut self, node: u32, tangent: &[[f64; D]; D], symmetric: bool) {
         self.skew |= !symmetric;
         self.nodes.push(node);
         self.nodal.extend_from_slice(tangent.as_flattened());

@@ -55,7 +55,7 @@ impl Isotropic {
     }
 
     /// Largest eigenvalue over the stored components.
-    pub fn largest_modulus<const S: usize>(&self) -> f64 {
+    pub(super) fn largest_modulus<const S: usize>(&self) -> f64 {
         self.shear.max(self.shear + normal_components::<S>() as f64 * self.volumetric)
     }
 }

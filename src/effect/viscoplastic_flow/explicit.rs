@@ -30,7 +30,8 @@ struct Advance<'a, const D: usize, const S: usize> {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn advance<const D: usize, const S: usize>(
     given: Advance<'_, D, S>,
-    (converged, trial): (&Pack<S>, &mut Pack<S>),
+    converged: &Pack<S>,
+    trial: &mut Pack<S>,
     stress: &mut Pack<S>,
 ) -> [f64; 3] {
     let Advance { law, step, cells, strain, rate, integrity, accumulated, growths } = given;
@@ -76,7 +77,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         outcome: &mut Outcome<'_>,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(histories) = self.stress.both_mut(batch.number) else { return };
+        let Some((converged, trial)) = self.stress.both_mut(batch.number) else { return };
         let mut accumulated = self.accumulated.as_mut().and_then(|history| history.both_mut(batch.number));
         let mut growths = [0.0; LANES];
         let given = Advance {
@@ -89,7 +90,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
             accumulated: accumulated.as_ref().map_or(&[0.0; LANES], |(Pack([before]), _)| before),
             growths: &mut growths,
         };
-        let [dissipated, numerical, overstress] = advance(given, histories, &mut batch.stress);
+        let [dissipated, numerical, overstress] = advance(given, converged, trial, &mut batch.stress);
         if let Some((Pack([before]), Pack([after]))) = &mut accumulated {
             for lane in 0..LANES {
                 after[lane] = before[lane] + step.length * growths[lane];

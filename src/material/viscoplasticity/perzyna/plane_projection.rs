@@ -25,7 +25,7 @@ impl Surface {
     ///
     /// Newton's method on the reciprocal of the norm, which is nearly linear and never overshoots.
     #[inline(always)]
-    pub fn multipliers<const N: usize>(
+    pub(super) fn multipliers<const N: usize>(
         &self,
         volumetric: &[f64; N],
         deviatoric: &[f64; N],

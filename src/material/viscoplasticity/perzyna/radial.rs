@@ -36,15 +36,11 @@ pub(super) fn flow<const S: usize>(
     let (norm, yield_stress) = start;
     let Perzyna { relaxation, exponent: power, .. } = law.parameters;
     let (shear, hardening) = (law.elasticity.shear, law.hardening_modulus());
-    let rate = length / (3.0 * relaxation);
     let stiffness = 1.5 * shear + hardening;
     let excess = norm - yield_stress;
-    let (growth, growing) = if power == 1.0 {
-        let growing = rate / (1.0 + rate * stiffness);
-        (growing * excess, growing)
-    } else {
-        power_law(excess, yield_stress, power, (rate, stiffness, hardening))
-    };
+    let rate = length / (3.0 * relaxation);
+    let equation = Equation { excess, yield_stress, power, rate, stiffness, hardening };
+    let (growth, growing) = if power == 1.0 { equation.solve_linear() } else { equation.solve_power() };
     let mean = trace(trial) / 3.0;
     let mut deviator = *trial;
     deviator.iter_mut().take(normal_components::<S>()).for_each(|d| *d -= mean);
@@ -56,35 +52,55 @@ pub(super) fn flow<const S: usize>(
     (deviator.map(|d| 1.5 * growth / norm * d), growth)
 }
 
-/// `dp`, and its derivative by `q*`, for a power `n` above 1; `rate` is `k / (3 lambda)`, `stiffness` `c`.
-fn power_law(
+/// The equation of the overstress `f`.
+struct Equation {
+    /// `q* - Y*`.
     excess: f64,
+    /// `Y*`.
     yield_stress: f64,
+    /// `n`.
     power: f64,
-    (rate, stiffness, hardening): (f64, f64, f64),
-) -> (f64, f64) {
-    // `c dp / f`, the flow against the overstress that is left, as a logarithm: powers overflow.
-    let flow_at = |f: f64| {
-        let y = yield_stress + hardening * (excess - f) / stiffness;
-        ((stiffness * rate).ln() + (power - 1.0) * (f / y).ln(), y)
-    };
-    // Convex in the logarithm of `f`, so that Newton's method comes down to the root from above.
-    let mut logarithm = excess.ln();
-    for _ in 0..ITERATIONS {
-        let f = logarithm.exp();
-        let (flow, y) = flow_at(f);
-        let slope = 1.0 + share(flow) * (power - 1.0) * (1.0 + hardening * f / (stiffness * y));
-        let change = (logarithm + softplus(flow) - excess.ln()) / slope;
-        logarithm -= change;
-        if change.abs() <= 2.0 * f64::EPSILON * (1.0 + logarithm.abs()) {
-            break;
-        }
+    /// `k / (3 lambda)`.
+    rate: f64,
+    /// `c`.
+    stiffness: f64,
+    /// `h`.
+    hardening: f64,
+}
+
+impl Equation {
+    /// `dp`, and its derivative by `q*`, for `n = 1`.
+    fn solve_linear(&self) -> (f64, f64) {
+        let growing = self.rate / (1.0 + self.rate * self.stiffness);
+        (growing * self.excess, growing)
     }
-    let overstress = logarithm.exp();
-    let (flow, y) = flow_at(overstress);
-    let by_yield_stress = hardening * (power - 1.0) * overstress / y;
-    let growing = power / (stiffness * ((-flow).exp() + power) + by_yield_stress);
-    (excess * share(flow) / stiffness, growing)
+
+    /// `dp`, and its derivative by `q*`, for `n` above 1.
+    fn solve_power(&self) -> (f64, f64) {
+        let Self { excess, yield_stress, power, rate, stiffness, hardening } = *self;
+        // `c dp / f`, the flow against the overstress that is left, as a logarithm: powers overflow.
+        let flow_at = |f: f64| {
+            let y = yield_stress + hardening * (excess - f) / stiffness;
+            ((stiffness * rate).ln() + (power - 1.0) * (f / y).ln(), y)
+        };
+        // Convex in the logarithm of `f`, so that Newton's method comes down to the root from above.
+        let mut logarithm = excess.ln();
+        for _ in 0..ITERATIONS {
+            let f = logarithm.exp();
+            let (flow, y) = flow_at(f);
+            let slope = 1.0 + share(flow) * (power - 1.0) * (1.0 + hardening * f / (stiffness * y));
+            let change = (logarithm + softplus(flow) - excess.ln()) / slope;
+            logarithm -= change;
+            if change.abs() <= 2.0 * f64::EPSILON * (1.0 + logarithm.abs()) {
+                break;
+            }
+        }
+        let overstress = logarithm.exp();
+        let (flow, y) = flow_at(overstress);
+        let by_yield_stress = hardening * (power - 1.0) * overstress / y;
+        let growing = power / (stiffness * ((-flow).exp() + power) + by_yield_stress);
+        (excess * share(flow) / stiffness, growing)
+    }
 }
 
 /// `ln(1 + e^x)`.
