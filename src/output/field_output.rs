@@ -87,10 +87,6 @@ impl<const D: usize> FieldOutput<D> {
         for (OutputField { name, place, shape, .. }, computed) in &computed {
             fields.push(Field { name, place: *place, shape: *shape, values: &**computed.values });
         }
-        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
-        if let Some(values) = traction.as_deref() {
-            fields.push(Field { name: "contact_traction", place: Place::Node, shape: Shape::Vector, values });
-        }
         let of_cells: Vec<History> = at.body.cell_histories().collect();
         for history in &of_cells {
             let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };

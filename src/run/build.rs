@@ -9,13 +9,13 @@ use crate::{
         Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns, fixed_components,
     },
     error::{Error, Result},
-    job::{self, Fix, Job, Material, Named, Scheme},
+    job::{self, Fix, Job, Material, Named},
     material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     mesh::Mesh,
     session::Session,
     space::{Geometry, surface_points},
     state::State,
-    stepping::SolverSettings,
+    stepping::{SolverSettings, evaluation},
     tensor::Vector,
 };
 

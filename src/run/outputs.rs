@@ -19,7 +19,6 @@ use crate::{
     session::Session,
     state::State,
     stepping::StepOutcome,
-    tensor::Mandel,
 };
 use std::{
     collections::BTreeMap,

@@ -4,6 +4,7 @@ use super::{
     difference::{Against, Pair},
     document::{Norm, Over, ProbeError, Quantity, Space},
     exact::ExactFields,
+    squares::Squares,
     stored::StoredFields,
 };
 use crate::{
