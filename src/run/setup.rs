@@ -41,7 +41,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
-    let scheme = Stepper::new(session, &body, &state, job.time.scheme, build::settings(job));
+    let scheme = Stepper::new(session, &mut body, &state, job.time.scheme, build::settings(job));
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",
@@ -66,7 +66,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     } else {
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
     };
-    scheme.guesses = job.solver.guesses as usize;
+    scheme.other_starts = job.solver.guesses as usize;
     scheme.accepts_fast_flow = accepted(job).explicit_stability;
     let verdict = certificates.verdict(longest, unique_step, accepted(job));
     session.agree(refuse(loaded, &verdict))?;

@@ -1,9 +1,12 @@
 //! A step whose contacts are bounds on velocity components, as PETSc's own solver for variational inequalities sees it.
 //!
-//! `K v - b = 0` but where a bound is reached, and the force there pushes back. It knows nothing of contact graphs and
+//! `K v - b = 0` but where a velocity is at its bound, which exerts the force that is left there. It does not use the contact graphs and
 //! serves as an independent check of Newton's method on them.
 
-use super::newton::Task;
+use super::{
+    linear_solver::SolverSettings,
+    problem::{REMEDY, StepProblem, System},
+};
 use crate::{
     body::Body,
     effect::Contact,
@@ -14,6 +17,7 @@ use crate::{
 /// PETSc's solver with its bounds.
 pub(super) struct Bounded {
     snes: BoundedSnes,
+    settings: SolverSettings,
     lower: DistributedVector,
     upper: DistributedVector,
     residual: DistributedVector,
@@ -21,16 +25,30 @@ pub(super) struct Bounded {
 
 impl Bounded {
     /// A solver for velocities laid out like `like`.
-    pub fn new(like: &DistributedVector) -> Result<Self> {
+    pub fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
         let (lower, upper, residual) = (like.like()?, like.like()?, like.like()?);
-        Ok(Self { snes: BoundedSnes::new("bounds_", like)?, lower, upper, residual })
+        Ok(Self { snes: BoundedSnes::new("bounds_", like)?, settings, lower, upper, residual })
     }
 
-    /// Solves from and into the velocity `trial`, and leaves the pressures with the contacts. Collective.
-    pub fn solve<const D: usize>(
+    /// Solves from and into the velocity `trial`, and sets the pressures of the contacts; gives the iterations. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<usize> {
+        let solved = self.solve_here(&mut problem.body.contacts, system, trial);
+        let outcome = problem.session.agree(solved)?;
+        if !outcome.converged() {
+            return Err(problem.failed(outcome.words(), REMEDY));
+        }
+        Ok(outcome.iterations)
+    }
+
+    fn solve_here<const D: usize>(
         &mut self,
         contacts: &mut [Contact<D>],
-        task: Task<'_>,
+        system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<NonlinearOutcome> {
         self.lower.fill(-UNBOUNDED)?;
@@ -40,16 +58,17 @@ impl Bounded {
             contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
         }
         let bounds = [&self.lower, &self.upper];
-        let (absolute, relative) = task.tolerances();
-        let limits = Limits { absolute, relative, iterations: task.settings.newton_iterations };
-        let Some(matrix) = task.matrix.assembled() else {
+        let Some(matrix) = system.matrix.assembled() else {
             return Err(Error::Internal("bounds need the entries of the matrix".into()));
         };
-        let outcome = self.snes.solve(matrix, task.right_hand_side, bounds, trial, limits)?;
+        let SolverSettings { tolerance, newton_iterations, .. } = self.settings;
+        let limits =
+            Limits { absolute: system.tolerance, relative: tolerance, iterations: newton_iterations };
+        let outcome = self.snes.solve(matrix, system.right_hand_side, bounds, trial, limits)?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
         for contact in contacts.iter_mut() {
-            contact.bear(&velocity, &residual);
+            contact.set_reactions(&velocity, &residual);
         }
         contacts.iter().for_each(|contact| contact.add_forces(&velocity, &mut residual));
         Ok(outcome)

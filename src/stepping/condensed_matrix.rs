@@ -1,4 +1,4 @@
-//! The matrix of a step, condensed on the motions that contact laws see.
+//! The matrix of a step, condensed on the motions on which contact laws act.
 
 use super::equations::StepMatrix;
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 use mpi::topology::SimpleCommunicator;
 use std::{cell::RefCell, ops::Range};
 
-/// A motion of one contact node that laws see: one scalar unknown.
+/// A motion of one contact node on which laws act: one scalar unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
     /// Where the values of its node start in vectors of contact nodes.
@@ -19,7 +19,7 @@ pub(super) struct Motion {
 
 /// The Schur complement `S = L L^T - B` of all other motions, whole on each rank, with the springs `B` that were factored with it.
 ///
-/// Vectors hold all components of the contact nodes of a rank; motions that no law sees have no stiffness here.
+/// Vectors hold all components of the contact nodes of a rank; motions on which no law acts have no stiffness here.
 pub(super) struct CondensedMatrix {
     /// Columns of `L` from the diagonal down.
     pub lower: Vec<f64>,
@@ -285,7 +285,7 @@ impl StepMatrix for CondensedMatrix {
         self.write(amounts, z)
     }
 
-    fn look(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut subspace = self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
         self.write_blocks(project, &mut subspace.room, workspace)?;

@@ -12,14 +12,14 @@ pub trait StepMatrix {
     /// `y = K x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
-    /// `z` near `K^-1 r`, on the subspace last looked at; for matrices that PETSc makes no preconditioner of. Collective.
+    /// `z` near `K^-1 r`, on the subspace last set; for matrices that PETSc makes no preconditioner of. Collective.
     fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("a matrix that PETSc preconditions was asked to do it".into()))
     }
 
-    /// Takes in the subspace of the solves that follow, given the projection on it; says whether a preconditioner was made
+    /// Sets the subspace of the solves that follow, given the projection on it; says whether a preconditioner was made
     /// for it. Collective.
-    fn look(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    fn set_subspace(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         Ok(false)
     }
 
@@ -84,7 +84,7 @@ pub struct Scratch {
     /// The velocities of the last residual.
     pub velocity: DistributedVector,
     open: DistributedVector,
-    /// Room for the way to equilibrium.
+    /// The change of the velocities to equilibrium, where steps are solved so.
     correction: Option<DistributedVector>,
     /// Ghosted values and forces, where some contact reads ghost nodes.
     ghosted: Option<[DistributedVector; 2]>,
@@ -116,12 +116,12 @@ pub struct Effort {
     pub refreshed: usize,
     /// Linear systems that were not symmetric: some point slides under a bound that follows the pressure.
     pub coupled: usize,
-    /// Numbers that tell the sets of branches of all points apart, one a linearisation.
+    /// A number for the set of branches of all points, one a linearisation; different sets have different numbers.
     pub sets: Vec<f64>,
 }
 
 impl Effort {
-    /// Nothing done; the room for sets stays.
+    /// Nothing done; `sets` keeps its memory.
     pub fn restart(&mut self) {
         self.sets.clear();
         *self = Self { sets: std::mem::take(&mut self.sets), ..Self::default() };
@@ -167,14 +167,6 @@ fn add_contact<const D: usize>(
 }
 
 impl<const D: usize> ContactEquations<'_, D> {
-    /// Writes the velocities of these unknowns.
-    fn map(&mut self, x: &DistributedVector) -> Result<()> {
-        self.scratch.velocity.copy_from(x)?;
-        let mut velocity = self.scratch.velocity.owned_mut()?;
-        self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
-        Ok(())
-    }
-
     /// Writes the residual at the mapped velocities.
     fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
@@ -190,7 +182,11 @@ impl<const D: usize> ContactEquations<'_, D> {
 impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
         self.effort.residuals += 1;
-        self.map(x)?;
+        self.scratch.velocity.copy_from(x)?;
+        {
+            let mut velocity = self.scratch.velocity.owned_mut()?;
+            self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        }
         self.write_residual(residual)?;
         if !self.equilibrated {
             return Ok(());
@@ -213,12 +209,12 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 
     fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
-        self.map(x)?;
-        {
-            let x = x.owned()?;
-            self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x));
-        }
         let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        velocity.copy_from(x)?;
+        {
+            let (x, mut velocity) = (x.owned()?, velocity.owned_mut()?);
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x, &mut velocity));
+        }
         if let Some(cells) = &mut self.cells {
             cells.linearise(velocity)?;
         }
@@ -233,7 +229,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         }
         let digests = self.contacts.iter().map(Contact::set_digest);
         let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
-        // Half the bits suffice to tell sets apart, and add up over ranks without a carry beyond them.
+        // Half the bits are enough for different numbers, and their sum over ranks is exact.
         let [all] = self.session.sum([(mine >> 32) as f64]);
         self.effort.sets.push(all);
         match self.effort.period() {
@@ -276,7 +272,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         open.copy_from(residual)?;
         operator.reduce(open)?;
         if operator.may_project() {
-            let made = self.matrix.look(&mut |column| operator.project(column))?;
+            let made = self.matrix.set_subspace(&mut |column| operator.project(column))?;
             self.effort.refreshed += usize::from(made);
         }
         let outcome = if coupled {
@@ -303,8 +299,8 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
-/// `P Q (K + F' + C') P` in velocities, where `F` are the forces of cells, `P` holds the points on vertical parts of their
-/// graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
+/// `P Q (K + F' + C') P` in velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
+/// their graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
 /// these.
 struct Reduced<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
@@ -353,7 +349,7 @@ impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
     }
 }
 
-/// `P K P`, where `P` holds all contact points.
+/// `P K P`, where `P` removes the motions of all contact points.
 struct Inside<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
     contacts: &'a [Contact<D>],
@@ -367,7 +363,7 @@ impl<const D: usize> ProjectedOperator for Inside<'_, D> {
 
     fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
         let mut x = x.owned_mut()?;
-        self.contacts.iter().for_each(|contact| contact.hold(&mut x));
+        self.contacts.iter().for_each(|contact| contact.remove_motions(&mut x));
         Ok(())
     }
 
@@ -381,7 +377,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn branches_that_come_back_after_others_are_told_with_their_period() {
+    fn branches_that_come_back_after_others_have_a_period() {
         let period = |sets: &[f64]| Effort { sets: sets.to_vec(), ..Effort::default() }.period();
         assert_eq!(period(&[]), None);
         assert_eq!(period(&[1.0]), None);

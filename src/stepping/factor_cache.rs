@@ -3,7 +3,12 @@
 //! Step lengths are powers of two times the first one. The preconditioner of such a length serves all lengths near it: two matrices
 //! `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
 
-use super::{condensed::Factored, linear_solver::Preconditioner, newton::Newton, step_solver::Solver};
+use super::{
+    condensed::Factored,
+    linear_solver::Preconditioner,
+    newton::Newton,
+    solver::{Solver, linear, projected},
+};
 use crate::{
     error::Result,
     petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
@@ -34,29 +39,6 @@ pub(super) enum Krylov {
     Newton(Box<ProjectedKsp>, Vec<[f64; 2]>),
     /// For Newton's method on the contact alone.
     Condensed(Box<Option<Factored>>),
-}
-
-/// A solver of linear steps, for this many unknowns. Collective.
-pub(super) fn linear(session: &Session, chosen: Preconditioner, unknowns: usize) -> Result<Ksp> {
-    let mut ksp = Ksp::new("")?;
-    chosen.configure(&mut ksp, session.ranks(), unknowns)?;
-    ksp.start_from_solution()?;
-    ksp.apply_options()?;
-    Ok(ksp)
-}
-
-/// A solver for Newton's method, for vectors laid out like `like` with `D` components a node. Collective.
-pub(super) fn projected<const D: usize>(
-    session: &Session,
-    chosen: Preconditioner,
-    unknowns: usize,
-    like: &DistributedVector,
-) -> Result<ProjectedKsp> {
-    let mut solver = ProjectedKsp::new("", like, D)?;
-    chosen.configure(solver.linear_solver(), session.ranks(), unknowns)?;
-    solver.linear_solver().apply_options()?;
-    solver.set_refresh_threshold(chosen.refresh_threshold(D));
-    Ok(solver)
 }
 
 impl Krylov {

@@ -9,7 +9,7 @@
 //! from the work of the stress less that on the flow of the step by `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`,
 //! in the metric of the compliance. For implicit Euler only the last terms are left.
 
-use super::{contacts::released_by_contact, flow::FlowStart, scheme::over_ranks};
+use super::{contacts::released_by_contact, flow::FlowStart, outcome::over_ranks};
 use crate::{
     body::Body,
     effect::{Blend, Energy, Form, Peaks, Step},
@@ -23,6 +23,7 @@ use crate::{
 /// Work vectors and what a step leaves for its energy balance.
 pub(super) struct Implicit {
     formula: fn(Step) -> Blend,
+    /// The blend of the step in hand.
     blend: Blend,
     /// `u~` and `v~`, with ghosts.
     displacement: DistributedVector,
@@ -81,7 +82,7 @@ impl Implicit {
         Ok(())
     }
 
-    /// Tells contacts that are prepared for the step where it starts.
+    /// Corrects contacts that are prepared for the step for the blend from which it starts.
     pub fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -105,7 +106,7 @@ impl Implicit {
         FlowStart { displacement: &self.displacement, length: self.blend.length }
     }
 
-    /// The least residual norm in N that means something. Collective.
+    /// The residual norm in N that rounding errors of the forces make. Collective.
     pub fn rounding(&self, session: &Session) -> f64 {
         1e-13 * session.sum([self.squares])[0].sqrt()
     }

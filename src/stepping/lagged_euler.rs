@@ -7,7 +7,7 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::{contacts::released_by_contact, scheme::over_ranks};
+use super::{contacts::released_by_contact, outcome::over_ranks};
 use crate::{
     body::Body,
     effect::{Energy, Peaks, Step},
@@ -16,7 +16,7 @@ use crate::{
     state::State,
 };
 
-/// What the start of a step leaves for its energy balance.
+/// Energies that the start of a step adds to its balance.
 #[derive(Debug, Default)]
 pub(super) struct LaggedEuler {
     explicit: Energy,

@@ -1,27 +1,29 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
-mod fallbacks;
 mod bdf2;
 mod bounded;
-mod choice;
 mod condensed;
 mod condensed_matrix;
 mod contacts;
 mod cost;
 mod drives;
 mod equations;
+mod factor_cache;
+mod fallbacks;
 mod flow;
-mod multistart;
+mod frames;
 mod implicit;
 mod implicit_euler;
+mod integrator;
 mod lagged_euler;
 mod linear_solver;
+mod multistart;
 mod newton;
 mod outcome;
-mod refined;
-mod factor_cache;
-mod scheme;
+mod problem;
+mod resistance;
+mod solver;
 mod springs;
 mod step_clock;
 mod step_error;
@@ -32,11 +34,11 @@ mod stepper;
 pub use adaptive::{Adaptive, AdaptiveSettings, Pace};
 pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
+pub use integrator::evaluation;
 pub use linear_solver::{
     FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize, SolverSettings,
 };
 pub use outcome::StepOutcome;
-pub use scheme::{Scheme, evaluation};
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
 pub use step_length::{Landing, Landings, SNAP, next_step};

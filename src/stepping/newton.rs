@@ -3,77 +3,68 @@
 use super::{
     StepOutcome,
     bounded::Bounded,
-    equations::{Effort, Scratch, StepMatrix},
-    fallbacks::{FALLBACKS, Search},
-    flow::{Flow, FlowStart},
+    equations::{CellForces, ContactEquations, Effort, Scratch, cycle},
+    fallbacks::{Conditions, Fallback, Search},
+    flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
+    problem::{REMEDY, StepProblem, System},
 };
 use crate::{
     body::Body,
-    effect::{COUNTS, Contact, Energy, Peaks, PointCount, Step},
-    error::{Error, Result},
-    petsc::{DistributedVector, ProjectedKsp, Snes, has_option},
+    effect::{COUNTS, Contact, Energy, Peaks, PointCount},
+    error::Result,
+    petsc::{DistributedVector, NonlinearOutcome, ProjectedKsp, Snes, has_option},
     session::Session,
     tensor::larger,
 };
 
-/// Newton's method with what it needs.
+/// Newton's method: PETSc's solvers, work vectors and the parameters of the contact graphs.
 pub(super) struct Newton {
-    pub snes: Snes,
+    snes: Snes,
+    settings: SolverSettings,
     /// PETSc's solver for variational inequalities, if that solves the steps.
     pub bounded: Option<Bounded>,
     pub linear_solver: ProjectedKsp,
-    pub scratch: Scratch,
-    pub before: Vec<u8>,
-    pub after: Vec<u8>,
-    /// The parameters of each contact's graphs for the matrix in use: along the normal, of friction.
+    scratch: Scratch,
+    /// Branches of all contact points at the start of the step and at its end.
+    before: Vec<u8>,
+    after: Vec<u8>,
+    /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: as stiff as the body is
+    /// against motions of its surface alone, and along the normal above twice the steepest fall. With softer ones the residual is
+    /// so steep where points change their branch that line searches fail.
     pub scales: Vec<[f64; 2]>,
     /// The steepest fall of each contact's friction at the pressures of the last attempt.
-    pub falls: Vec<f64>,
+    falls: Vec<f64>,
     /// What was done for the step.
     effort: Effort,
-    /// Where the step started.
-    pub start: DistributedVector,
+    /// The velocity from which the step was started.
+    start: DistributedVector,
     /// Whether the user chose how to search along steps.
-    pub chosen_search: bool,
+    chosen_search: bool,
     /// What cells that flow need, if there are any.
     pub flow: Option<Flow>,
 }
 
-/// Share of the friction graph's parameter that its fall may reach while a step is solved, and that it is given at first.
+/// Share of the friction graph's parameter that its fall may reach while a step is solved, and the share that it has at first.
 const STEEPEST: f64 = 0.8;
-pub(super) const STEEP: f64 = 0.5;
+const STEEP: f64 = 0.5;
 
 /// Linear solves stop at this share of what the step needs.
 const LINEAR_SHARE: f64 = 0.3;
 /// First linear solves of a step reduce their residual by this factor only, while branches may still change.
 const LINEAR_REDUCTION: f64 = 1e-3;
 
-/// The equations of a step and what counts as their solution.
-#[derive(Clone, Copy)]
-pub(super) struct Task<'a> {
-    pub step: Step,
-    pub matrix: &'a dyn StepMatrix,
-    pub right_hand_side: &'a DistributedVector,
-    pub tolerance: f64,
-    pub settings: SolverSettings,
-    /// Where the displacement starts, if stresses are those at the end of the step.
-    pub flow: Option<FlowStart<'a>>,
-}
+/// Fixed-point iterations after which an attempt has failed.
+const FIXED_POINTS: usize = 200;
 
-/// The converged state that a step starts from.
-#[derive(Clone, Copy)]
-pub(super) struct From<'a> {
-    pub velocity: &'a DistributedVector,
-    pub traction: Option<&'a DistributedVector>,
-}
+const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
 
-impl Task<'_> {
-    /// The residual norm in N at which a step is solved, and the share of the first one that is small enough in any case:
-    /// where next to nothing acts but an obstacle that moves, its first push is what residuals are small against.
-    pub fn tolerances(&self) -> (f64, f64) {
-        (self.tolerance, self.settings.tolerance)
-    }
+/// How an attempt to solve a step ended.
+struct Attempt {
+    /// Newton iterations.
+    iterations: usize,
+    /// Why it failed, if it did.
+    failure: Option<String>,
 }
 
 impl Newton {
@@ -82,11 +73,13 @@ impl Newton {
         like: &DistributedVector,
         contacts: &[Contact<D>],
         linear_solver: ProjectedKsp,
+        settings: SolverSettings,
     ) -> Result<Self> {
         let mut snes = Snes::new("", like, D)?;
         snes.apply_options()?;
         Ok(Self {
             snes,
+            settings,
             bounded: None,
             linear_solver,
             scratch: Scratch::new(like, contacts)?,
@@ -101,120 +94,172 @@ impl Newton {
         })
     }
 
-    /// Chooses the parameters `c` of each contact's graphs: as stiff as the body is against motions of its surface alone, along
-    /// the normal and in sliding, and along the normal above twice the steepest fall. With softer ones the residual is so
-    /// steep where points change their branch that line searches fail. Collective.
-    pub fn choose_scales<const D: usize>(
-        &mut self,
-        session: &Session,
-        contacts: &[Contact<D>],
-        like: &DistributedVector,
-        matrix: &dyn StepMatrix,
-    ) -> Result<()> {
-        self.scales.clear();
-        let mut room = [like.like()?, like.like()?];
-        for contact in contacts {
-            self.scales.push(resistance(session, contact, matrix, &mut room)?);
-        }
-        Ok(())
-    }
-
-    /// Solves a step from the velocity in `trial`, and leaves the new one there. Collective.
+    /// Solves a step from the velocity in `trial`, and leaves the new one there: tries one fallback after the other, then checks that
+    /// velocities and pressures lie on the contact graphs. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        from: From<'_>,
-        task: Task<'_>,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let (step, settings) = (task.step, task.settings);
-        branches(body, from.velocity, &mut self.before)?;
+        write_branches(problem.body, system.converged, &mut self.before)?;
+        self.effort.restart();
         if let Some(bounded) = &mut self.bounded {
-            let contacts = &mut body.contacts;
-            let solved = bounded.solve(contacts, task, trial);
-            let outcome = session.agree(solved)?;
-            if !outcome.converged() {
-                return Err(failed(step, outcome.words(), REMEDY));
-            }
-            return self.check_inclusion(
-                session,
-                body,
-                step,
-                trial,
-                settings,
-                (outcome.iterations, &Effort::default()),
-            );
+            let iterations = bounded.solve(problem, system, trial)?;
+            return self.check_inclusion(problem, trial, iterations);
         }
-        self.linear_solver.set_tolerances(
-            LINEAR_REDUCTION,
-            LINEAR_SHARE * task.tolerance,
-            LINEAR_ITERATIONS,
-        )?;
+        let tolerance = LINEAR_SHARE * system.tolerance;
+        self.linear_solver.set_tolerances(LINEAR_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
         self.start.copy_from(trial)?;
-        let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
-        let (follows, chosen) = (body.contacts.iter().any(follows), self.chosen_search);
-        let mut attempts = FALLBACKS.iter().filter(|a| match a.iteration {
-            FrictionIteration::Newton => !follows || settings.friction == FrictionIteration::Newton,
-            FrictionIteration::FixedPoint => follows,
-        });
-        // Elsewhere what is inside is no linear problem.
-        let inside = self.flow.is_none() && !body.contacts.iter().any(Contact::needs_ghosts);
-        let mut attempts = attempts.by_ref().filter(|a| match a.search {
-            Search::FullSteps => !chosen,
-            Search::Equilibrated => inside,
-            Search::Backtracking => true,
-        });
-        largest_falls(session, &body.contacts, &mut self.falls);
-        let mut effort = std::mem::take(&mut self.effort);
-        effort.restart();
-        let mut newton_iterations = 0;
-        let mut attempt = attempts.next().copied();
-        let mut why = String::new();
-        while let Some(now) = attempt {
-            self.parametrise(body, now);
-            match self.attempt(session, body, task, now, trial, &mut effort)? {
-                Ok(iterations) => newton_iterations += iterations,
-                Err((iterations, words)) => {
-                    (newton_iterations, why) = (newton_iterations + iterations, words);
-                    attempt = attempts.next().copied();
-                    self.start_again(body, from, trial)?;
-                    continue;
-                }
+        write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
+        let mut fallbacks = self.conditions(&problem.body.contacts).fallbacks();
+        let mut next = fallbacks.next();
+        let (mut iterations, mut failure) = (0, String::new());
+        loop {
+            let Some(fallback) = next else { return Err(problem.failed(&failure, REMEDY)) };
+            self.set_graph_parameters(&mut problem.body.contacts, fallback);
+            let attempt = self.attempt(problem, system, fallback, trial)?;
+            iterations += attempt.iterations;
+            if let Some(why) = attempt.failure {
+                (failure, next) = (why, fallbacks.next());
+                trial.copy_from(&self.start)?;
+                problem.restore_pressures()?;
+                continue;
             }
             // Where the pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
-            largest_falls(session, &body.contacts, &mut self.falls);
-            let mut pairs = body.contacts.iter().zip(&self.falls);
+            write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
+            let mut pairs = problem.body.contacts.iter().zip(&self.falls);
             if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
-                break;
+                return self.check_inclusion(problem, trial, iterations);
             }
         }
-        if attempt.is_none() {
-            return Err(failed(step, &why, REMEDY));
-        }
-        let checked =
-            self.check_inclusion(session, body, step, trial, settings, (newton_iterations, &effort));
-        self.effort = effort;
-        checked
     }
 
-    /// Holds the velocity in `trial` and the pressures of the contacts against the graphs. Collective.
+    fn conditions<const D: usize>(&self, contacts: &[Contact<D>]) -> Conditions {
+        let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
+        Conditions {
+            follows_pressure: contacts.iter().any(follows),
+            friction: self.settings.friction,
+            chosen_search: self.chosen_search,
+            interior_is_linear: self.flow.is_none() && !contacts.iter().any(Contact::needs_ghosts),
+        }
+    }
+
+    /// Sets the parameters of all graphs, those of friction for its falls.
+    fn set_graph_parameters<const D: usize>(&self, contacts: &mut [Contact<D>], fallback: Fallback) {
+        let follows = fallback.iteration == FrictionIteration::Newton;
+        for ((contact, scales), fall) in contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
+            let [normal, tangential] = scales.map(|scale| fallback.stiffer * scale);
+            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
+            contact.set_friction(tangential.max(fall / STEEP), follows);
+        }
+    }
+
+    /// Tries a fallback once. A fixed-point iteration solves with friction bounds of fixed pressures, and updates these until
+    /// the bounds of the solution solve the equations, too. Collective.
+    fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        fallback: Fallback,
+        trial: &mut DistributedVector,
+    ) -> Result<Attempt> {
+        if fallback.iteration == FrictionIteration::Newton {
+            return self.iterate(problem, system, fallback.search, trial);
+        }
+        let mut sum = 0;
+        for _ in 0..FIXED_POINTS {
+            problem.body.contacts.iter_mut().for_each(Contact::take_pressures);
+            let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
+            if failure.is_some() {
+                return Ok(Attempt { iterations: sum + iterations, failure });
+            }
+            if iterations == 0 && sum > 0 {
+                // What solves the equations of the last bounds solves those of its own.
+                return Ok(Attempt { iterations: sum, failure: None });
+            }
+            sum += iterations.max(1);
+        }
+        let failure = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
+        Ok(Attempt { iterations: sum, failure: Some(failure) })
+    }
+
+    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
+    fn iterate<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        search: Search,
+        trial: &mut DistributedVector,
+    ) -> Result<Attempt> {
+        let session = problem.session;
+        {
+            let mut unknowns = trial.owned_mut()?;
+            problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        }
+        if !self.chosen_search {
+            self.snes.search_along_steps(search != Search::FullSteps)?;
+        }
+        self.effort.sets.clear();
+        let (cells, contacts) = problem.body.cells_and_contacts();
+        let mut cells = match (&mut self.flow, problem.flow_start) {
+            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
+            _ => None,
+        };
+        let mut equations = ContactEquations {
+            matrix: system.matrix,
+            cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
+            contacts,
+            right_hand_side: system.right_hand_side,
+            scratch: &mut self.scratch,
+            linear_solver: &mut self.linear_solver,
+            session,
+            stop_at_cycles: search == Search::FullSteps,
+            equilibrated: search == Search::Equilibrated,
+            effort: std::mem::take(&mut self.effort),
+        };
+        // Small relative to the first residual is enough: the right-hand side is next to zero where only an obstacle moves the body.
+        let tolerances = (system.tolerance, self.settings.tolerance);
+        let solved = self.snes.solve(&mut equations, trial, tolerances, self.settings.newton_iterations);
+        self.effort = equations.effort;
+        let iterations = self.effort.sets.len();
+        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+        // All ranks take the same branch, whichever of them failed.
+        let [missed] = session.largest([f64::from(u8::from(missed))]);
+        let failure = if missed == 0.0 {
+            None
+        } else {
+            match session.agree(solved) {
+                Ok(outcome) => Some(explain(&outcome, &self.effort)),
+                Err(error) if error.is_failure() => Some(error.to_string()),
+                Err(error) => return Err(error.into()),
+            }
+        };
+        if search == Search::Equilibrated {
+            trial.copy_from(&self.scratch.velocity)?;
+        } else {
+            let mut velocity = trial.owned_mut()?;
+            problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        }
+        Ok(Attempt { iterations, failure })
+    }
+
+    /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and sums up what the step took.
+    /// Collective.
     fn check_inclusion<const D: usize, const S: usize>(
         &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        step: Step,
+        problem: &StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
-        settings: SolverSettings,
-        (newton_iterations, effort): (usize, &Effort),
+        newton_iterations: usize,
     ) -> Result<StepOutcome> {
+        let (session, body) = (problem.session, &*problem.body);
         trial.update_ghosts()?;
-        branches(body, trial, &mut self.after)?;
+        write_branches(body, trial, &mut self.after)?;
         let changes = self.before.iter().zip(&self.after).filter(|(a, b)| a != b).count();
         let inclusion = self.inclusion_residual(session, body, trial)?;
-        if inclusion.is_nan() || inclusion > settings.inclusion_tolerance {
+        if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
             let found = format!("velocity and pressure are {inclusion:.1e} off the contact graph");
-            return Err(failed(step, &found, INCLUSION_REMEDY));
+            return Err(problem.failed(&found, INCLUSION_REMEDY));
         }
         let velocity = trial.local()?;
         let mut points = [0.0; COUNTS];
@@ -224,10 +269,10 @@ impl Newton {
         }
         Ok(StepOutcome {
             newton_iterations,
-            linear_iterations: effort.linear_iterations,
+            linear_iterations: self.effort.linear_iterations,
             active_changes: session.total(changes),
             points: PointCount::from_array(session.sum(points)),
-            indefinite_solves: effort.indefinite,
+            indefinite_solves: self.effort.indefinite,
             inclusion_residual: inclusion,
             solutions: 0,
             landed_on: None,
@@ -255,64 +300,14 @@ impl Newton {
     }
 }
 
-/// What resists a motion of a contact's boundary alone, along the normal and in sliding, in Pa s/m; along the normal no less than
-/// twice the law's steepest fall. Collective.
-fn resistance<const D: usize>(
-    session: &Session,
-    contact: &Contact<D>,
-    matrix: &dyn StepMatrix,
-    [motion, answer]: &mut [DistributedVector; 2],
-) -> Result<[f64; 2]> {
-    let mut against = |motion: &DistributedVector, square: f64| -> Result<f64> {
-        matrix.multiply(motion, answer)?;
-        let [square] = session.sum([square]);
-        Ok(positive_or_one(motion.dot(answer)? / square))
-    };
-    motion.fill(0.0)?;
-    contact.add_normals(&mut motion.owned_mut()?);
-    let square = contact.normal_square(&motion.owned()?);
-    let normal = against(motion, square)?.max(2.0 * contact.law.monotonicity_constant());
-    if contact.friction().is_none() {
-        return Ok([normal; 2]);
-    }
-    motion.fill(0.0)?;
-    contact.add_unit_sliding(&mut motion.owned_mut()?);
-    let square = contact.tangential_square(&motion.owned()?);
-    Ok([normal, against(motion, square)?])
+/// Why Newton's method failed, in words.
+fn explain(outcome: &NonlinearOutcome, effort: &Effort) -> String {
+    let words = outcome.words().to_owned();
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
-/// Sets the reference values of the contacts from the matrix of the whole body, however steps are solved. Collective.
-pub(super) fn set_reference_values<const D: usize>(
-    session: &Session,
-    contacts: &mut [Contact<D>],
-    like: &DistributedVector,
-    matrix: &dyn StepMatrix,
-) -> Result<()> {
-    if contacts.is_empty() {
-        return Ok(());
-    }
-    let mut room = [like.like()?, like.like()?];
-    for contact in contacts {
-        contact.reference.resistance = resistance(session, contact, matrix, &mut room)?;
-        [contact.reference.area] = session.sum([contact.area()]);
-    }
-    Ok(())
-}
-
-/// Takes the pressures of all contacts back to those of the converged state.
-pub(super) fn restore_pressures<const D: usize, const S: usize>(
-    body: &mut Body<D, S>,
-    from: From<'_>,
-) -> Result<()> {
-    if let Some(traction) = from.traction {
-        let traction = traction.owned()?;
-        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));
-    }
-    Ok(())
-}
-
-/// Writes the steepest fall of each contact's friction at the pressures of now, over all ranks. Collective.
-fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
+/// Writes the steepest fall of each contact's friction at the pressures that its bounds follow, over all ranks. Collective.
+fn write_largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let falls = |contact: &Contact<D>| match contact.friction() {
         Some(law) if law.steepest_fall() > 0.0 => session.largest([contact.steepest_friction_fall()])[0],
         _ => 0.0,
@@ -321,24 +316,8 @@ fn largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out
     out.extend(contacts.iter().map(falls));
 }
 
-fn positive_or_one(stiffness: f64) -> f64 {
-    if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
-}
-
-pub(super) const REMEDY: &str =
-    "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";
-
-const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
-
-pub(super) fn failed(step: Step, what: &str, remedy: &str) -> Error {
-    Error::Failed(format!(
-        "step to t = {:.6e} s (length {:.3e} s) failed: {what}; {remedy}",
-        step.time, step.length
-    ))
-}
-
-/// Branches of all contact points at owned or ghost velocities.
-fn branches<const D: usize, const S: usize>(
+/// Writes the branches of all contact points at velocities with ghosts.
+fn write_branches<const D: usize, const S: usize>(
     body: &Body<D, S>,
     velocity: &DistributedVector,
     out: &mut Vec<u8>,

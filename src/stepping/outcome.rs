@@ -1,4 +1,9 @@
-use crate::effect::{Energy, Peaks, PointCount};
+//! What a step leaves beside the state.
+
+use crate::{
+    effect::{Energy, Peaks, PointCount},
+    session::Session,
+};
 
 /// What a step cost and how well it was solved.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -15,12 +20,18 @@ pub struct StepOutcome {
     pub indefinite_solves: usize,
     /// Largest scaled distance to the contact graphs.
     pub inclusion_residual: f64,
-    /// Different solutions that were found, where others were looked for; else 0.
+    /// Different solutions that were found, where others were searched for; else 0.
     pub solutions: usize,
-    /// What the step landed on, where the log should tell.
+    /// What the step landed on, if the log reports it.
     pub landed_on: Option<&'static str>,
     /// Energies of the step, over all ranks.
     pub energy: Energy,
     /// Largest stress and strain at its end, over all ranks.
     pub peaks: Peaks,
+}
+
+/// Sums and largest values over all ranks. Collective.
+pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
+    let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);
+    (Energy::from_array(session.sum(energy.to_array())), Peaks { von_mises, strain })
 }

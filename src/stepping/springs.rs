@@ -1,7 +1,7 @@
 //! Springs on contact nodes, for factors and preconditioners of bodies that contact alone holds.
 //!
 //! Where neither supports nor inertia resist a rigid motion, the matrix `K` of a step is singular, or so nearly that its factor
-//! is made of rounding errors. `K + B` is not, with soft springs `B` along the motions that contact laws see. It is what is factored, or
+//! is made of rounding errors. `K + B` is not, with soft springs `B` along the motions on which contact laws act. It is what is factored, or
 //! what preconditioners are made of; the equations of the step keep `K`.
 
 use crate::{
@@ -16,14 +16,22 @@ use crate::{
 
 /// Stiffness of a spring over that of the matrix at its node.
 const SOFTNESS: f64 = 1e-4;
-/// The resistance of a whole body against a translation, over that of one of its nodes, below which it is as good as none.
+/// The resistance of a whole body against a translation, over that of one of its nodes, below which it does not count.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// The springs of a body.
 #[derive(Default)]
 pub(super) struct Springs {
-    /// The rigid motions that no support holds, in words, body by body; `None` before anybody asked.
+    /// The rigid motions that no support holds, in words, body by body; `None` until they are needed.
     free: Option<Vec<String>>,
+}
+
+/// The rows of the matrix `K + B` on this rank.
+pub(super) struct SprungRows {
+    pub rows: BlockRows,
+    /// The stiffness of the springs `B` in N s/m, of every motion of the contact nodes of this rank; `None` on all ranks where no body
+    /// needs any.
+    pub springs: Option<Vec<f64>>,
 }
 
 impl Springs {
@@ -39,27 +47,24 @@ impl Springs {
         }
     }
 
-    /// The rows of the matrix of steps of this length in s on this rank with the springs, and their stiffness as
-    /// [`add`](Self::add) gives it. Collective.
+    /// The rows of the matrix of steps of this length in s with the springs. Collective.
     pub fn rows<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &mut Body<D, S>,
+        body: &Body<D, S>,
         length: f64,
-    ) -> Result<(BlockRows, Option<Vec<f64>>)> {
-        let mut rows = body.matrix(session, length)?;
-        let springs = self.add(session, body, &mut rows)?;
-        Ok((rows, springs))
+    ) -> Result<SprungRows> {
+        let rows = body.matrix(session, length)?;
+        self.add(session, body, rows)
     }
 
-    /// Adds the springs to the rows of a matrix of this rank and gives their stiffness in N s/m: that of every motion of the contact
-    /// nodes of this rank; `None` on all ranks where no body needs any. Collective.
+    /// Adds the springs to the rows of a matrix. Collective.
     pub fn add<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
-        rows: &mut BlockRows,
-    ) -> Result<Option<Vec<f64>>> {
+        mut rows: BlockRows,
+    ) -> Result<SprungRows> {
         // Points of Gauss quadrature may touch nodes of other ranks.
         let nodes = contact_nodes(&body.contacts, &body.fixed);
         let nodes = nodes.iter().filter(|contact| contact.node < body.mesh.owned);
@@ -81,13 +86,13 @@ impl Springs {
         };
         let springs: Vec<f64> = motions.iter().map(stiffness).collect();
         if session.total(springs.iter().filter(|spring| **spring > 0.0).count()) == 0 {
-            return Ok(None);
+            return Ok(SprungRows { rows, springs: None });
         }
         if self.free.is_none() {
             self.free = Some(free_motions(session, &body.mesh, body.fixed.as_chunks().0, &[])?);
         }
         if self.free.as_ref().is_none_or(Vec::is_empty) {
-            return Ok(None);
+            return Ok(SprungRows { rows, springs: None });
         }
         for ((node, motion), spring) in motions.iter().zip(&springs) {
             let range = rows.offsets[*node]..rows.offsets[node + 1];
@@ -98,7 +103,7 @@ impl Springs {
                 *value += spring * motion[k / D] * motion[k % D];
             }
         }
-        Ok(Some(springs))
+        Ok(SprungRows { rows, springs: Some(springs) })
     }
 }
 

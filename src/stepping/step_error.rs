@@ -1,10 +1,11 @@
 //! The error of a step, for steps that are chosen by it.
 
-use super::Stepper;
+use super::flow::FlowStart;
 use crate::{
     body::Body,
     effect::{Curvature, Form, Step},
     error::Result,
+    petsc::DistributedVector,
     session::Session,
     state::State,
 };
@@ -21,14 +22,14 @@ pub struct Norms {
     pub stress: f64,
 }
 
-/// The error of a step with what it has to be compared with.
+/// The error of a step with the sizes that it is relative to.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepError {
     /// The error.
     pub error: Norms,
     /// Velocity and stress at the end of the step.
     pub size: Norms,
-    /// A velocity of so many times the stress is rounding, and the other way round.
+    /// A velocity below this multiple of the stress is rounding, and the other way round.
     pub negligible: Norms,
 }
 
@@ -41,36 +42,45 @@ pub(super) struct ErrorWorkspace {
     forces: Vec<f64>,
 }
 
-impl Stepper {
-    /// The error of the step that was attempted last: of the velocity, of the strain that it makes, and of what histories of
-    /// cells and nodes make of stresses and forces. Collective.
+/// A step that was solved and not yet committed.
+#[derive(Clone, Copy)]
+pub(super) struct SolvedStep<'a> {
+    pub step: Step,
+    /// The velocity at its end, with ghosts.
+    pub velocity: &'a DistributedVector,
+    /// Where the displacement starts, if stresses are those at the end of the step.
+    pub flow_start: Option<FlowStart<'a>>,
+    /// In a step of second order, the length in s by which a velocity counts in the displacement.
+    pub second_order_length: Option<f64>,
+}
+
+impl ErrorWorkspace {
+    /// The error of a step whose trial histories are those of its solution. Collective.
     pub fn error<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &mut Body<D, S>,
+        body: &Body<D, S>,
         state: &State,
-        step: Step,
+        solved: SolvedStep<'_>,
     ) -> Result<StepError> {
-        self.finish(body, state, step)?;
-        self.trial.update_ghosts()?;
+        let SolvedStep { step, velocity, flow_start, second_order_length } = solved;
         let curvature = Curvature::of(step);
-        let trial = self.trial.local()?;
+        let trial = velocity.local()?;
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let values = trial.iter().zip(now.iter().zip(before.iter()));
-        let ErrorWorkspace { curved, strained, end, forces } = &mut self.workspace;
+        let Self { curved, strained, end, forces } = self;
         write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
         // Displacements, and stresses with them, are one order better in the formula of second order.
-        let length = if self.scheme.is_two_step() && step.previous_length > 0.0 {
+        let length = if let Some(length) = second_order_length {
             strained.clone_from(curved);
-            self.method.matrix_length(step)
+            length
         } else {
             write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
             step.length
         };
         let histories = {
-            let start = self.method.flow_start();
             let (start, length) =
-                start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
+                flow_start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
             write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
             body.stress_error(curvature, end)
         };
@@ -86,8 +96,8 @@ impl Stepper {
         let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
         let [velocity, stress, all_velocity, all_stress] =
             session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
-        // With mass both are roots of energies: a body that flies free of stress has some from rounding, and one that is held moves
-        // by rounding. The square of a velocity in the norm of the viscosity is a power.
+        // With mass both are roots of energies: a body that flies without stress has some from rounding, and one that is held has a
+        // velocity from rounding. The square of a velocity in the norm of the viscosity is a power.
         let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };
         Ok(StepError {
             error: Norms { velocity, stress },

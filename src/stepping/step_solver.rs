@@ -1,41 +1,23 @@
 //! The matrix of a step with its solver.
 
 use super::{
-    StepOutcome, choice,
-    condensed::Condensed,
-    factor_cache::{self, Cached, FactorCache, Krylov},
-    flow::FlowStart,
+    StepOutcome,
+    factor_cache::{Cached, FactorCache, Krylov},
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
-    newton::{From, Newton, REMEDY, Task, failed, set_reference_values},
-    springs::Springs,
+    problem::{REMEDY, StepProblem, System},
+    resistance::{resistances_of_body, set_reference_values},
+    solver::Solver,
+    springs::{Springs, SprungRows},
 };
 use crate::{
     agreement::Agreed,
     body::Body,
-    effect::{Contact, Step},
+    effect::Contact,
     error::{Error, Result},
     petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
     session::Session,
     state::State,
 };
-
-/// What a step brings to its solution.
-#[derive(Clone, Copy)]
-pub(super) struct Known<'a> {
-    /// The right-hand side in N.
-    pub forces: &'a DistributedVector,
-    /// The least residual norm in N that means something.
-    pub rounding: f64,
-    /// Where the displacement starts, if stresses are those at the end of the step.
-    pub start: Option<FlowStart<'a>>,
-}
-
-/// The solver of a linear or of a nonlinear step: only the one that is needed exists.
-pub(super) enum Solver {
-    Linear(Ksp),
-    Newton(Box<Newton>),
-    Condensed(Box<Condensed>),
-}
 
 /// The length of a step, and that of the steps for which its preconditioner is set up, both as matrices have them, in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +38,7 @@ pub(super) struct StepSolver {
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
-    /// What else is kept.
+    /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
     /// What keeps factors of bodies that contact alone holds from being singular.
     springs: Springs,
@@ -66,21 +48,16 @@ impl StepSolver {
     /// Chooses the solver; the matrix comes with [`StepSolver::prepare`]. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         state: &State,
         settings: SolverSettings,
     ) -> Result<Self> {
-        let unknowns = body.mesh.total_nodes * D;
         let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision);
         let (preconditioner, reason) = settings.preconditioner.resolve(problem);
-        let flows = body.flows();
-        let solver = if body.contacts.is_empty() && !flows {
-            Solver::Linear(factor_cache::linear(session, preconditioner, unknowns)?)
-        } else {
-            choice::newton(session, body, state, settings, (preconditioner, problem.factor_precision()))?
-        };
+        let settings = SolverSettings { preconditioner, ..settings };
+        let solver = Solver::new(session, body, &state.velocity, settings, problem.factor_precision())?;
         Ok(Self {
-            settings: SolverSettings { preconditioner, ..settings },
+            settings,
             reason,
             cached: None,
             between: None,
@@ -127,12 +104,20 @@ impl StepSolver {
         like: &DistributedVector,
     ) -> Result<bool> {
         self.between = None;
-        let cached = self.cached_length(lengths);
-        let mut made = false;
-        if self.cached.as_ref().is_none_or(|(known, _)| *known != cached) {
-            made = self.change_matrix(session, body, cached, like)?;
+        let length = self.cached_length(lengths);
+        let mut is_new = false;
+        if self.cached.as_ref().is_none_or(|(known, _)| *known != length) {
+            let kept = self.cache.as_mut().and_then(|cache| cache.take(length));
+            is_new = kept.is_none();
+            let (matrix, krylov) = kept.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
+            self.keep_matrix_in_use(session, body, krylov, like)?;
+            let matrix = match matrix {
+                Some(matrix) => matrix,
+                None => self.set_up(session, body, length, like)?,
+            };
+            self.cached = Some((length, matrix));
         }
-        if lengths.matrix != cached {
+        if lengths.matrix != length {
             let rows = matrix_rows(session, body, lengths.matrix)?;
             self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
@@ -141,73 +126,75 @@ impl StepSolver {
         if let (Solver::Linear(ksp), Some((_, cached))) = (&mut self.solver, &self.cached) {
             ksp.set_matrices(self.between.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
         }
-        Ok(made)
+        Ok(is_new)
     }
 
-    /// The length whose matrix is set up: what is condensed serves no other.
+    /// The length whose preconditioner is set up: what is condensed serves no other.
     fn cached_length(&self, lengths: Lengths) -> f64 {
         if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
     }
 
-    /// Brings the matrix and preconditioner of this length into use; says whether they had to be made. Collective.
-    fn change_matrix<const D: usize, const S: usize>(
+    /// Moves the matrix in use with its preconditioner to those that are kept, and brings another linear solver into use: `next`, or
+    /// one that is not set up. Does nothing without a matrix. Collective.
+    fn keep_matrix_in_use<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        next: Option<Krylov>,
+        like: &DistributedVector,
+    ) -> Result<()> {
+        let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
+        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
+        let cache = match &mut self.cache {
+            Some(cache) => cache,
+            none => {
+                let bytes = 12.0 * matrix.stored_entries()?;
+                let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
+                none.insert(FactorCache::new(kept - 1))
+            }
+        };
+        let mut krylov = match next {
+            Some(krylov) => krylov,
+            None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+        };
+        krylov.exchange(&mut self.solver);
+        cache.put(Cached { length, matrix, krylov });
+        Ok(())
+    }
+
+    /// Assembles the matrix of steps of this length in s and sets the preconditioner of the linear solver in use up with it. Collective.
+    fn set_up<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
         like: &DistributedVector,
-    ) -> Result<bool> {
-        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
-        let found = self.cache.as_mut().and_then(|cache| cache.take(length));
-        let (is_there, mut next) = match found {
-            Some(Cached { matrix, krylov, .. }) => (Some(matrix), Some(krylov)),
-            None => (None, None),
-        };
-        if let Some((length, matrix)) = self.cached.take() {
-            let cache = match &mut self.cache {
-                Some(cache) => cache,
-                none => {
-                    let bytes = 12.0 * matrix.stored_entries()?;
-                    let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
-                    none.insert(FactorCache::new(kept - 1))
-                }
-            };
-            let mut krylov = match next.take() {
-                Some(krylov) => krylov,
-                None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
-            };
-            krylov.exchange(&mut self.solver);
-            cache.put(Cached { length, matrix, krylov });
-        }
-        if let Some(matrix) = is_there {
-            self.cached = Some((length, matrix));
-            return Ok(false);
-        }
-        let mut rows = matrix_rows(session, body, length)?;
+    ) -> Result<Matrix> {
+        let rows = matrix_rows(session, body, length)?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        let springs = self.springs.add(session, body, &mut rows)?;
+        let mut sprung = self.springs.add(session, body, rows)?;
         if let Solver::Condensed(condensed) = &mut self.solver {
-            if condensed.prepare(session, body, rows, springs.as_deref(), (&matrix, like))? {
+            if condensed.prepare(session, body, sprung, &matrix, like)? {
                 if condensed.precision_in_use()? == Precision::Single {
                     matrix.multiply_often()?;
                 }
-                self.cached = Some((length, matrix));
-                return Ok(true);
+                return Ok(matrix);
             }
-            self.solver = choice::whole_newton(session, body, like, self.settings, chosen)?;
-            (rows, _) = self.springs.rows(session, body, length)?;
+            self.solver = Solver::whole(session, body, like, self.settings)?;
+            sprung = self.springs.rows(session, body, length)?;
         }
+        let SprungRows { rows, springs } = sprung;
         // What the preconditioner is made of, if it is not the matrix itself.
-        let mut sprung = None;
+        let mut with_springs = None;
         if springs.is_some() {
-            sprung = Some(session.agree(Matrix::symmetric(D, &rows))?);
+            with_springs = Some(session.agree(Matrix::symmetric(D, &rows))?);
         }
         drop(rows);
-        if chosen == Preconditioner::Gamg {
+        if self.settings.preconditioner == Preconditioner::Gamg {
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
-            sprung.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
+            with_springs.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
         }
-        if chosen != Preconditioner::Cholesky {
+        if self.settings.preconditioner != Preconditioner::Cholesky {
             matrix.multiply_often()?;
         }
         match &mut self.solver {
@@ -216,14 +203,13 @@ impl StepSolver {
                 session.agree(ksp.set_up())?;
             }
             Solver::Newton(newton) => {
-                let constant = sprung.as_ref().unwrap_or(&matrix);
+                let constant = with_springs.as_ref().unwrap_or(&matrix);
                 session.agree(newton.linear_solver.set_constant(constant))?;
-                newton.choose_scales(session, &body.contacts, like, &matrix)?;
+                newton.scales = resistances_of_body(session, &body.contacts, like, &matrix)?;
             }
             Solver::Condensed(_) => {}
         }
-        self.cached = Some((length, matrix));
-        Ok(true)
+        Ok(matrix)
     }
 
     /// The matrix in use.
@@ -248,7 +234,7 @@ impl StepSolver {
     }
 
     /// Bytes that were moved on this rank since then, at the least; `None` where that is not counted: cells that flow, PETSc's solver
-    /// for variational inequalities, preconditioners that don't tell their size.
+    /// for variational inequalities, preconditioners whose size is not known.
     pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
         let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
         match &mut self.solver {
@@ -281,102 +267,123 @@ impl StepSolver {
         }
     }
 
-    /// Solves a step from the velocity in `trial`, and leaves the new one there. Collective.
+    /// Solves a step from the velocity in `trial`, and leaves the new one there. Where it fails, it is tried again with a factor in
+    /// double precision and with the tolerance that rounding errors of the solution allow. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        state: &State,
-        step: Step,
-        known: Known<'_>,
+        problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        let Known { forces, rounding, start } = known;
-        let norm = forces.norm()?;
-        if !norm.is_finite() {
-            return Err(failed(
-                step,
-                "the forces are not finite",
-                "check loads and initial values; use smaller steps",
-            ));
+        let (session, state, forces) = (problem.session, problem.state, problem.forces);
+        let mut tolerance = self.tolerance(problem, trial)?;
+        let mut is_relaxed = false;
+        loop {
+            let (_, matrix) =
+                self.between.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
+                    Error::Internal("a step was taken before its matrix was assembled".into())
+                })?;
+            let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
+            let solved = match &mut self.solver {
+                Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
+                Solver::Newton(newton) => newton.solve(problem, system, trial),
+                Solver::Condensed(condensed) => condensed.solve(problem, system, trial),
+            };
+            let failure = match session.agree(solved) {
+                Err(failure) if failure.is_failure() => failure,
+                solved => return solved.map_err(|error| self.springs.explain(error)),
+            };
+            if self.factor_in_use()? == Some(Precision::Single) {
+                session.agree(self.factor_in_double(problem, trial))?;
+                continue;
+            }
+            // The start may be much less than the solution, above all at rest.
+            let mut answer = forces.like()?;
+            self.precondition(forces, &mut answer)?;
+            let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
+            if is_relaxed || !floor.is_finite() || floor <= tolerance {
+                return Err(self.springs.explain(failure));
+            }
+            if !self.is_nonlinear() {
+                trial.copy_from(&answer)?;
+            }
+            (tolerance, is_relaxed) = (floor, true);
         }
-        // As many newtons as if all unknowns bore alike. At rest under steady loads the forces cancel: pressures are told apart
-        // no better than what rounding leaves of them.
-        let told = norm.max(rounding / self.settings.inclusion_tolerance);
-        let total = told * ((body.mesh.total_nodes * D) as f64).sqrt();
+    }
+
+    /// The residual norm in N to which a step is solved; refuses forces that are not finite. Sets the reference forces of the
+    /// contacts. Collective.
+    fn tolerance<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        start: &DistributedVector,
+    ) -> Result<f64> {
+        let norm = problem.forces.norm()?;
+        if !norm.is_finite() {
+            let remedy = "check loads and initial values; use smaller steps";
+            return Err(problem.failed("the forces are not finite", remedy));
+        }
+        let StepProblem { session, body, rounding, .. } = problem;
+        // The sum of the forces as if those of all unknowns were equal. At rest under steady loads the forces cancel: pressures are known
+        // no better than their rounding errors.
+        let size = norm.max(*rounding / self.settings.inclusion_tolerance);
+        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
         // No residual below the rounding of `K v` is asked for, however small the forces that are left; friction on a moving
         // obstacle rounds `v` as a difference from its velocity.
-        let mut motion = trial.norm()?;
+        let mut motion = start.norm()?;
         if body.contacts.iter().any(Contact::may_drift) {
             let mine = body.contacts.iter().map(Contact::drift_square).sum();
             motion += session.sum([mine])[0].sqrt();
         }
         let product = f64::EPSILON * self.matrix_norm * motion;
-        let tolerance = (self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(rounding).max(product);
-        let solved = self.solve_to(session, body, state, (step, start), (forces, tolerance), trial);
-        let solved = session.agree(solved);
-        if !solved.as_ref().is_err_and(Agreed::is_failure) {
-            return Ok(solved?);
-        }
-        // The start may be much less than the solution, above all at rest.
-        let mut answer = forces.like()?;
-        self.precondition(forces, &mut answer)?;
-        let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
-        if floor.is_finite() && floor > tolerance {
-            if !self.is_nonlinear() {
-                trial.copy_from(&answer)?;
-            }
-            let solved = self.solve_to(session, body, state, (step, start), (forces, floor), trial);
-            return session.agree(solved).map_err(|failure| self.springs.explain(failure));
-        }
-        solved.map_err(|failure| self.springs.explain(failure))
+        Ok((self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(*rounding).max(product))
     }
 
-    /// Solves a step to this residual norm in N. Collective.
-    fn solve_to<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &mut Body<D, S>,
-        state: &State,
-        (step, start): (Step, Option<FlowStart<'_>>),
-        (forces, tolerance): (&DistributedVector, f64),
-        trial: &mut DistributedVector,
-    ) -> Result<StepOutcome> {
-        let Some((length, matrix)) = self.between.as_ref().or(self.cached.as_ref()) else {
-            return Err(Error::Internal("a step was taken before its matrix was assembled".into()));
-        };
-        let from = From { velocity: &state.velocity, traction: state.contact_traction.as_ref() };
-        let task =
-            Task { step, matrix, right_hand_side: forces, tolerance, settings: self.settings, flow: start };
+    /// The precision of the factor in use, where steps are solved on the contact alone.
+    fn factor_in_use(&mut self) -> Result<Option<Precision>> {
         match &mut self.solver {
-            Solver::Linear(ksp) => {
-                ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
-                let outcome = session.agree(ksp.solve(forces, trial))?;
-                if !outcome.converged() {
-                    return Err(failed(step, outcome.words(), REMEDY));
-                }
-                Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
-            }
-            Solver::Newton(newton) => newton.solve(session, body, from, task, trial),
-            Solver::Condensed(condensed) => {
-                if let Some(outcome) = condensed.solve(session, body, from, task, trial)? {
-                    return Ok(outcome);
-                }
-                condensed.precision = Precision::Double;
-                let (rows, springs) = self.springs.rows(session, body, *length)?;
-                condensed.prepare(session, body, rows, springs.as_deref(), (matrix, forces))?;
-                let solved = condensed.solve(session, body, from, task, trial)?;
-                solved.ok_or_else(|| Error::Internal("a factor in double precision was not enough".into()))
-            }
+            Solver::Condensed(condensed) => condensed.precision_in_use().map(Some),
+            _ => Ok(None),
         }
     }
+
+    /// Replaces a factor in single precision that was not enough, and takes the step back to its start. Collective.
+    fn factor_in_double<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        let (length, matrix) =
+            self.between.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
+        let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
+        condensed.start_again(trial)?;
+        problem.restore_pressures()?;
+        condensed.precision = Precision::Double;
+        let rows = self.springs.rows(problem.session, problem.body, length)?;
+        condensed.prepare(problem.session, problem.body, rows, matrix, problem.forces)?;
+        Ok(())
+    }
+}
+
+/// Solves a step without contact and flow. Collective.
+fn solve_linear<const D: usize, const S: usize>(
+    ksp: &mut Ksp,
+    problem: &StepProblem<'_, D, S>,
+    tolerance: f64,
+    trial: &mut DistributedVector,
+) -> Result<StepOutcome> {
+    ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
+    let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
+    if !outcome.converged() {
+        return Err(problem.failed(outcome.words(), REMEDY));
+    }
+    Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
 }
 
 /// The rows of the matrix here, which PETSc can count. Collective.
 fn matrix_rows<const D: usize, const S: usize>(
     session: &Session,
-    body: &mut Body<D, S>,
+    body: &Body<D, S>,
     length: f64,
 ) -> Result<BlockRows, Agreed> {
     let rows = body.matrix(session, length)?;

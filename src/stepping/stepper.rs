@@ -1,21 +1,22 @@
-//! A step as all schemes take it: right-hand side, contact, solution, commit, energy balance.
+//! A step as all schemes take it: matrix, right-hand side, contact, solution, commit, energy balance.
 
 use super::{
     StepOutcome,
     contacts::{commit_tractions, prepare_contacts},
     factor_cache::nearest,
+    integrator::Integrator,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
-    multistart::{is_new, other_solutions},
-    scheme::{Method, Scheme},
+    multistart::solve_and_search,
+    problem::StepProblem,
     step_clock::{Stages, StepClock, StepTraffic},
-    step_error::ErrorWorkspace,
-    step_solver::{Known, Lengths, StepSolver},
+    step_error::{ErrorWorkspace, SolvedStep, StepError},
+    step_solver::{Lengths, StepSolver},
 };
 use crate::{
     body::{Body, PassBytes},
     effect::Step,
-    error::{Error, Result},
+    error::Result,
     petsc::{DistributedVector, Precision},
     session::Session,
     state::State,
@@ -24,22 +25,22 @@ use std::time::Instant;
 
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
-    pub(super) scheme: Scheme,
-    pub(super) method: Method,
+    scheme: Scheme,
+    integrator: Integrator,
     stages: Stages,
     solver: StepSolver,
     load: Option<DistributedVector>,
     load_is_current: bool,
     right_hand_side: DistributedVector,
-    pub(super) trial: DistributedVector,
+    trial: DistributedVector,
     /// Whether the scheme has finished the step that was attempted last, so that trial histories are those of its solution.
     is_finished: bool,
     /// Room for the error of a step.
-    pub(super) workspace: ErrorWorkspace,
-    /// Length in s through which the ladder of preconditioners goes.
-    ladder: f64,
-    /// Other starts from which steps with contact are solved, to look for other solutions.
-    pub guesses: usize,
+    workspace: ErrorWorkspace,
+    /// Length in s of which those with preconditioners are a power of two.
+    base_length: f64,
+    /// Number of other start velocities from which steps with contact are solved to search for other solutions.
+    pub other_starts: usize,
     /// Whether steps may be longer than explicit flow allows at the stresses that occur.
     pub accepts_fast_flow: bool,
     /// Preconditioners that were made.
@@ -55,14 +56,14 @@ impl Stepper {
     /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
-        body: &Body<D, S>,
+        body: &mut Body<D, S>,
         state: &State,
         scheme: Scheme,
         settings: SolverSettings,
     ) -> Result<Self> {
         Ok(Self {
             scheme,
-            method: Method::new(scheme, state)?,
+            integrator: Integrator::new(scheme, state)?,
             stages: Stages::register()?,
             solver: StepSolver::new(session, body, state, settings)?,
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
@@ -71,8 +72,8 @@ impl Stepper {
             trial: state.velocity.like()?,
             is_finished: false,
             workspace: ErrorWorkspace::default(),
-            ladder: 1.0,
-            guesses: 0,
+            base_length: 1.0,
+            other_starts: 0,
             accepts_fast_flow: false,
             set_ups: 0,
             clock: StepClock::default(),
@@ -106,15 +107,15 @@ impl Stepper {
         self.solver.factor_precision()
     }
 
-    /// Assembles the matrix for a first step of this length. Preconditioners will stand at this length and at powers of two
-    /// times it. Collective.
+    /// Assembles the matrix for a first step of this length. Preconditioners are made for this length and powers of two times
+    /// it. Collective.
     pub fn prepare_length<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
     ) -> Result<()> {
-        self.ladder = length;
+        self.base_length = length;
         self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })
     }
 
@@ -125,8 +126,8 @@ impl Stepper {
         body: &mut Body<D, S>,
         step: Step,
     ) -> Result<()> {
-        let cached = self.method.steady_length(nearest(self.ladder, step.length));
-        let lengths = Lengths { matrix: self.method.matrix_length(step), cached };
+        let cached = self.integrator.steady_length(nearest(self.base_length, step.length));
+        let lengths = Lengths { matrix: self.integrator.matrix_length(step), cached };
         if self.solver.is_prepared_for(lengths) {
             return Ok(());
         }
@@ -187,48 +188,50 @@ impl Stepper {
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
-        let others = if self.guesses > 0 && !body.contacts.is_empty() {
-            let known = known(session, &self.method, &self.right_hand_side);
-            let (solver, trial) = (&mut self.solver, &self.trial);
-            let others = other_solutions(session, (body, state), step, known, solver, trial, self.guesses)?;
-            self.start(session, body, state, step)?;
-            Some(others)
-        } else {
-            None
+        let mut problem = StepProblem {
+            session,
+            body,
+            state,
+            step,
+            forces: &self.right_hand_side,
+            rounding: self.integrator.rounding(session),
+            flow_start: self.integrator.flow_start(),
         };
-        let outcome = self.solve(session, body, state, step, others.as_deref());
+        let outcome = if self.other_starts == 0 || problem.body.contacts.is_empty() {
+            self.solver.solve(&mut problem, &mut self.trial)
+        } else {
+            solve_and_search(&mut self.solver, &mut problem, &mut self.trial, self.other_starts)
+        };
         drop(stage);
         self.clock.solve += solving.elapsed();
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
         outcome
     }
 
-    /// Solves the prepared step, and tells how many different solutions it has beside these. Collective.
-    fn solve<const D: usize, const S: usize>(
+    /// The error of the step that was attempted last: of the velocity, of the strain that it makes, and of what histories of
+    /// cells and nodes make of stresses and forces. Collective.
+    pub fn error<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
         step: Step,
-        others: Option<&[DistributedVector]>,
-    ) -> Result<StepOutcome> {
-        let known = known(session, &self.method, &self.right_hand_side);
-        let solved = self.solver.solve(session, body, state, step, known, &mut self.trial);
-        let Some(others) = others else { return solved };
-        match session.agree(solved) {
-            Ok(outcome) => {
-                let solutions = others.len() + usize::from(is_new(others, &self.trial)?);
-                Ok(StepOutcome { solutions, ..outcome })
-            }
-            Err(error) if error.is_failure() => {
-                Err(Error::Failed(format!("{error}; solutions found from other starts: {}", others.len())))
-            }
-            Err(other) => Err(other.into()),
-        }
+    ) -> Result<StepError> {
+        self.finish(body, state, step)?;
+        self.trial.update_ghosts()?;
+        let second_order_length = (self.scheme.is_two_step() && step.previous_length > 0.0)
+            .then(|| self.integrator.matrix_length(step));
+        let solved = SolvedStep {
+            step,
+            velocity: &self.trial,
+            flow_start: self.integrator.flow_start(),
+            second_order_length,
+        };
+        self.workspace.error(session, body, state, solved)
     }
 
     /// Does what the scheme has left to do for the step that was attempted last, once. Collective.
-    pub(super) fn finish<const D: usize, const S: usize>(
+    fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -237,7 +240,7 @@ impl Stepper {
         if self.is_finished {
             return Ok(());
         }
-        self.method.finish(body, state, &mut self.trial, step)?;
+        self.integrator.finish(body, state, &mut self.trial, step)?;
         if self.scheme.is_implicit() {
             self.traffic.add_solve(Some(self.passes.finish));
         }
@@ -256,18 +259,18 @@ impl Stepper {
     ) -> Result<()> {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
-        self.method.finish(body, state, &mut self.trial, step)?;
+        self.integrator.finish(body, state, &mut self.trial, step)?;
         if self.scheme.is_implicit() {
             self.traffic.add_solve(Some(self.passes.finish));
         }
-        self.method.commit(state, &self.trial, step)?;
+        self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
         drop(stage);
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
-        (outcome.energy, outcome.peaks) = self.method.energy(session, body, state, step)?;
+        (outcome.energy, outcome.peaks) = self.integrator.energy(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
             outcome.energy.work += step.length * load.dot(&state.velocity)?;
@@ -277,7 +280,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Loads and what the scheme knows of the other forces, zero at held components.
+    /// Loads and the other forces that the scheme knows before the step, zero at held components.
     fn write_right_hand_side<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -294,7 +297,7 @@ impl Stepper {
         {
             let mut forces = self.right_hand_side.local_mut()?;
             forces.fill(0.0);
-            self.method.start(body, state, step, &mut forces)?;
+            self.integrator.start(body, state, step, &mut forces)?;
         }
         self.right_hand_side.add_ghosts_to_owners()?;
         if let Some(load) = &self.load {
@@ -315,7 +318,7 @@ impl Stepper {
     ) -> Result<()> {
         self.extrapolate(state, step)?;
         let prepared = prepare_contacts(body, state, step);
-        Ok(session.agree(prepared.and_then(|()| self.method.prepare_contacts(body, state, step)))?)
+        Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
     }
 
     /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.
@@ -339,11 +342,6 @@ impl Stepper {
         }
         Ok(())
     }
-}
-
-/// What the scheme brings to the solution of a step under these forces.
-fn known<'a>(session: &Session, method: &'a Method, forces: &'a DistributedVector) -> Known<'a> {
-    Known { forces, rounding: method.rounding(session), start: method.flow_start() }
 }
 
 /// Whether there are two velocities to start a step from.

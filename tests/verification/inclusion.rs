@@ -33,6 +33,7 @@ pub fn judged(session: &Session) {
                 (0..2 * run.body.mesh.owned).map(|i| 1e3 * noise(u64::from(ids[i / 2]) * 2 + i as u64 % 2)).collect();
             let velocity = run.state.velocity.local().expect("values");
             let contact = &mut run.body.contacts[0];
+            contact.number_unknowns(|node| node);
             let range = session.largest(contact.range(&velocity));
             let distance = contact.inclusion_residual(&velocity, &open, range);
             // As the attempts of a step do.

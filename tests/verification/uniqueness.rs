@@ -130,11 +130,13 @@ fn falling<const D: usize, const S: usize>(
     run: &Simulation<D, S>,
     contacts: &mut [Contact<D>],
 ) -> Dense {
+    contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| node));
     let mut unknowns = run.state.velocity.like().expect("vector");
     {
         let mut unknowns = unknowns.owned_mut().expect("values");
         contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
-        contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&unknowns));
+        let mut velocity = unknowns.to_vec();
+        contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&unknowns, &mut velocity));
     }
     let rest = run.state.velocity.like().expect("vector");
     let rest = rest.local().expect("values");

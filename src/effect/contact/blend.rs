@@ -1,6 +1,6 @@
 //! Contact in steps that start from a blend of the two states before.
 
-use super::Contact;
+use super::{Contact, point::Vectors};
 use crate::{
     contact::Rate,
     effect::{Blend, Step},
@@ -15,7 +15,7 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         }
         for point in &mut self.points {
-            point.shift = point.normal_component(shift);
+            point.shift = point.normal_component(Vectors::Body, shift);
             point.context.penetration += point.shift;
             point.context.step_length = blend.length;
         }

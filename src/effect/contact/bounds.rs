@@ -1,6 +1,9 @@
 //! Contacts whose laws are nothing but bounds on one velocity component each.
 
-use super::{Contact, point::Unknown};
+use super::{
+    Contact,
+    point::{Unknown, Vectors::Newton},
+};
 use crate::contact::NodeContext;
 
 /// How far a normal may be off an axis, as a part of its length.
@@ -15,14 +18,14 @@ impl<const D: usize> Contact<D> {
         free.into_iter().find(|p| !is_simple(axis(&p.direction))).map(|p| &p.place)
     }
 
-    /// Lowers `upper` and raises `lower`, one entry a velocity component of the owned nodes, to what the law allows.
+    /// Lowers `upper` and raises `lower`, vectors of Newton's method with one entry a velocity component, to what the law allows.
     pub fn add_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let Some((axis, bound)) = axis(&point.direction).zip(self.law.velocity_bound(point.context))
             else {
                 continue;
             };
-            let (at, bound) = (point.node() * D + axis, bound / point.stretch);
+            let (at, bound) = (point.first(Newton) * D + axis, bound / point.stretch);
             if point.direction[axis] > 0.0 {
                 upper[at] = upper[at].min(bound);
             } else {
@@ -31,13 +34,14 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Takes the pressures at points on their bounds from the forces in N that are left there, none elsewhere.
-    pub fn bear(&mut self, velocity: &[f64], residual: &[f64]) {
+    /// Sets the pressures at points on their bounds to those that balance the forces in N that are left there, elsewhere to zero. Both
+    /// are vectors of Newton's method.
+    pub fn set_reactions(&mut self, velocity: &[f64], residual: &[f64]) {
         let law = &self.law;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let bound = law.velocity_bound(point.context).unwrap_or(f64::INFINITY) / point.stretch;
-            let borne = -point.along(residual) / (point.weight * point.stretch);
-            point.pressure = if point.along(velocity) >= bound { borne.max(0.0) } else { 0.0 };
+            let reaction = -point.along(Newton, residual) / (point.weight * point.stretch);
+            point.pressure = if point.along(Newton, velocity) >= bound { reaction.max(0.0) } else { 0.0 };
         }
     }
 }

@@ -3,10 +3,10 @@
 use super::{
     Contact,
     friction::{Friction, Motion},
-    point::Unknown,
+    point::{Unknown, Vectors::Newton},
 };
 
-/// Branches of normal laws that are told apart; the last takes in all that follow.
+/// Branches of normal laws that are counted one by one; the last count includes all that follow.
 const BRANCHES: usize = 8;
 
 /// How many numbers a [`PointCount`] is.
@@ -19,7 +19,7 @@ pub struct PointCount {
     pub held: usize,
     /// Without pressure.
     pub open: usize,
-    /// On each branch of the normal law, in the order of velocity; the last entry takes in all that follow.
+    /// On each branch of the normal law, in the order of velocity; the last entry includes all that follow.
     pub branches: [usize; BRANCHES],
     /// With friction and at rest under it.
     pub sticking: usize,
@@ -46,12 +46,12 @@ impl PointCount {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Counts the points here by what happens there.
+    /// Counts the points here by what happens there, at velocities in a vector of Newton's method.
     pub fn count(&self, velocity: &[f64]) -> PointCount {
         let mut count = PointCount::default();
         for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {
-            count.open += usize::from(point.pressure_at(&self.law, velocity) == 0.0);
-            let along = point.normal_component(velocity);
+            count.open += usize::from(point.pressure_at(&self.law, Newton, velocity) == 0.0);
+            let along = point.normal_component(Newton, velocity);
             let branch = if point.unknown == Unknown::Parameter {
                 let found = self.law.resolve(self.scale * along + point.pressure, self.scale, point.context);
                 count.held += usize::from(found.derivative == 0.0);

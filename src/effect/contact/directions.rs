@@ -1,4 +1,4 @@
-//! The motions of nodes that contact laws see.
+//! The motions of nodes on which contact laws act.
 
 use super::{
     Contact,
@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 pub struct ContactNode<const D: usize> {
     /// Its number on this rank.
     pub node: usize,
-    /// Orthonormal directions; in the first `seen` of them laws act.
+    /// Orthonormal directions; laws act along the first `seen` of them.
     pub frame: [Vector<D>; D],
-    /// How many directions are seen: none where supports hold the node.
+    /// Directions along which laws act: none where supports hold the node.
     pub seen: usize,
 }
 
@@ -32,7 +32,7 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) ->
             nodes.entry(point.node()).or_default().push(seen);
         }
         let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
-        tangential.for_each(|point| nodes.entry(point.node).or_default().push(None));
+        tangential.for_each(|point| nodes.entry(point.node()).or_default().push(None));
     }
     let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
@@ -68,14 +68,7 @@ impl<const D: usize> Contact<D> {
         let rubs = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
         let tangents = rubs
             .flat_map(|friction| &friction.points)
-            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node, *tangent)));
+            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)));
         points.chain(tangents).collect()
-    }
-
-    /// Gives the nodes of all points other numbers: those of arrays that hold the nodes of contacts alone, and back.
-    pub fn number_nodes(&mut self, number: impl Fn(usize) -> usize) {
-        self.points.iter_mut().for_each(|point| point.set_node(number(point.node())));
-        let friction = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
-        friction.for_each(|point| point.node = number(point.node));
     }
 }

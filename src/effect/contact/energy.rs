@@ -1,11 +1,14 @@
 //! What a contact stores, dissipates and takes from its obstacle, and how deep it lies in that.
 
-use super::{Contact, point::Point};
+use super::{
+    Contact,
+    point::{Point, Vectors::Body},
+};
 use crate::{error::Result, tensor::larger};
 
 impl<const D: usize> Contact<D> {
     /// Energy in J that a step of this length dissipated, the scheme's own term, and the work of the obstacle on the body, from
-    /// velocities at its end.
+    /// velocities at its end (with ghosts).
     ///
     /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
     /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme. Friction `q` on an obstacle
@@ -13,8 +16,8 @@ impl<const D: usize> Contact<D> {
     pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 3] {
         let mut sums = [0.0; 3];
         for point in &self.points {
-            let v = point.normal_component(velocity);
-            let pressure = point.pressure_at(&self.law, velocity);
+            let v = point.normal_component(Body, velocity);
+            let pressure = point.pressure_at(&self.law, Body, velocity);
             let work = length * pressure * v;
             let change = point.context.step_length * v;
             let after = point.context.penetration + change;
@@ -44,7 +47,7 @@ impl<const D: usize> Contact<D> {
     pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
         let depth = |point: &Point<D>| {
             let gap = self.gap.at(time, &point.place, &point.normal);
-            gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(displacement) - gap)
+            gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(Body, displacement) - gap)
         };
         self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
     }
@@ -56,7 +59,7 @@ impl<const D: usize> Contact<D> {
         }
         let energy = |point: &Point<D>| {
             let gap = self.gap.at(time, &point.place, &point.normal)?;
-            let stored = self.law.energy(point.normal_component(displacement) - gap);
+            let stored = self.law.energy(point.normal_component(Body, displacement) - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };
         self.points.iter().map(energy).sum()

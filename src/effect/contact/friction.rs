@@ -14,8 +14,8 @@
 //! equation is taken from the tangential ones ([`Friction::reduce`]).
 
 use super::{
-    inclusion::ReferenceValues,
-    point::{Point, Unknown},
+    point::{Point, Unknown, Vectors},
+    reference::{ReferenceValues, worst},
     tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
 };
 use crate::{
@@ -86,7 +86,7 @@ impl<const D: usize> Friction<D> {
             }
             out.push(TangentialPoint {
                 at,
-                node,
+                numbers: [node; 2],
                 weight: point.weight,
                 tangents,
                 count,
@@ -100,7 +100,7 @@ impl<const D: usize> Friction<D> {
         Ok(Self { law, scale: 1.0, follows, points: out, drift: Vec::new(), held: held_tangents })
     }
 
-    /// Forgets points that have no tangent.
+    /// Removes points that have no tangent.
     pub fn keep_points_with_tangents(&mut self) {
         self.points.retain(|point| point.count > 0);
     }
@@ -108,19 +108,21 @@ impl<const D: usize> Friction<D> {
     /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
     pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
-            point.traction = point.along(traction);
+            point.traction = point.along(Vectors::Body, traction);
             point.pressure = points[point.at].pressure;
         }
     }
 
-    /// Goes by the pressures of `points` from now on.
+    /// Takes the pressures of `points` as those that the bounds follow.
     pub fn take_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
     }
 
     /// Turns velocities into unknowns.
     pub fn unmap(&self, values: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(1.0 / self.scale, &point.traction, values));
+        self.points
+            .iter()
+            .for_each(|point| point.add(Vectors::Newton, 1.0 / self.scale, &point.traction, values));
         self.add_drift(-1.0, values);
     }
 
@@ -131,7 +133,7 @@ impl<const D: usize> Friction<D> {
             self.take_pressures(points);
         }
         for point in &mut self.points {
-            let unknown = point.along(values);
+            let unknown = point.along(Vectors::Newton, values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let shares = if found.traction == 0.0 {
@@ -150,13 +152,18 @@ impl<const D: usize> Friction<D> {
 
     /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
     fn add_drift(&self, factor: f64, values: &mut [f64]) {
-        self.points.iter().zip(&self.drift).for_each(|(point, drift)| point.add(factor, drift, values));
+        let pairs = self.points.iter().zip(&self.drift);
+        pairs.for_each(|(point, drift)| point.add(Vectors::Newton, factor, drift, values));
     }
 
     /// The points with their sliding velocities.
-    fn sliding(&self, velocity: &[f64]) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
-        self.points.iter().enumerate().map(|(at, point)| {
-            let along = point.along(velocity);
+    fn sliding(
+        &self,
+        vectors: Vectors,
+        velocity: &[f64],
+    ) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
+        self.points.iter().enumerate().map(move |(at, point)| {
+            let along = point.along(vectors, velocity);
             let drift = self.drift.get(at);
             (point, drift.map_or(along, |drift| std::array::from_fn(|i| along[i] - drift[i])))
         })
@@ -169,7 +176,7 @@ impl<const D: usize> Friction<D> {
     pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
         let (law, scale, follows) = (self.law, self.scale, self.follows);
         for point in &mut self.points {
-            let unknown = point.along(values);
+            let unknown = point.along(Vectors::Newton, values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let at_rest = length == 0.0 || found.speed == 0.0;
@@ -195,7 +202,7 @@ impl<const D: usize> Friction<D> {
     pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;
         for point in &mut self.points {
-            let unknown = point.along(values);
+            let unknown = point.along(Vectors::Newton, values);
             let Tangent { toward, theta, coefficient, .. } = point.tangent;
             let ahead = dot(&toward, &unknown);
             let pressed = coefficient * points[point.at].change / scale;
@@ -209,25 +216,27 @@ impl<const D: usize> Friction<D> {
 
     /// Adds the forces of the last evaluation.
     pub fn add_forces(&self, forces: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(point.weight, &point.traction, forces));
+        self.points
+            .iter()
+            .for_each(|point| point.add(Vectors::Newton, point.weight, &point.traction, forces));
     }
 
     /// Adds the change of the forces along the last direction.
     pub fn add_derivative(&self, forces: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(point.weight, &point.change, forces));
+        self.points.iter().for_each(|point| point.add(Vectors::Newton, point.weight, &point.change, forces));
     }
 
     /// Adds the tractions to nodal values.
     pub fn add_tractions(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(1.0, &point.traction, nodal));
+        self.points.iter().for_each(|point| point.add(Vectors::Body, 1.0, &point.traction, nodal));
     }
 
     /// Adds the change of the forces with the velocity where points slide; nothing of the pressure of vertical graphs.
     pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
-            let pressed = normal.slope * normal.along(direction);
-            point.add(point.weight, &point.sliding_change(direction, pressed), forces);
+            let pressed = normal.slope * normal.along(Vectors::Newton, direction);
+            point.add(Vectors::Newton, point.weight, &point.sliding_change(direction, pressed), forces);
         }
     }
 
@@ -237,8 +246,8 @@ impl<const D: usize> Friction<D> {
         for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
             let normal = &points[point.at];
             if normal.theta == 0.0 {
-                let open = normal.along(values);
-                point.add(-point.tangent.coefficient * open, &point.tangent.toward, values);
+                let open = normal.along(Vectors::Newton, values);
+                point.add(Vectors::Newton, -point.tangent.coefficient * open, &point.tangent.toward, values);
             }
         }
     }
@@ -249,7 +258,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Removes from nodal values what moves any point along its tangents.
-    pub fn hold(&self, values: &mut [f64]) {
+    pub fn remove_motions(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.set(&[0.0; D], values));
     }
 
@@ -257,12 +266,12 @@ impl<const D: usize> Friction<D> {
     pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
         for point in &self.points {
             if point.tangent.sticks {
-                let open = point.along(open);
+                let open = point.along(Vectors::Newton, open);
                 point.set(&open.map(|force| force / (self.scale * point.weight)), values);
             } else {
                 let normal = &points[point.at];
-                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(values);
-                point.add(1.0 / self.scale, &point.sliding_change(values, pressed), values);
+                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(Vectors::Newton, values);
+                point.add(Vectors::Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
             }
         }
     }
@@ -272,20 +281,20 @@ impl<const D: usize> Friction<D> {
         self.points.iter().any(|p| p.tangent.coefficient > 0.0)
     }
 
-    /// What the last linearisation is made of, to tell it from others.
+    /// Numbers that differ between linearisations with different sets of branches.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
     }
 
-    /// Largest fall of the graphs of all points in Pa s/m, at the pressures the bounds go by.
+    /// Largest fall of the graphs of all points in Pa s/m, at the pressures that the bounds follow.
     pub fn steepest_fall(&self) -> f64 {
         let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
         self.law.steepest_fall() * most
     }
 
-    /// What happens at each point.
+    /// What happens at each point, at velocities in a vector of Newton's method.
     pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
-        self.sliding(velocity).map(|(point, sliding)| {
+        self.sliding(Vectors::Newton, velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
                 return Motion::Separated;
             }
@@ -298,13 +307,14 @@ impl<const D: usize> Friction<D> {
     /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
     pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
         // Points are ordered by node, at most one a node.
-        let found = self.points.binary_search_by_key(&node, |point| point.node);
-        found.map_or([0.0; D], |at| self.points[at].along(nodal))
+        let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
+        found.map_or([0.0; D], |at| self.points[at].along(Vectors::Body, nodal))
     }
 
     /// Power in W that friction dissipates at these velocities.
     pub fn power(&self, velocity: &[f64]) -> f64 {
-        self.sliding(velocity).map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
+        let sliding = self.sliding(Vectors::Body, velocity);
+        sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
     }
 
     /// Power in W that the obstacle gives the body by friction.
@@ -313,29 +323,31 @@ impl<const D: usize> Friction<D> {
         -given.sum::<f64>()
     }
 
-    /// Largest sliding velocity and largest traction or bound at points here.
+    /// Largest sliding velocity and largest traction or bound at points here, at velocities in a vector of Newton's method.
     pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         // Beside the velocity of the obstacle a slower sliding is rounding.
         let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
-        self.sliding(velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
+        self.sliding(Vectors::Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
             [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })
     }
 
     /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
-    /// `range`; at most by a factor of the square root of 2 too large. `residual` holds the open forces in N.
+    /// `range`; at most by a factor of the square root of 2 too large. `residual` holds the open forces in N; both are vectors of
+    /// Newton's method.
     pub fn inclusion_residual(
         &self,
         points: &[Point<D>],
         velocity: &[f64],
         residual: &[f64],
-        (range, reference): ([f64; 2], ReferenceValues),
+        range: [f64; 2],
+        reference: ReferenceValues,
     ) -> f64 {
         let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
         let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
-            let open = point.along(residual);
+            let open = point.along(Vectors::Newton, residual);
             let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
@@ -348,22 +360,28 @@ impl<const D: usize> Friction<D> {
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
-        super::inclusion::worst(self.sliding(velocity).map(distance))
+        worst(self.sliding(Vectors::Newton, velocity).map(distance))
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.
     pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(1.0, &point.tangents[0], nodal));
+        self.points.iter().for_each(|point| point.add(Vectors::Body, 1.0, &point.tangents[0], nodal));
     }
 
     /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
     pub fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(factor * point.weight, &point.along(x), forces));
+        for point in &self.points {
+            let along = point.along(Vectors::Body, x);
+            point.add(Vectors::Body, factor * point.weight, &along, forces);
+        }
     }
 
     /// `integral of w_tau^2` over the points here.
     pub fn square(&self, nodal: &[f64]) -> f64 {
-        self.points.iter().map(|p| p.weight * p.along(nodal).iter().map(|x| x * x).sum::<f64>()).sum()
+        let square = |point: &TangentialPoint<D>| {
+            point.weight * point.along(Vectors::Body, nodal).iter().map(|x| x * x).sum::<f64>()
+        };
+        self.points.iter().map(square).sum()
     }
 }
 

@@ -1,4 +1,6 @@
 //! A quadrature point of a contact boundary.
+//!
+//! A point finds the values of its nodes in two kinds of vectors, [`Vectors`]. It holds the numbers of its nodes in both.
 
 use crate::{
     contact::{NodeContext, NormalResponse, Resolved},
@@ -14,15 +16,24 @@ pub(super) enum Unknown {
     Parameter,
     /// The velocity itself.
     Velocity,
-    /// Nothing: supports hold all that the normal sees.
+    /// None: supports hold all components along the normal.
     Held,
 }
 
-/// A point where the law holds: its velocity is a mean of nodal ones, its pressure pushes the same nodes.
+/// The vectors of nodal values that contacts read and write, `D` values a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Vectors {
+    /// All nodes of the body on this rank.
+    Body,
+    /// The nodes at which Newton's method has unknowns: all nodes, or those of the contacts alone.
+    Newton,
+}
+
+/// A point where the law holds: its velocity is a mean of nodal ones, its pressure acts on the same nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Point<const D: usize> {
-    /// Local nodes; `count` of them are used.
-    nodes: [u32; D],
+    /// Numbers of its nodes in the vectors of the body and in those of Newton's method; `count` of them are used.
+    numbers: [[u32; D]; 2],
     count: usize,
     /// Share of each node.
     shares: [f64; D],
@@ -30,7 +41,7 @@ pub(super) struct Point<const D: usize> {
     /// Quadrature weight in m^(D-1).
     pub weight: f64,
     /// Force on each node per pressure, without held components, in m^(D-1).
-    push: [Vector<D>; D],
+    force: [Vector<D>; D],
     /// At nodal points: the normal without held components, of length 1.
     pub direction: Vector<D>,
     /// Length that the normal has left without held components.
@@ -44,7 +55,7 @@ pub(super) struct Point<const D: usize> {
     pub penetration_before: f64,
     /// How far the gap grew in the step, in m.
     pub growth: f64,
-    /// What is in the penetration beside the displacement at the start of the step, in m.
+    /// What the blend of a two-step scheme adds to the penetration, in m.
     pub shift: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
     pub pressure: f64,
@@ -59,12 +70,12 @@ pub(super) struct Point<const D: usize> {
 impl<const D: usize> Point<D> {
     pub fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
         let mut point = Self {
-            nodes: [0; D],
+            numbers: [[0; D]; 2],
             count: nodes.len(),
             shares: [0.0; D],
             normal,
             weight,
-            push: [[0.0; D]; D],
+            force: [[0.0; D]; D],
             direction: [0.0; D],
             stretch: 0.0,
             unknown: Unknown::Velocity,
@@ -79,10 +90,11 @@ impl<const D: usize> Point<D> {
             change: 0.0,
         };
         for (a, (&node, &share)) in nodes.iter().zip(shares).enumerate() {
-            (point.nodes[a], point.shares[a]) = (node, share);
+            point.numbers.iter_mut().for_each(|numbers| numbers[a] = node);
+            point.shares[a] = share;
             for i in 0..D {
                 if !fixed[node as usize * D + i] {
-                    point.push[a][i] = weight * share * normal[i];
+                    point.force[a][i] = weight * share * normal[i];
                 }
             }
         }
@@ -100,32 +112,46 @@ impl<const D: usize> Point<D> {
             point.direction = free.map(|x| x / point.stretch);
             point.unknown = Unknown::Parameter;
         } else {
-            point.push = [[0.0; D]; D];
+            point.force = [[0.0; D]; D];
             point.unknown = Unknown::Held;
         }
         point
     }
 
-    /// The first of its nodes: the only one of a nodal point.
+    /// The first of its nodes on this rank: the only one of a nodal point.
     pub fn node(&self) -> usize {
-        self.nodes[0] as usize
+        self.first(Vectors::Body)
     }
 
-    /// Gives the only node of a nodal point another number.
-    pub fn set_node(&mut self, node: usize) {
-        self.nodes[0] = node as u32;
-    }
-
-    /// Nodes and shares.
-    pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.nodes[..self.count].iter().map(|&node| node as usize).zip(self.shares)
-    }
-
+    /// The number of its first node in these vectors.
     #[inline]
-    pub fn normal_component(&self, nodal: &[f64]) -> f64 {
+    pub fn first(&self, vectors: Vectors) -> usize {
+        self.numbers[vectors as usize][0] as usize
+    }
+
+    /// Sets the numbers of its nodes in the vectors of Newton's method, given those in the vectors of the body.
+    pub fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
+        self.numbers[Vectors::Newton as usize] =
+            self.numbers[Vectors::Body as usize].map(|node| number(node as usize) as u32);
+    }
+
+    /// Nodes of this rank and shares.
+    pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.places(Vectors::Body)
+    }
+
+    /// Numbers of the nodes in these vectors, and shares.
+    fn places(&self, vectors: Vectors) -> impl Iterator<Item = (usize, f64)> {
+        self.numbers[vectors as usize][..self.count].iter().map(|&node| node as usize).zip(self.shares)
+    }
+
+    /// The normal component of the mean of nodal values.
+    #[inline]
+    pub fn normal_component(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        let numbers = &self.numbers[vectors as usize];
         let mut sum = 0.0;
         for a in 0..self.count {
-            let value = &nodal[self.nodes[a] as usize * D..][..D];
+            let value = &nodal[numbers[a] as usize * D..][..D];
             for i in 0..D {
                 sum += self.shares[a] * self.normal[i] * value[i];
             }
@@ -133,16 +159,17 @@ impl<const D: usize> Point<D> {
         sum
     }
 
-    /// Length of the mean of nodal values.
+    /// Length of the mean of velocities in vectors of Newton's method.
     pub fn speed(&self, nodal: &[f64]) -> f64 {
-        let mean = |i: usize| self.nodes().map(|(node, share)| share * nodal[node * D + i]).sum();
+        let mean =
+            |i: usize| self.places(Vectors::Newton).map(|(node, share)| share * nodal[node * D + i]).sum();
         norm::<D>(&std::array::from_fn(mean))
     }
 
     /// The component of a nodal value along the free part of the normal.
     #[inline]
-    pub fn along(&self, nodal: &[f64]) -> f64 {
-        let value = &nodal[self.node() * D..][..D];
+    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        let value = &nodal[self.first(vectors) * D..][..D];
         let mut sum = 0.0;
         for i in 0..D {
             sum += self.direction[i] * value[i];
@@ -152,19 +179,21 @@ impl<const D: usize> Point<D> {
 
     /// Adds to a nodal value along the free part of the normal.
     #[inline]
-    pub fn add_along(&self, amount: f64, nodal: &mut [f64]) {
-        let target = &mut nodal[self.node() * D..][..D];
+    pub fn add_along(&self, vectors: Vectors, amount: f64, nodal: &mut [f64]) {
+        let target = &mut nodal[self.first(vectors) * D..][..D];
         for i in 0..D {
             target[i] += amount * self.direction[i];
         }
     }
 
+    /// Adds the forces in N of a pressure in Pa.
     #[inline]
-    pub fn push(&self, pressure: f64, forces: &mut [f64]) {
+    pub fn add_force(&self, vectors: Vectors, pressure: f64, forces: &mut [f64]) {
+        let numbers = &self.numbers[vectors as usize];
         for a in 0..self.count {
-            let target = &mut forces[self.nodes[a] as usize * D..][..D];
+            let target = &mut forces[numbers[a] as usize * D..][..D];
             for i in 0..D {
-                target[i] += pressure * self.push[a][i];
+                target[i] += pressure * self.force[a][i];
             }
         }
     }
@@ -190,22 +219,22 @@ impl<const D: usize> Point<D> {
     }
 
     /// Pressure in Pa, given nodal velocities.
-    pub fn pressure_at(&self, law: &NormalResponse, velocity: &[f64]) -> f64 {
+    pub fn pressure_at(&self, law: &NormalResponse, vectors: Vectors, velocity: &[f64]) -> f64 {
         match self.unknown {
             Unknown::Parameter => self.pressure,
-            Unknown::Velocity => law.pressure(self.normal_component(velocity), self.context),
+            Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
             Unknown::Held => 0.0,
         }
     }
 
-    /// The normal force per area that the residual leaves open here.
+    /// The normal force per area that a residual, a vector of Newton's method, leaves open here.
     pub fn open_pressure(&self, residual: &[f64]) -> f64 {
         let mut largest = 0.0f64;
         for a in 0..self.count {
-            let at = self.nodes[a] as usize * D;
+            let at = self.numbers[Vectors::Newton as usize][a] as usize * D;
             let Some(value) = residual.get(at..at + D) else { continue };
-            let share: f64 = (0..D).map(|i| self.push[a][i] * self.push[a][i]).sum::<f64>().sqrt();
-            let along: f64 = (0..D).map(|i| self.push[a][i] * value[i]).sum();
+            let share: f64 = (0..D).map(|i| self.force[a][i] * self.force[a][i]).sum::<f64>().sqrt();
+            let along: f64 = (0..D).map(|i| self.force[a][i] * value[i]).sum();
             if share > 0.0 && (along / (share * share)).abs() > largest.abs() {
                 largest = along / (share * share);
             }

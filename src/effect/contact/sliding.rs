@@ -1,6 +1,6 @@
-//! A contact with friction, seen from outside.
+//! The friction of a contact.
 
-use super::{Contact, friction::Friction};
+use super::{Contact, friction::Friction, point::Vectors};
 use crate::{
     contact::FrictionLaw,
     error::{Error, Result},
@@ -45,14 +45,14 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, |friction| friction.scale)
     }
 
-    /// Holds the friction bounds at the pressures of now.
+    /// Sets the pressures that friction bounds follow to those of the points.
     pub fn take_pressures(&mut self) {
         if let Some(friction) = &mut self.friction {
             friction.take_pressures(&self.points);
         }
     }
 
-    /// Steepest fall of the friction graphs of points here in Pa s/m, at the pressures of now.
+    /// Steepest fall of the friction graphs of points here in Pa s/m, at the pressures that its bounds follow.
     pub fn steepest_friction_fall(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, Friction::steepest_fall)
     }
@@ -72,19 +72,16 @@ impl<const D: usize> Contact<D> {
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 
-    /// The largest contact pressure in Pa at points here, at least 0, in the step just solved.
+    /// The largest contact pressure in Pa at points here, at least 0, in the step just solved, at its velocities with ghosts.
     pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
-        self.points.iter().fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, velocity)))
+        self.points
+            .iter()
+            .fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, Vectors::Body, velocity)))
     }
 
     /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.
     pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
         self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
-    }
-
-    /// Whether the last linearisation is not symmetric at points here.
-    pub fn is_coupled(&self) -> bool {
-        self.friction.as_ref().is_some_and(Friction::is_coupled)
     }
 
     /// Adds a unit velocity along a tangent at each point with friction to nodal values.

@@ -1,6 +1,6 @@
-//! The sums of squares of velocities by which a step sees its contact.
+//! Sums of squares of velocities at the points of a contact.
 
-use super::Contact;
+use super::{Contact, point::Vectors::Body};
 
 impl<const D: usize> Contact<D> {
     /// Adds the derivative of half of `sum of w (normal x_nu^2 + tangential |x_tau|^2)` to `forces`: over the quadrature points
@@ -8,7 +8,7 @@ impl<const D: usize> Contact<D> {
     /// components.
     pub fn add_squares(&self, [normal, tangential]: [f64; 2], x: &[f64], forces: &mut [f64]) {
         for point in &self.points {
-            point.push(normal * point.normal_component(x), forces);
+            point.add_force(Body, normal * point.normal_component(Body, x), forces);
         }
         if let Some(friction) = &self.friction {
             friction.add_squares(tangential, x, forces);

@@ -1,6 +1,6 @@
 //! Other velocities for a step to start from, where it may have several solutions.
 
-use super::Contact;
+use super::{Contact, point::Vectors::Body};
 
 impl<const D: usize> Contact<D> {
     /// The largest velocity in m/s at which a law here turns a corner; 0 where none is given.
@@ -10,12 +10,12 @@ impl<const D: usize> Contact<D> {
         f64::max(normal, sliding)
     }
 
-    /// Gives the nodal points the normal velocity in m/s that `velocity` says for their node, and as much along a tangent
-    /// where there is friction. `nodal` holds velocities at owned nodes.
+    /// Sets the normal velocity of the nodal points to that of `velocity` for their node, in m/s, and as much along a tangent
+    /// where there is friction. `nodal` holds velocities at the owned nodes of the body.
     pub fn start_at(&self, velocity: impl Fn(usize) -> f64, nodal: &mut [f64]) {
         for point in self.points.iter().filter(|point| !self.needs_ghosts && point.stretch > 0.0) {
             let wanted = velocity(point.node()) / point.stretch;
-            point.add_along(wanted - point.along(nodal), nodal);
+            point.add_along(Body, wanted - point.along(Body, nodal), nodal);
         }
         if let Some(friction) = &self.friction {
             let mut sliding = vec![0.0; nodal.len()];

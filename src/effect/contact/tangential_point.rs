@@ -1,5 +1,6 @@
 //! The tangential side of a contact point.
 
+use super::point::Vectors;
 use crate::tensor::{Vector, dot, norm};
 
 /// A length below which a direction is rounding.
@@ -10,7 +11,8 @@ pub(super) const ROUNDING: f64 = 1e-9;
 pub(super) struct TangentialPoint<const D: usize> {
     /// Its number among the points of the contact.
     pub at: usize,
-    pub node: usize,
+    /// Numbers of its node in the vectors of the body and in those of Newton's method.
+    pub numbers: [usize; 2],
     pub weight: f64,
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
@@ -46,8 +48,13 @@ impl<const D: usize> Tangent<D> {
 }
 
 impl<const D: usize> TangentialPoint<D> {
-    /// Gives up what is not orthogonal to this direction.
-    pub fn give_up(&mut self, direction: &Vector<D>) {
+    /// Its node on this rank.
+    pub fn node(&self) -> usize {
+        self.numbers[Vectors::Body as usize]
+    }
+
+    /// Removes what is not orthogonal to this direction from the tangents.
+    pub fn remove_direction(&mut self, direction: &Vector<D>) {
         let mut along = [0.0; D];
         for tangent in &self.tangents[..self.count] {
             let share = dot(tangent, direction);
@@ -61,8 +68,8 @@ impl<const D: usize> TangentialPoint<D> {
     }
 
     /// The part of a nodal value along the tangents.
-    pub fn along(&self, nodal: &[f64]) -> Vector<D> {
-        let value = &nodal[self.node * D..][..D];
+    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
+        let value = &nodal[self.numbers[vectors as usize] * D..][..D];
         self.part(&std::array::from_fn(|i| value[i]))
     }
 
@@ -77,22 +84,22 @@ impl<const D: usize> TangentialPoint<D> {
     }
 
     /// Adds to a nodal value.
-    pub fn add(&self, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
-        let target = &mut nodal[self.node * D..][..D];
+    pub fn add(&self, vectors: Vectors, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
+        let target = &mut nodal[self.numbers[vectors as usize] * D..][..D];
         (0..D).for_each(|i| target[i] += factor * vector[i]);
     }
 
-    /// Replaces the part of a nodal value along the tangents.
+    /// Replaces the part of a value along the tangents in a vector of Newton's method.
     pub fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
-        let now = self.along(nodal);
+        let now = self.along(Vectors::Newton, nodal);
         let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
-        self.add(1.0, &change, nodal);
+        self.add(Vectors::Newton, 1.0, &change, nodal);
     }
 
-    /// Change of the traction at a point that slides, with a change of the velocity and of the pressure.
+    /// Change of the traction at a point that slides, with a change of the velocity, a vector of Newton's method, and of the pressure.
     pub fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
         let Tangent { toward, slopes, coefficient, .. } = self.tangent;
-        let velocity = self.along(direction);
+        let velocity = self.along(Vectors::Newton, direction);
         let ahead = dot(&toward, &velocity);
         std::array::from_fn(|i| {
             slopes[1] * (velocity[i] - ahead * toward[i])

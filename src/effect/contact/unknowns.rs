@@ -73,14 +73,14 @@ fn keep_tangents_free_of_normals<const D: usize>(
         let Some(friction) = &mut contact.friction else { continue };
         for point in &mut friction.points {
             let own = (number, point.at);
-            let others = normals.get(&point.node).into_iter().flatten();
-            others.filter(|(at, _)| *at != own).for_each(|(_, direction)| point.give_up(direction));
+            let others = normals.get(&point.node()).into_iter().flatten();
+            others.filter(|(at, _)| *at != own).for_each(|(_, direction)| point.remove_direction(direction));
         }
         friction.keep_points_with_tangents();
     }
 }
 
-/// The nodes with friction; a direction can only bear that of one boundary.
+/// The nodes with friction; along one direction only that of one boundary can act.
 fn refuse_shared_tangents<const D: usize>(
     contacts: &[Contact<D>],
     mesh: &Mesh<D>,
@@ -88,11 +88,11 @@ fn refuse_shared_tangents<const D: usize>(
     let mut nodes = BTreeSet::new();
     let frictions = contacts.iter().filter_map(|contact| contact.friction.as_ref());
     for point in frictions.flat_map(|friction| &friction.points) {
-        if !nodes.insert(point.node) {
+        if !nodes.insert(point.node()) {
             return Err(Error::Refused(format!(
                 "friction at {:?} m: two boundaries with friction meet at an edge there, and both would act along it; give \
                  friction to one of them only, or round the edge",
-                mesh.nodes[point.node]
+                mesh.nodes[point.node()]
             )));
         }
     }

@@ -1,36 +1,39 @@
-//! The choice of the time scheme.
+//! A time scheme at work: what is its own in a step.
 
-use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
+use super::{
+    bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler,
+};
 use crate::{
     body::Body,
     effect::{Blend, Energy, Evaluation, Peaks, Step},
     error::Result,
+    job::Scheme,
     petsc::DistributedVector,
     session::Session,
     state::State,
 };
-
-pub use crate::job::Scheme;
 
 /// The state at which laws are evaluated under a scheme, before the first step.
 pub fn evaluation(scheme: Scheme) -> Evaluation {
     if scheme.is_implicit() { Evaluation::End(Blend::euler(0.0)) } else { Evaluation::Converged }
 }
 
-/// A scheme with what it keeps from one part of a step to the next.
-pub(super) enum Method {
+/// A scheme with what it keeps from one part of a step to the next. Implicit schemes differ in the blend of earlier states from which
+/// a step starts, and have all else in common.
+pub(super) enum Integrator {
     LaggedEuler(LaggedEuler),
     Implicit(Box<Implicit>),
 }
 
-impl Method {
+impl Integrator {
+    /// The integrator of a scheme, for vectors laid out like those of the state.
     pub fn new(scheme: Scheme, state: &State) -> Result<Self> {
-        let implicit = |formula| Ok(Self::Implicit(Box::new(Implicit::new(state, formula)?)));
-        match scheme {
-            Scheme::LaggedEuler => Ok(Self::LaggedEuler(LaggedEuler::default())),
-            Scheme::ImplicitEuler => implicit(implicit_euler::blend),
-            Scheme::Bdf2 => implicit(bdf2::blend),
-        }
+        let blend = match scheme {
+            Scheme::LaggedEuler => return Ok(Self::LaggedEuler(LaggedEuler::default())),
+            Scheme::ImplicitEuler => implicit_euler::blend,
+            Scheme::Bdf2 => bdf2::blend,
+        };
+        Ok(Self::Implicit(Box::new(Implicit::new(state, blend)?)))
     }
 
     /// The length for which the matrix of a step is assembled.
@@ -46,7 +49,7 @@ impl Method {
         self.matrix_length(Step { time: 0.0, length, previous_length: length })
     }
 
-    /// Takes in what the step starts from, and adds what is known of its forces to `forces` (with ghosts).
+    /// Keeps what the step starts from, and adds its known forces to `forces` (with ghosts).
     pub fn start<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -60,7 +63,7 @@ impl Method {
         }
     }
 
-    /// Tells contacts that are prepared for the step where it starts.
+    /// Corrects contacts that are prepared for the step for the blend from which it starts.
     pub fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -81,7 +84,7 @@ impl Method {
         }
     }
 
-    /// The least residual norm in N that means something. Collective.
+    /// The residual norm in N that rounding errors of the forces make. Collective.
     pub fn rounding(&self, session: &Session) -> f64 {
         match self {
             Self::LaggedEuler(_) => 0.0,
@@ -125,10 +128,4 @@ impl Method {
             Self::Implicit(scheme) => scheme.energy(session, body, state, step),
         }
     }
-}
-
-/// Sums and largest values over all ranks. Collective.
-pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
-    let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);
-    (Energy::from_array(session.sum(energy.to_array())), Peaks { von_mises, strain })
 }
