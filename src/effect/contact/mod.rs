@@ -68,6 +68,19 @@ pub struct Contact<const D: usize> {
     points: Vec<Point<D>>,
     friction: Option<Friction<D>>,
     needs_ghosts: bool,
+    derivatives: Derivatives,
+}
+
+/// What the points hold of the derivatives of the laws. Newton's method of PETSc decides when they are taken and used, so that the order
+/// of calls is checked, in debug builds, where they are.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+enum Derivatives {
+    /// Nothing yet.
+    Unknown,
+    /// Those of the last linearisation.
+    Linearised,
+    /// These, and the changes along the direction last mapped.
+    AlongDirection,
 }
 
 impl<const D: usize> Contact<D> {
@@ -100,7 +113,17 @@ impl<const D: usize> Contact<D> {
         let scale = 2.0 * law.monotonicity_constant() + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
         let reference = ReferenceValues::default();
-        Ok(Self { law, gap, scale, reference, facets: facets.to_vec(), points, friction: None, needs_ghosts })
+        Ok(Self {
+            law,
+            gap,
+            scale,
+            reference,
+            facets: facets.to_vec(),
+            points,
+            friction: None,
+            needs_ghosts,
+            derivatives: Derivatives::Unknown,
+        })
     }
 
     /// Whether velocities of ghost nodes are read and forces on them written.

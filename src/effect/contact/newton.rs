@@ -5,7 +5,7 @@
 //! pressures along the direction last mapped.
 
 use super::{
-    Contact,
+    Contact, Derivatives,
     friction::Friction,
     point::{Unknown, Vectors::Newton},
 };
@@ -65,6 +65,38 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// The branch of every point at these velocities, to count changes of the active set.
+    pub fn branches(&self, velocity: &[f64], out: &mut Vec<u8>) {
+        out.extend(self.points.iter().map(|point| {
+            let along = point.normal_component(Newton, velocity);
+            let branch = match point.unknown {
+                Unknown::Parameter => {
+                    self.law.resolve(self.scale * along + point.pressure, self.scale, point.context).branch
+                }
+                Unknown::Velocity => self.law.branch(along, point.context),
+                Unknown::Held => 0,
+            };
+            branch.min(255) as u8
+        }));
+        if let Some(friction) = &self.friction {
+            out.extend(friction.motions(velocity).map(|motion| motion as u8));
+        }
+    }
+
+    /// Removes from nodal values what moves any nodal point.
+    pub fn remove_motions(&self, values: &mut [f64]) {
+        for point in &self.points {
+            match point.unknown {
+                Unknown::Parameter => point.add_along(Newton, -point.along(Newton, values), values),
+                Unknown::Velocity => values[point.first(Newton) * D..][..D].fill(0.0),
+                Unknown::Held => {}
+            }
+        }
+        if let Some(friction) = &self.friction {
+            friction.remove_motions(values);
+        }
+    }
+
     /// Takes the derivatives of the laws at these unknowns, and turns `velocity`, a copy of the unknowns, into velocities as
     /// [`map`](Self::map) does.
     pub fn linearise_parameters(&mut self, unknowns: &[f64], velocity: &mut [f64]) {
@@ -78,6 +110,7 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.linearise(&self.points, unknowns);
         }
+        self.derivatives = Derivatives::Linearised;
     }
 
     /// Takes the slopes of the law at these velocities, where the velocity is the unknown.
@@ -87,8 +120,10 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Turns a change of the unknowns into the change of the velocities, and gives the points the changes of their pressures.
+    /// Turns a change of the unknowns into the change of the velocities, and gives the points the changes of their pressures. After
+    /// [`linearise_parameters`](Self::linearise_parameters).
     pub fn map_direction(&mut self, values: &mut [f64]) {
+        debug_assert!(self.derivatives >= Derivatives::Linearised);
         let scale = self.scale;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
@@ -98,11 +133,13 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &mut self.friction {
             friction.map_direction(&self.points, values);
         }
+        self.derivatives = Derivatives::AlongDirection;
     }
 
     /// Adds the change of the contact forces: of the direction last mapped, where the unknown is the velocity that of the change
-    /// `direction` of the velocity.
+    /// `direction` of the velocity. After [`map_direction`](Self::map_direction).
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
+        debug_assert_eq!(self.derivatives, Derivatives::AlongDirection);
         for point in &self.points {
             match point.unknown {
                 Unknown::Parameter => point.add_force(Newton, point.change, forces),
@@ -118,8 +155,10 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Adds the change of the contact forces with the velocity; nothing where the graph is vertical.
+    /// Adds the change of the contact forces with the velocity; nothing where the graph is vertical. After
+    /// [`linearise_parameters`](Self::linearise_parameters), as all that follow.
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
+        debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in &self.points {
             match point.unknown {
                 Unknown::Parameter => {
@@ -141,6 +180,7 @@ impl<const D: usize> Contact<D> {
     /// Brings equations into the form in which unknown pressures of sliding points do not occur; then
     /// [`project`](Self::project) leaves those of the velocities.
     pub fn reduce(&self, values: &mut [f64]) {
+        debug_assert!(self.derivatives >= Derivatives::Linearised);
         if let Some(friction) = &self.friction {
             friction.reduce(&self.points, values);
         }
@@ -148,6 +188,7 @@ impl<const D: usize> Contact<D> {
 
     /// Removes from nodal values what moves points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
+        debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.theta == 0.0) {
             point.add_along(Newton, -point.along(Newton, values), values);
         }
@@ -156,23 +197,10 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Removes from nodal values what moves any nodal point.
-    pub fn remove_motions(&self, values: &mut [f64]) {
-        for point in &self.points {
-            match point.unknown {
-                Unknown::Parameter => point.add_along(Newton, -point.along(Newton, values), values),
-                Unknown::Velocity => values[point.first(Newton) * D..][..D].fill(0.0),
-                Unknown::Held => {}
-            }
-        }
-        if let Some(friction) = &self.friction {
-            friction.remove_motions(values);
-        }
-    }
-
     /// Turns a change of velocities into the change of the unknowns. `open` holds the forces in N that the change of velocities
     /// leaves open.
     pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
+        debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
                 point.along(Newton, open) / (self.scale * point.weight * point.stretch * point.stretch)
@@ -198,23 +226,5 @@ impl<const D: usize> Contact<D> {
         let mut digest = Xxh3::new();
         numbers.for_each(|number| digest.update(&number.to_le_bytes()));
         digest.digest()
-    }
-
-    /// The branch of every point at these velocities, to count changes of the active set.
-    pub fn branches(&self, velocity: &[f64], out: &mut Vec<u8>) {
-        out.extend(self.points.iter().map(|point| {
-            let along = point.normal_component(Newton, velocity);
-            let branch = match point.unknown {
-                Unknown::Parameter => {
-                    self.law.resolve(self.scale * along + point.pressure, self.scale, point.context).branch
-                }
-                Unknown::Velocity => self.law.branch(along, point.context),
-                Unknown::Held => 0,
-            };
-            branch.min(255) as u8
-        }));
-        if let Some(friction) = &self.friction {
-            out.extend(friction.motions(velocity).map(|motion| motion as u8));
-        }
     }
 }
