@@ -1,4 +1,4 @@
-//! A body on a mesh with all that acts on it: what a run advances in time.
+//! A body: mesh, geometry, effects, contacts and loads, which a run advances in time.
 
 mod implicit;
 mod traffic;
@@ -43,7 +43,7 @@ pub struct Body<const D: usize, const S: usize> {
     evaluation: Evaluation,
     /// The step being taken, if laws are evaluated at its end.
     step: Step,
-    /// The fastest relaxation of power laws in 1/s since it was last asked for.
+    /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
     fastest_flow: f64,
 }
 
@@ -160,13 +160,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().map(|effect| effect.term())
     }
 
-    /// Whether an effect stands for this form.
+    /// Whether an effect has this form.
     pub fn has_form(&self, form: Form) -> bool {
         let on_the_surface = form == Form::Elasticity && !self.surface_effects.is_empty();
         on_the_surface || self.terms().any(|term| term.form() == Some(form))
     }
 
-    /// Whether effects stand for this form in all of the body.
+    /// Whether an effect has this form in every material of the body.
     pub fn has_form_everywhere(&self, form: Form) -> bool {
         self.terms().any(|term| term.form() == Some(form) && term.is_everywhere())
     }
@@ -184,7 +184,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         })
     }
 
-    /// Adds `F x` of a form to `forces`; both with ghosts, held components not yet zeroed.
+    /// Adds `F x` with the matrix `F` of a form to `forces`; both have ghosts, and held components are not yet zero.
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
@@ -210,7 +210,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.terms().filter_map(modulus).reduce(f64::min)
     }
 
-    /// Properties of viscoplastic flow, of each effect that is one.
+    /// Properties of each effect that is viscoplastic flow.
     pub fn flow_properties(&self) -> impl Iterator<Item = FlowProperties> {
         self.terms()
             .filter_map(|term| if let Term::Flow(properties) = term { Some(properties) } else { None })
@@ -235,7 +235,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
     }
 
-    /// Keeps what [`Body::stress_error`] needs from now on.
+    /// Keeps the histories before the last step from now on, as far as [`Body::stress_error`] or laws at the end of steps need them.
     pub fn keep_earlier(&mut self) {
         let evaluation = self.evaluation;
         self.visit_histories(&mut |history| history.keep_earlier(evaluation));
@@ -316,12 +316,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.effects.iter().flat_map(|effect| all_of(effect.histories()))
     }
 
-    /// The same of nodes.
+    /// The histories of nodes, likewise.
     pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
         self.surface_effects.iter().flat_map(|effect| all_of(effect.histories()))
     }
 
-    /// Takes over the saved values of the history of this name.
+    /// Restores the saved values of the history of this name.
     pub fn restore_history(&mut self, name: &str, values: &[f64]) {
         self.visit_histories(&mut |history| history.restore(name, values));
     }
@@ -331,7 +331,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         session.total(self.fixed[..self.mesh.owned * D].iter().filter(|fixed| !**fixed).count())
     }
 
-    /// Names of all that is simulated.
+    /// Names of all effects, loads and contact.
     pub fn effect_names(&self) -> Vec<&'static str> {
         let mut names: Vec<&str> = self.effects.iter().map(|e| e.name()).collect();
         if !self.load.tractions.is_empty() {
@@ -350,12 +350,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         names
     }
 
-    /// The effects for which this holds, asked once a pass.
+    /// The effects for whose phases this holds, determined once a pass.
     fn called(&self, holds: impl Fn(Phases) -> bool) -> Called {
         Called::of(&self.effects, self.evaluation, holds)
     }
 
-    /// What energies at the end of a step need and, where there is stress, the largest stress and strain.
+    /// The needs of energies at the end of a step and, where there is stress, of the largest stress and strain.
     fn needs_of_energy(&self) -> Option<Needs> {
         let strained = self.needs(|p| p.stress).map(|needs| Needs { strain: true, ..needs });
         self.needs(|p| p.energy).into_iter().chain(strained).reduce(Needs::or)
@@ -366,7 +366,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 }
 
-/// Positions of effects, a bit for each.
+/// A set of effects, by their positions: one bit each.
 #[derive(Clone, Copy)]
 struct Called(u64);
 

@@ -1,11 +1,11 @@
-//! What all families of laws share: what is wrong with their keys, the root of a scalar equation, and calls of the law that was chosen.
+//! Shared by all families of laws: faults of their keys, a root finder for scalar equations, and the dispatch to the chosen law.
 
-/// What is wrong with a key of a law.
+/// A fault of a key of a law.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LawFault {
-    /// The key, with dots, from the table it was asked of.
+    /// The dotted key, relative to the table that was checked.
     pub key: String,
-    /// Whether it is the key itself that should not be there, and not its value that is wrong.
+    /// Whether the key should be absent; otherwise its value is wrong.
     pub is_at_key: bool,
     /// What is wrong.
     pub message: String,
@@ -14,17 +14,17 @@ pub struct LawFault {
 }
 
 impl LawFault {
-    /// A value that is wrong.
+    /// A wrong value.
     pub fn at_value(key: impl Into<String>, message: impl Into<String>, help: impl Into<String>) -> Self {
         Self { key: key.into(), is_at_key: false, message: message.into(), help: help.into() }
     }
 
-    /// A key that should not be there.
+    /// A key that should be absent.
     pub fn at_key(key: impl Into<String>, message: impl Into<String>, help: impl Into<String>) -> Self {
         Self { is_at_key: true, ..Self::at_value(key, message, help) }
     }
 
-    /// The fault of a key in this table.
+    /// The same fault, with its key relative to the table around this one.
     pub fn within(self, table: &str) -> Self {
         Self { key: format!("{table}.{}", self.key), ..self }
     }
@@ -62,7 +62,7 @@ pub(crate) fn increasing_root(
     at
 }
 
-/// Methods of an enum of laws that call the same ones of the chosen law, by a `match` that the macro `$each` makes.
+/// Methods of an enum of laws that delegate to the chosen law, through the `match` of the macro `$each`.
 macro_rules! calls {
     ($each:ident $family:ident $contract:ident: $($method:ident($($argument:ident: $kind:ty),*) -> $out:ty;)*) => {
         $(

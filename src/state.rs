@@ -7,13 +7,14 @@ use crate::{error::Result, mesh::Mesh, petsc::DistributedVector};
 pub struct State {
     /// Displacement in m.
     pub displacement: DistributedVector,
-    /// Displacement before the last step in m; there if the scheme needs it.
+    /// Displacement before the last step in m; present if the scheme needs it.
     pub previous_displacement: Option<DistributedVector>,
     /// Velocity in m/s.
     pub velocity: DistributedVector,
     /// Velocity before the last step in m/s.
     pub previous_velocity: DistributedVector,
-    /// Traction of nodal contacts, `-sigma_nu` along the normal without held components, in Pa; there if contact is.
+    /// Traction of nodal contacts, `-sigma_nu` along the normal without held components, in Pa; present if
+    /// there is such contact.
     pub contact_traction: Option<DistributedVector>,
     /// Time in s.
     pub time: f64,
@@ -41,7 +42,7 @@ impl State {
         })
     }
 
-    /// Takes the velocity of a solved step over and moves the body with it: `u_n = u_{n-1} + k v_n`. Collective.
+    /// Commits the velocity of a solved step and the displacement `u_n = u_{n-1} + k v_n`. Collective.
     pub fn commit(&mut self, solved: &DistributedVector, time: f64, step_length: f64) -> Result<()> {
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
         self.velocity.copy_from(solved)?;
@@ -57,7 +58,7 @@ impl State {
         Ok(())
     }
 
-    /// Takes velocity and displacement of a solved step over. Collective.
+    /// Commits velocity and displacement of a solved step. Collective.
     pub fn commit_both(
         &mut self,
         velocity: &DistributedVector,

@@ -1,4 +1,4 @@
-//! What a step asks of a body that is implicit in every stress.
+//! A body in steps that are implicit in every stress.
 
 use super::{Body, Called};
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     tensor::{Mandel, add_scaled, component, dot, symmetric_part},
 };
 
-/// The cells of a body and what acts at its surface beside contact.
+/// The cells of a body with their effects, and the effects at its surface beside contact.
 pub struct Cells<'a, const D: usize, const S: usize> {
     mesh: &'a Mesh<D>,
     geometry: &'a Geometry<D>,
@@ -25,19 +25,19 @@ pub struct Cells<'a, const D: usize, const S: usize> {
 }
 
 impl<const D: usize, const S: usize> Body<D, S> {
-    /// Cells and contacts, to be used side by side.
+    /// Cells and contacts, borrowed at the same time.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
         let Self { mesh, geometry, effects, surface_effects, fixed, contacts, .. } = self;
         let (evaluation, step) = (self.evaluation, self.step);
         (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step }, contacts)
     }
 
-    /// Whether implicit steps are nonlinear, contact apart: cells flow or are damaged, or something else acts at the surface.
+    /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
     pub fn flows(&self) -> bool {
         !self.is_explicit() && (!self.surface_effects.is_empty() || !self.called(|p| p.end).is_empty())
     }
 
-    /// Names of what may make the forces at the end of an implicit step fall with the displacement, contact apart.
+    /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.
     pub fn softening(&self) -> impl Iterator<Item = &'static str> {
         let cells = self.called(|p| p.end && p.weakens).among(&self.effects).map(|e| e.name());
         let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
@@ -45,8 +45,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// Adds the forces of the state that a step starts from to `forces` (with ghosts): `nodal` has the blended displacement, and the
-    /// converged one as that before. Gives the sum of the squares of the
-    /// forces of each effect on cells, whose rounding no residual can be less than: large ones may cancel.
+    /// converged displacement as the previous one. Gives the sum of the squares of the forces of each effect on cells: no residual can be
+    /// less than their rounding, also where large forces cancel.
     pub fn add_start_forces(
         &mut self,
         blend: Blend,
@@ -111,7 +111,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         !self.effects.iter().any(|effect| is_skew(effect.term()))
     }
 
-    /// What flows or is damaged at the end of a step, and what that needs.
+    /// The effects that are evaluated at the end of a step, and their needs.
     fn flowing(&self) -> (Called, Needs) {
         let called = |holds: fn(Phases) -> bool| Called::of(&*self.effects, self.evaluation, holds);
         let elastic_stress = !called(|p| p.end && p.weakens).is_empty();

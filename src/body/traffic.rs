@@ -1,4 +1,4 @@
-//! What passes over the cells of a body move through memory.
+//! Memory traffic of the passes over the cells of a body.
 
 use super::Body;
 use crate::{
@@ -52,12 +52,12 @@ impl PassBytes {
 enum Moved {
     Nothing,
     Converged,
-    /// With the values of the step before, where a scheme keeps them; the trial values are written.
+    /// Converged values and, where they are kept, those before the last step are read; trial values are written.
     All,
 }
 
 impl Moved {
-    /// Bytes of an effect's histories, which count themselves with converged and trial values.
+    /// Bytes of an effect's histories; [`History::bytes`](crate::effect::History::bytes) includes the trial values.
     fn bytes<const D: usize, const S: usize>(self, effect: &dyn Effect<D, S>) -> usize {
         let stores = effect.histories();
         let both: usize = stores.iter().map(|store| store.history().bytes).sum();

@@ -1,4 +1,4 @@
-//! Adhesion: bonds between body and obstacle that stretch, pull the body back and give way.
+//! Adhesion: elastic bonds between body and obstacle that break.
 //!
 //! With the bonding `b` between 0 (broken) and 1 (whole), stiffnesses `c_n`, `c_t` and the truncation `R` of lengths at the
 //! bond's length, the traction on the body is
@@ -8,8 +8,8 @@
 //! viscosity b' = -<b (c_n R(-u_nu)^2 + c_t |R(u_tau)|^2) - energy>_+
 //! ```
 //!
-//! with the normal `nu` out of the body and the displacement `u` since the bonds were made, at `u = 0`. Bonds don't come
-//! back. They store `b^2 F(u)`, `F` the potential of the truncated springs; in slow separation they take up `energy` in all,
+//! with the normal `nu` out of the body and the displacement `u` since the bonds were made, at `u = 0`. Broken bonds are
+//! not restored. Bonds store `b^2 F(u)`, `F` the potential of the truncated springs; in slow separation they take up `energy` in all,
 //! and the largest traction is `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational and
 //! numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003),
 //! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
@@ -77,7 +77,7 @@ impl Adhesion {
         gap.into_iter().chain(obstacle).collect()
     }
 
-    /// What the user should know of the parameters.
+    /// A warning about the parameters, if they mean that no bond ever breaks.
     pub fn warning(&self) -> Option<String> {
         let (length, energy) = (self.length?, self.energy);
         let most = (self.stiffness + self.tangential_stiffness()) * length * length;
@@ -148,8 +148,8 @@ impl Adhesion {
         add_scaled(&normal.map(|n| along * n), across, &sliding)
     }
 
-    /// The bonding after a step of implicit Euler of this length in s from `start`: it never falls below where debonding ends; and
-    /// its derivative by the drive. Drive, energy and viscosity may be per area or of a node.
+    /// The bonding after a step of implicit Euler of this length in s from `start`, which is not below the value at which debonding
+    /// ends, and its derivative by the drive. Drive, energy and viscosity may be per area or of a node.
     pub fn relax(start: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> [f64; 2] {
         if start * drive <= energy {
             return [start, 0.0];

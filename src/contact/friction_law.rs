@@ -23,13 +23,13 @@ pub struct Slip {
     pub coefficient: f64,
 }
 
-/// Bisection takes over where Newton's method leaves the bracket; more iterations than bits serve nothing.
+/// Bisection halves the bracket, so that more iterations than bits bring nothing.
 const ITERATIONS: usize = 100;
 
-/// What a friction law says of a point. The defaults are those of a bound that is proportional to the contact pressure and
+/// The evaluation of a friction law at a point. The defaults are those of a bound that is proportional to the contact pressure and
 /// the same at any velocity.
 pub trait FrictionBound {
-    /// Friction traction per contact pressure at a sliding velocity; 0 for laws that know no pressure.
+    /// Friction traction per contact pressure at a sliding velocity; 0 for laws independent of the pressure.
     fn coefficient(&self, speed: f64) -> f64;
 
     /// Largest friction traction in Pa at a sliding velocity in m/s and a contact pressure in Pa.
@@ -104,7 +104,7 @@ fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f
     at
 }
 
-/// The choice of friction laws, from the list of them: the enum that the job holds, and calls of the law that it is.
+/// The choice of friction laws, defined by their list: the enum of the job, and the dispatch to the chosen law.
 macro_rules! friction_laws {
     ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The friction law.

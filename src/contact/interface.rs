@@ -1,6 +1,6 @@
 use super::laws::{FrictionLaw, NormalLaw};
 
-/// What stands in a `[[contact]]` table beside adhesion and memory, as far as it can be read.
+/// Normal law, friction law and obstacle of a `[[contact]]` table, beside which adhesion and memory act, as far as they can be read.
 #[derive(Debug, Clone)]
 pub struct Interface {
     /// The table's path in the job, for messages: `contact.0`.

@@ -39,27 +39,27 @@ friction_laws! {
 }
 
 impl NormalLaw {
-    /// Its table in the job, from that of the contact.
+    /// Its table in the job, relative to that of the contact.
     pub fn table(&self) -> String {
         format!("normal.{}", self.name())
     }
 
-    /// The key of its gap, if that is given, from the table of the contact.
+    /// The key of its gap, if that is given, relative to the table of the contact.
     pub fn gap_key(&self) -> Option<String> {
         self.gap().map(|_| format!("{}.gap", self.table()))
     }
 
-    /// Whether to bound the displacement or the velocity is all it does.
+    /// Whether it does nothing but bound the displacement or the velocity.
     pub fn is_bound(&self) -> bool {
         self.response().is_ok_and(|law| law.velocity_bound(NodeContext::AT_THE_GAP).is_some())
     }
 
-    /// Whether it acts at nodes only: Gauss points know neither jumps nor the displacement.
+    /// Whether it acts at nodes only: Gauss points support neither jumps nor a dependence on the displacement.
     pub fn needs_nodes(&self) -> bool {
         self.response().is_ok_and(|law| law.has_vertical_parts() || law.depends_on_displacement())
     }
 
-    /// What is wrong with it beside an obstacle; keys are those of the contact's table.
+    /// Faults of the law beside an obstacle; keys are those of the contact's table.
     pub(super) fn faults_beside_obstacle(&self) -> Vec<LawFault> {
         let against =
             self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));

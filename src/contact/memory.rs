@@ -1,4 +1,4 @@
-//! Memory of a foundation: what was pressed in pushes back, the more the longer it has been.
+//! Contact memory: a foundation whose pressure depends on the history of the penetration.
 //!
 //! Beside the normal law's pressure, `-sigma_nu` has the part
 //!
@@ -6,10 +6,10 @@
 //! m(t) = integral from 0 to t of b(t - s) max(u_nu(s), 0) ds,    b(t) = stiffness_rate exp(-t / decay_time)
 //! ```
 //!
-//! so that `m' = stiffness_rate max(u_nu, 0) - m / decay_time`: one number a point stands for the whole past. A displacement
-//! that is held is opposed, in the end, like by a spring of the stiffness `stiffness_rate decay_time`; what came off the
-//! foundation is still pushed while that forgets. The force follows the displacement late, and so may put energy into a body
-//! that swings: damping in the normal law or in the body has to take it up. (M. Sofonea, F. Pătrulescu, Analysis of a
+//! so that `m' = stiffness_rate max(u_nu, 0) - m / decay_time`: one number for each point represents the history. Against
+//! a displacement held for a long time the foundation acts as a spring of the stiffness `stiffness_rate decay_time`; after a body
+//! lifts off, the pressure decays. The force lags behind the displacement and may therefore add energy to an oscillating body, which
+//! damping in the normal law or in the body has to dissipate. (M. Sofonea, F. Pătrulescu, Analysis of a
 //! history-dependent frictionless contact problem, Math. Mech. Solids 18 (2013), 409-430.)
 
 use super::{interface::Interface, laws::NormalLaw};

@@ -1,10 +1,10 @@
-//! Normal laws: the contact pressure, as one step sees it a graph over the normal velocity.
+//! The contract of normal laws: within a step the contact pressure is a graph over the normal velocity.
 //!
-//! A law is what a job says ([`NormalParameters`]) and what evaluates it at a point ([`Response`]), often the same type.
+//! A law has parameters ([`NormalParameters`]) and a type that evaluates it at a point ([`Response`]), often the same type.
 
 use crate::{error::Result, expression::Scalar, law::LawFault};
 
-/// What a step brings to a point of the contact boundary.
+/// The data of a step at a point of the contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeContext {
     /// `u_nu - gap` in m, with the displacement at the start of the step and the gap at its end; minus infinity where
@@ -72,7 +72,7 @@ const SAMPLES: usize = 120;
 
 /// A normal law that a job may choose.
 pub trait NormalParameters {
-    /// What evaluates it.
+    /// The type that evaluates it.
     type Response: Response;
 
     /// What evaluates the law; refuses parameters that make no law.
@@ -95,7 +95,7 @@ pub trait NormalParameters {
     }
 }
 
-/// What a step asks of a normal law. The defaults are those of a continuous law of the velocity that never falls, whose
+/// The evaluation of a normal law. The defaults are those of a continuous law of the velocity that never falls, whose
 /// pressure begins at its only kink and has no bound.
 pub trait Response {
     /// Velocity and pressure where `c v + p = s`, for a `c` above the steepest fall.
@@ -130,7 +130,7 @@ pub trait Response {
         false
     }
 
-    /// Whether it depends on the displacement, so that it knows no velocity and no pressure of its own.
+    /// Whether it depends on the displacement, so that it has no scale of velocity and pressure of its own.
     fn depends_on_displacement(&self) -> bool {
         false
     }
@@ -172,8 +172,8 @@ pub trait Response {
     }
 }
 
-/// The choice of normal laws, from the list of them: the enum that the job holds, the enum that a step asks, and calls of the
-/// law that it is.
+/// The choice of normal laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the
+/// chosen law.
 macro_rules! normal_laws {
     ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The normal law.
@@ -182,7 +182,7 @@ macro_rules! normal_laws {
             $($(#[$about])* #[serde(rename = $name)] $law($law),)*
         }
 
-        /// What evaluates the normal law that was chosen.
+        /// The evaluation of the chosen normal law.
         #[derive(Debug, Clone, PartialEq)]
         pub enum NormalResponse {
             $($(#[$about])* $law(<$law as NormalParameters>::Response),)*

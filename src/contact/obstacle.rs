@@ -24,8 +24,9 @@ use serde::{Deserialize, Serialize};
 /// Cosine between boundary and plane below which the ray counts as parallel to the plane.
 const PARALLEL: f64 = 1e-6;
 
-/// A rigid obstacle that may move; friction acts on the velocity relative to it, over a step the mean one. The gap is measured from the place where a point of the boundary was at first along its
-/// normal there (deformations are small); where that ray does not meet the obstacle there is no contact.
+/// A rigid obstacle that may move; friction acts on the velocity relative to it, over a step the mean one. The gap is measured from the
+/// place where a point of the boundary was at first along its normal there (deformations are small); where that ray does not meet the
+/// obstacle there is no contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Obstacle")]
@@ -81,7 +82,7 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// What it turns about; in the plane there is but one axis.
+    /// The axis of rotation; in the plane it is always z.
     pub(super) fn axis(&self) -> Vector<3> {
         match self.axis.as_deref() {
             None | Some([]) => [0.0, 0.0, 1.0],
@@ -116,7 +117,7 @@ impl Gap {
         )))
     }
 
-    /// What it depends on time by.
+    /// The expressions that may depend on time.
     pub fn expressions(&self) -> Vec<&[Scalar]> {
         match self {
             Self::Distance(gap) => vec![std::slice::from_ref(gap)],
@@ -140,7 +141,7 @@ impl Gap {
         }
     }
 
-    /// The gap, not a number where the obstacle is nowhere.
+    /// The gap; NaN where the obstacle is undefined.
     fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
         match self {
             Self::Distance(gap) => gap.evaluate(time, place),

@@ -1,4 +1,4 @@
-//! How the material of an obstacle moves: what friction slides on.
+//! The velocity of the material of an obstacle, relative to which friction acts.
 //!
 //! An obstacle is a rigid body. With `x` the plane's point or the sphere's centre and `y` a place on its surface, its material
 //! there has the velocity
@@ -57,7 +57,7 @@ pub struct ObstacleMotion<const D: usize> {
 }
 
 impl<const D: usize> ObstacleMotion<D> {
-    /// Whether all places move alike.
+    /// Whether the motion is a translation.
     fn is_translation(&self) -> bool {
         self.spin == [0.0; 3]
     }
@@ -70,7 +70,7 @@ impl<const D: usize> ObstacleMotion<D> {
 }
 
 impl Gap {
-    /// Whether the obstacle's material may move in any other way than that which the gap knows.
+    /// Whether the obstacle's material may move; false for a distance, whose motion is part of the gap.
     pub fn may_drag(&self) -> bool {
         let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
         let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());

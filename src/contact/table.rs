@@ -1,4 +1,4 @@
-//! What the laws of one `[[contact]]` table say of their parameters and of each other.
+//! Faults of the laws of one `[[contact]]` table, each alone and in combination.
 
 use super::{adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory};
 use crate::law::LawFault;
@@ -16,7 +16,7 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// What stands in a `[[contact]]` table, as far as it can be read.
+/// The contents of a `[[contact]]` table, as far as they can be read.
 #[derive(Debug, Clone)]
 pub struct ContactTable {
     /// Normal law, friction law and obstacle.
@@ -30,7 +30,7 @@ pub struct ContactTable {
 }
 
 impl ContactTable {
-    /// What is wrong with its laws, each alone and all together; keys are those of the table.
+    /// The faults of its laws, each alone and in combination; keys are those of the table.
     pub fn faults(&self) -> Vec<LawFault> {
         let Interface { normal, friction, has_obstacle, .. } = &self.interface;
         let mut faults = Vec::new();

@@ -15,11 +15,10 @@ use crate::{
     tensor::{Vector, add_scaled, dot},
 };
 
-/// Bonds on contact boundaries, with the bonding `b` as one number a node.
+/// Adhesion on contact boundaries, with one bonding `b` for each node.
 ///
-/// Explicitly their force follows the displacement before the step, as elastic stress does:
-/// `w b_n^2 t(u_{n-1})` at a point of weight `w`, with `b_n` from `b_{n-1}` and `u_{n-1}`. With the potential `F` of the law
-/// the work against it is exactly
+/// With laws evaluated at the converged state the force at a point of weight `w` is `w b_n^2 t(u_{n-1})`, with `b_n` from `b_{n-1}` and
+/// `u_{n-1}`. With the potential `F` of the law the work against it is exactly
 ///
 /// ```text
 /// -w b_n^2 t(u_{n-1}) . (u_n - u_{n-1}) = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) F(u_{n-1}) - numerical
@@ -76,7 +75,7 @@ impl<const D: usize> Adhesion<D> {
         }
     }
 
-    /// What drives debonding at a node with these points in J, what it takes in J, and what slows it in J s.
+    /// Sums over the points of a node: driving force and threshold of debonding in J, and viscosity in J s.
     fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> [f64; 3] {
         let [mut drive, mut energy, mut viscosity] = [0.0; 3];
         for (law, point) in group {
@@ -88,7 +87,7 @@ impl<const D: usize> Adhesion<D> {
         [drive, energy, viscosity]
     }
 
-    /// What whole bonds at a node with these points store, in J.
+    /// Energy in J that intact bonds at the points of a node store.
     fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
         let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
             point.weight * self.laws[*law].potential(&at(displacement, point), &point.normal)
@@ -106,7 +105,7 @@ impl<const D: usize> Adhesion<D> {
         })
     }
 
-    /// Debonds by the converged displacement and adds the forces of the bonds.
+    /// Advances the bonding with the converged displacement and adds the forces of the bonds.
     fn add_explicit(&mut self, step: Step, displacement: &[f64], forces: &mut [f64], energy: &mut Energy) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
@@ -121,7 +120,7 @@ impl<const D: usize> Adhesion<D> {
         self.bonding.trial = trial;
     }
 
-    /// Debonds by the displacement at the end of a step.
+    /// Advances the bonding with the displacement at the end of a step.
     fn advance(&mut self, evolution: Evolution, displacement: &[f64]) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         let mut slopes = std::mem::take(&mut self.slopes);
@@ -167,7 +166,7 @@ impl<const D: usize> Adhesion<D> {
             let target = &mut forces[point.node as usize * D..][..D];
             target.iter_mut().zip(&pull).for_each(|(force, pull)| *force -= square * pull);
             if let Some(tangents) = &mut tangents {
-                // The bonding falls with the displacement. Traction and gradient of the drive are parallel as far as nothing is cut.
+                // The bonding depends on the displacement. Traction and gradient of the drive are parallel unless a length is truncated.
                 let tangent = std::array::from_fn(|i| {
                     add_scaled(&tangent[i], -2.0 * bonding * slope * pull[i], &gradient).map(|t| length * t)
                 });

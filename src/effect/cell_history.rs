@@ -5,13 +5,13 @@ use super::{
 use crate::{simd::Pack, space::CellRun};
 use std::borrow::Cow;
 
-/// Values of the cells of some materials, `W` a cell, converged and trial, in packs as the geometry has them. Other cells take no
+/// Converged and trial values of the cells of some materials, `W` a cell, in the packs of the geometry. Other cells take no
 /// storage.
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
     name: &'static str,
     earlier_name: &'static str,
-    /// Whether only laws evaluated at the end of steps need the values before the last step.
+    /// Whether the values before the last step are needed only by laws evaluated at the end of steps.
     is_earlier_for_end: bool,
     runs: Vec<CellRun>,
     /// The position of the pack of each run, if its material keeps any.
@@ -56,7 +56,7 @@ impl<const W: usize> CellHistory<W> {
         Self { is_earlier_for_end: true, ..self }
     }
 
-    /// What the last step added in a cell; zeros where that is not kept.
+    /// The change of the values of a cell in the last step; zeros where earlier values are not kept.
     #[inline]
     pub(super) fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
         let (Some(place), Some(earlier)) = (self.place(run), &self.earlier) else { return [0.0; W] };
@@ -71,7 +71,7 @@ impl<const W: usize> CellHistory<W> {
         }
     }
 
-    /// Converged values of a run of cells, if it keeps any; asks for those of the next run.
+    /// Converged values of a run of cells, if it keeps any; prefetches those of the next run.
     #[inline]
     pub(super) fn converged(&self, run: usize) -> Option<&Pack<W>> {
         if let Some(next) = self.place(run + 1) {
@@ -80,7 +80,7 @@ impl<const W: usize> CellHistory<W> {
         self.place(run).map(|place| &self.converged[place])
     }
 
-    /// Converged and trial values of a run of cells, if it keeps any; asks for those of the next run.
+    /// Converged and trial values of a run of cells, if it keeps any; prefetches those of the next run.
     #[inline]
     pub(super) fn both(&self, run: usize) -> Option<[&Pack<W>; 2]> {
         self.prefetch(run + 1);

@@ -15,11 +15,11 @@ use crate::{
     space::SurfacePoint,
 };
 
-/// Foundations that remember, with the pressure `m` as one number a node.
+/// Contact memory, with one pressure `m` for each node.
 ///
-/// Their force is `w m_n nu` at a point of weight `w`. Explicitly `m_n` follows from `m_{n-1}` and `u_{n-1}`, which counts as held; in an
-/// implicit step from `m_{n-1}` and both `u_{n-1}` and `u_n`, between which the displacement moves steadily: of second order whatever
-/// the scheme. The work against the body, `k w m_n nu . v_n`, is what the foundation takes up, or gives back.
+/// The force at a point of weight `w` is `w m_n nu`. At the converged state `m_n` follows from `m_{n-1}` and `u_{n-1}`, which is taken as
+/// constant over the step. In an implicit step `m_n` follows from `m_{n-1}`, `u_{n-1}` and `u_n`, with a displacement that is linear in
+/// time between them: second order under every scheme. The foundation takes up the work `k w m_n nu . v_n`, or gives it back.
 #[derive(Debug)]
 pub struct ContactMemory<const D: usize> {
     /// One a node, in the order of nodes.
@@ -32,7 +32,7 @@ pub struct ContactMemory<const D: usize> {
 }
 
 impl<const D: usize> ContactMemory<D> {
-    /// Foundations that remember nothing yet, each with its points at owned nodes. Refuses edges: a node has one memory.
+    /// Foundations without history, each with its points at owned nodes. Refuses edges, because a node has one memory.
     pub fn new(foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>, mesh: &Mesh<D>) -> Result<Self> {
         let of_each = foundations.into_iter();
         let mut points: Vec<(Memory, SurfacePoint<D>)> =
@@ -141,7 +141,7 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         self.advance(step, ends.after);
     }
 
-    /// The foundation counts as the spring that it is against what is held for long.
+    /// The foundation counts as the spring that it is for a displacement held for a long time.
     fn add_error(&self, curvature: Curvature, _: &[f64], error: &mut StressError) {
         for ((law, point), pressure) in self.points.iter().zip(self.pressure.last_three()) {
             let stiffness = law.stiffness();

@@ -15,12 +15,12 @@ use crate::{
     tensor::{Mandel, add_scaled},
 };
 
-/// Isotropic damage `d`, one number for each cell that may be damaged: the elastic and viscoplastic stress counts by the
-/// share `1 - d`, viscous stress in full.
+/// Isotropic damage `d`, one number for each cell whose material has the law: the elastic and viscoplastic stress is multiplied by
+/// `1 - d`, viscous stress is not.
 ///
-/// Explicitly `d_n` follows from `d_{n-1}` and the energy `Y_{n-1}` of `S_{n-1} = E e(u_{n-1}) + H_{n-1}`, so that the loss of elastic
-/// energy in the step is exactly `(d_n - d_{n-1}) Y_{n-1}`, the dissipation; all other terms of the elastic energy count by
-/// `1 - d_n`.
+/// With laws evaluated at the converged state `d_n` follows from `d_{n-1}` and the energy `Y_{n-1}` of
+/// `S_{n-1} = E e(u_{n-1}) + H_{n-1}`, so that the loss of elastic energy in the step is exactly `(d_n - d_{n-1}) Y_{n-1}`, the
+/// dissipation; all other terms of the elastic energy are multiplied by `1 - d_n`.
 ///
 /// In an implicit step `d_n` follows from `Y_n`, and the stress is `(1 - d_n) S_n` with `S_n` as flow leaves it. The dissipation is
 /// `(d_n - d_{n-1}) (Y_{n-1} + Y_n) / 2`.
@@ -31,7 +31,7 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Sound cells, for the runs whose material has a law.
+    /// Undamaged cells, for the runs whose material has a law.
     pub fn new(laws: ByMaterial<Elastic<material::Damage>>, runs: &[CellRun]) -> Self {
         let names = ["damage", "previous_damage"];
         let damage = CellHistory::new(names, runs, |material| laws.get(material).is_some());
@@ -55,7 +55,7 @@ impl Damage {
         batch.integrity.weaken(left(after));
     }
 
-    /// Damages the cells of a batch by the sound stress at the end of a step, takes from their stress what they no longer bear, and
+    /// Damages the cells of a batch by the undamaged stress at the end of a step, subtracts the damaged fraction from their stress, and
     /// weakens the batch.
     fn advance_implicitly<const D: usize, const S: usize>(
         &mut self,
@@ -102,8 +102,8 @@ struct Growth {
     length: f64,
 }
 
-/// Writes the change of the derivative of a cell's stress by its strain rate, beyond `k' E`, where the cell bears `1 - damage` of the
-/// sound stress: `(1 - d) C - dd/dY S (x) C^T E^-1 S` with the derivative `C` of the sound stress `S`.
+/// Updates the derivative of a cell's stress by its strain rate, less `k' E`, for a stress `(1 - d) S`:
+/// `(1 - d) C - dd/dY S (x) C^T E^-1 S` with the derivative `C` of the undamaged stress `S`.
 fn weaken_tangent<const S: usize>(
     law: &Elastic<material::Damage>,
     Growth { damage, slope, length }: Growth,
@@ -129,7 +129,7 @@ fn weaken_tangent<const S: usize>(
     }
 }
 
-/// What damage leaves.
+/// The fractions that damaged cells carry.
 fn left(damage: &[f64; LANES]) -> [f64; LANES] {
     damage.map(|damage| 1.0 - damage)
 }
@@ -185,7 +185,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
-    /// An error `e` of the damage is one of `e` times the stress of the sound cell.
+    /// An error `e` of the damage is an error of the stress of `e` times the undamaged stress.
     fn add_error(&self, curvature: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some([Pack([now]), Pack([before]), Pack([earlier])]) = self.damage.last_three(batch.number)

@@ -12,11 +12,11 @@ pub enum Role {
     Dissipated,
     /// Work done on the body in the step.
     Work,
-    /// The scheme's own terms in the step, known exactly. Files hold minus their sum: what they dissipated.
+    /// Terms of the time scheme in the step, known exactly. Files hold minus their sum: the numerical dissipation.
     Numerical,
 }
 
-/// Makes [`Energy`] of a list: what each energy is, its role, its field and its column in `history.csv`.
+/// Defines [`Energy`] from a list of its members: meaning, role, field and column in `history.csv`.
 macro_rules! energies {
     ($($(#[$meaning:meta])* $role:ident $name:ident = $column:literal;)*) => {
         /// Energies of a body in J (J/m in the plane): those that are stored at the end of a step, the others in it.
@@ -31,7 +31,7 @@ macro_rules! energies {
         /// with `X` the viscoplastic strain rate at `s_{n-1}`, `(s_{n-1} - P_K s_{n-1}) / (2 lambda)` in the paper, and stresses
         /// measured by `E^-1`. The implicit schemes have their own `numerical`, see `stepping::implicit`. What hardening stores is part
         /// of the viscoplastic term. Damage `d` scales all terms with `S` or `E` by `1 - d_n` and adds its dissipation
-        /// `(d_n - d_{n-1}) 1/2 S_{n-1}:E^-1 S_{n-1}`; what adhesion adds stands with [`super::Adhesion`].
+        /// `(d_n - d_{n-1}) 1/2 S_{n-1}:E^-1 S_{n-1}`; for the terms of adhesion see [`super::Adhesion`].
         #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
         #[serde(default)]
         pub struct Energy {
@@ -69,11 +69,11 @@ energies! {
     Dissipated viscous = "viscous_dissipation";
     /// Taken up by viscoplastic flow: dissipated, or stored by hardening.
     Dissipated viscoplastic = "viscoplastic_dissipation";
-    /// Dissipated by contact, or taken up by a foundation that remembers.
+    /// Dissipated by contact, or taken up by contact memory.
     Dissipated contact = "contact_dissipation";
     /// Work of loads and of obstacles that move.
     Work work = "external_work";
-    /// The scheme's own terms.
+    /// Terms of the time scheme.
     Numerical numerical = "numerical_dissipation";
     /// Stored in contact (compliant foundations).
     Stored stored_in_contact = "contact_energy";
@@ -81,7 +81,7 @@ energies! {
     Dissipated damage = "damage_dissipation";
     /// Stored in stretched adhesive bonds.
     Stored stored_in_bonds = "adhesion_energy";
-    /// Dissipated by bonds that give way.
+    /// Dissipated by bonds that break.
     Dissipated debonding = "adhesion_dissipation";
 }
 

@@ -1,11 +1,12 @@
 use super::step::Blend;
 
-/// How an implicit step advances an internal variable of one number that changes in one direction only, such as damage or bonding.
+/// An implicit step for a scalar internal variable that changes in one direction only, such as damage or bonding.
 ///
-/// The law gives the value after a step of implicit Euler of some length from some value. A two-step formula starts from the value
-/// before the step and a share of what the last step added to it. That share counts as far as the rate at the end of the step bears
-/// it out, so that a variable whose driving force is gone stays as it was: where the share is more than what the law adds, the law
-/// adds the same again instead, which is continuous. A variable that did not change in the step before takes a step of implicit Euler.
+/// The law solves one step of implicit Euler of a given length from a given value. A two-step formula starts from the value before the
+/// step plus a fraction of the change in the last step. This extrapolated change is limited by the change that the law makes, so that a
+/// variable without driving force stays constant: where the extrapolated change exceeds that of the law, the step is one of implicit
+/// Euler of twice the formula's length, which is continuous. A variable that did not change in the last step takes a step of implicit
+/// Euler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Evolution {
     /// How the step starts.
@@ -15,8 +16,8 @@ pub(super) struct Evolution {
 }
 
 impl Evolution {
-    /// The value at the end of the step and its derivative by the driving force, given the value before the step and what the last
-    /// step added to it. `relax` gives both after a step of implicit Euler from a value over a length in s.
+    /// The value at the end of the step and its derivative by the driving force, given the value before the step and its change in
+    /// the last step. `relax` gives both after a step of implicit Euler from a value over a length in s.
     #[inline]
     pub(super) fn advance(self, before: f64, last: f64, relax: impl Fn(f64, f64) -> [f64; 2]) -> [f64; 2] {
         let share = -self.blend.earlier * last;

@@ -1,4 +1,4 @@
-//! Stresses and energies of isotropic tensors, cells side by side.
+//! Stresses and energies of isotropic tensors, for a pack of cells.
 
 use crate::{
     material::Isotropic,
@@ -8,7 +8,7 @@ use crate::{
 };
 use multiversion::multiversion;
 
-/// Adds `factor` times the stresses of strains or strain rates, as far as the cells bear them.
+/// Adds `factor` times the stresses of strains or strain rates, times the fractions that the cells carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn add_stresses<const S: usize>(
     tensor: &Isotropic,
@@ -23,7 +23,7 @@ pub(super) fn add_stresses<const S: usize>(
     });
 }
 
-/// `integral of T(e) : e` over the cells, as far as they bear it.
+/// `integral of T(e) : e` over the cells, times the fractions that they carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn square<const D: usize, const S: usize>(
     tensor: &Isotropic,
@@ -40,7 +40,7 @@ pub(super) fn square<const D: usize, const S: usize>(
     sum(&squares)
 }
 
-/// `integral of s : T^-1(s)` over the cells of the stress `s = T(e) + h`, as far as they bear it.
+/// `integral of s : T^-1(s)` over the cells for the stress `s = T(e) + h`, times the fractions that they carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn inverse_square<const D: usize, const S: usize>(
     tensor: &Isotropic,
@@ -58,7 +58,7 @@ pub(super) fn inverse_square<const D: usize, const S: usize>(
     sum(&squares)
 }
 
-/// Adds histories to stresses, as far as the cells bear them.
+/// Adds histories to stresses, times the fractions that the cells carry.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn add_histories<const S: usize>(history: &Pack<S>, integrity: &Integrity, stress: &mut Pack<S>) {
     let share = integrity.shares();

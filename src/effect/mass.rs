@@ -1,4 +1,4 @@
-//! Forces and energies of consistent mass, cells side by side.
+//! Forces and energies of the consistent mass matrix, for a pack of cells.
 
 use crate::{
     material::ByMaterial,

@@ -4,7 +4,7 @@ use super::{
 };
 use std::borrow::Cow;
 
-/// One value for each of some nodes that a rank owns, converged and trial. Other nodes take no storage.
+/// Converged and trial values of some of the nodes that a rank owns, one a node. Other nodes take no storage.
 #[derive(Debug)]
 pub(super) struct NodeHistory {
     name: &'static str,
@@ -18,8 +18,8 @@ pub(super) struct NodeHistory {
 }
 
 impl NodeHistory {
-    /// The same value at each of these of the `owned` nodes. The names are those of the converged values and of the values before
-    /// the last step.
+    /// The same value at each of `nodes`, of which the rank owns `owned` in all. The names are those of the converged values and of the
+    /// values before the last step.
     pub(super) fn new(
         [name, earlier_name]: [&'static str; 2],
         nodes: Vec<u32>,
@@ -30,7 +30,7 @@ impl NodeHistory {
         Self { name, earlier_name, nodes, owned, trial: converged.clone(), converged, earlier: None }
     }
 
-    /// What the last step added to the value of a node by its position; 0 where that is not kept.
+    /// The change of the value of a node, by its position, in the last step; 0 where earlier values are not kept.
     pub(super) fn last_change(&self, at: usize) -> f64 {
         self.earlier.as_ref().map_or(0.0, |earlier| self.converged[at] - earlier[at])
     }

@@ -19,7 +19,7 @@ pub struct Peaks {
     pub strain: f64,
 }
 
-/// Squares of the largest ones of the cells that a pass has come by, lane by lane.
+/// Squares of the largest values over the cells visited so far, lane by lane.
 #[derive(Debug, Default)]
 pub struct PeakSquares {
     von_mises: [f64; LANES],
@@ -27,12 +27,12 @@ pub struct PeakSquares {
 }
 
 impl PeakSquares {
-    /// Takes in strain and total stress of so many cells of a pack.
+    /// Updates the maxima with strain and total stress of the first `count` cells of a pack.
     pub fn take_in<const S: usize>(&mut self, count: usize, strain: &Pack<S>, stress: &Pack<S>) {
         take_in(self, count, strain, stress);
     }
 
-    /// The largest of all.
+    /// The maxima over all lanes.
     pub fn peaks(&self) -> Peaks {
         let most = |squares: &[f64; LANES]| squares.iter().copied().fold(0.0, larger).sqrt();
         Peaks { von_mises: most(&self.von_mises), strain: most(&self.strain) }

@@ -3,8 +3,9 @@
 use super::{isotropic, step::Step};
 use crate::{material::Isotropic, simd::Pack, space::Batch};
 
-/// What no straight line through the last values has of the next one: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
-/// x_{n-2}))` with `w = k_n / k_{n-1}`, the local error of implicit Euler. In the first step values count as steady before it.
+/// The deviation of the next value from the straight line through the last two: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
+/// x_{n-2}))` with `w = k_n / k_{n-1}`, the local error of implicit Euler. Before the first step values are taken as
+/// constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curvature {
     share: f64,
@@ -22,15 +23,14 @@ impl Curvature {
         }
     }
 
-    /// Of the value at the end of the step, of the one before it and of the one before that.
+    /// The error of a value, given it at the end of the step, before the step and before the last step.
     #[inline(always)]
     pub fn error(self, [now, before, earlier]: [f64; 3]) -> f64 {
         self.share * (now - before - self.ratio * (before - earlier))
     }
 }
 
-/// Squares in the norm of the compliance, sums over cells and nodes, in J: a stress `s` counts by `s : E^-1 s`, a spring by twice its
-/// energy.
+/// Squares of norms in J, summed over cells and nodes: `s : E^-1 s` for a stress `s`, twice the energy for a spring.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StressError {
     /// Of the errors that histories make in stresses and forces.

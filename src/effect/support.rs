@@ -14,7 +14,7 @@ pub enum Held {
     All,
     /// Those along these axes.
     Axes(Vec<usize>),
-    /// The one along the normal of a boundary square to an axis.
+    /// The one along the normal of a boundary that is perpendicular to an axis.
     Normal,
 }
 
@@ -54,7 +54,7 @@ impl Support {
     }
 }
 
-/// One flag a component of every local node, ghosts included: whether a support on any rank holds it. Collective, also
+/// One flag for each component of each local node, ghosts included: whether a support on any rank holds it. Collective, also
 /// where a rank refuses.
 pub fn fixed_components<const D: usize>(
     mesh: &Mesh<D>,

@@ -1,8 +1,8 @@
 use crate::material::Tangent;
 
-/// What the constant matrix of an implicit step lacks: for cells that flow or are damaged, the derivative of the stress by the strain
-/// rate beyond that of elasticity, in Pa s; for nodes that are bonded or remember, the derivative of minus the force by the velocity, in
-/// N s/m.
+/// The part of the Jacobian of an implicit step that the constant matrix does not contain: for cells that flow or are damaged, the
+/// derivative of the stress by the strain rate beyond that of elasticity, in Pa s; for nodes with adhesion or contact memory, the
+/// derivative of minus the force by the velocity, in N s/m.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tangents {
     cells: Vec<u32>,
@@ -13,7 +13,7 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// Forgets all cells; there is room for as many, which takes no memory before it is written.
+    /// Removes all cells and nodes, and reserves room for so many cells; the system provides the memory when it is written.
     pub fn restart<const S: usize>(&mut self, cells: usize) {
         self.skew = false;
         self.nodes.clear();
@@ -32,7 +32,8 @@ impl Tangents {
         self.values.extend_from_slice(tangent.as_flattened());
     }
 
-    /// The matrix of this cell, zero if it had none, and whether it had one: for effects that change what others made of the stress.
+    /// The matrix of a cell, inserted as zero if it is absent, and whether it was present: for effects that change the stress of
+    /// others.
     pub(super) fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
         // Cells come in their order.
         let found = self.cells.binary_search(&(cell as u32));
@@ -44,7 +45,7 @@ impl Tangents {
         (&mut self.values[at * S * S..][..S * S], found.is_ok())
     }
 
-    /// Says that a matrix is not symmetric.
+    /// Records that a matrix is not symmetric.
     pub(super) fn mark_skew(&mut self) {
         self.skew = true;
     }
@@ -67,7 +68,7 @@ impl Tangents {
         }
     }
 
-    /// Whether those of all cells and nodes are.
+    /// Whether the matrices of all cells and nodes are symmetric.
     pub fn are_symmetric(&self) -> bool {
         !self.skew
     }

@@ -7,11 +7,11 @@
 //! viscosity d' = (1 - d)^exponent <Y - threshold>_+,   d <= largest,
 //! ```
 //!
-//! and never heals: it dissipates `Y d' >= 0`. With exponent 0 this is the law of M. Frémond and B. Nedjar (Damage, gradient
+//! and never decreases: it dissipates `Y d' >= 0`. With exponent 0 this is the law of M. Frémond and B. Nedjar (Damage, gradient
 //! of damage and principle of virtual power, Int. J. Solids Struct. 33 (1996), 1083-1103) in `beta = 1 - d` without the
 //! gradient of damage; for the mathematics see M. Sofonea, W. Han, M. Shillor, Analysis and Approximation of Contact
-//! Problems with Adhesion or Damage, 2006. Without the gradient only the rate spreads damage: the slower the load, the
-//! thinner the band of cells in which it gathers.
+//! Problems with Adhesion or Damage, 2006. Without the gradient only the viscosity limits localisation: the slower the load,
+//! the narrower the band of damaged cells.
 
 use super::elasticity::{Elastic, Elasticity, Hypothesis};
 use crate::{law::increasing_root, tensor::Mandel};
@@ -43,7 +43,7 @@ fn nearly_all() -> f64 {
 }
 
 impl Damage {
-    /// Why it needs elasticity.
+    /// The message where elasticity is missing.
     pub const WITHOUT_ELASTICITY: &'static str = "damage without elasticity has nothing to weaken";
 
     /// The law in a material of this elasticity.

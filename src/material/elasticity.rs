@@ -1,4 +1,4 @@
-//! Linear isotropic elasticity, and what the plane stands for.
+//! Linear isotropic elasticity, and the hypothesis of plane problems.
 
 use super::isotropic::Isotropic;
 use schemars::JsonSchema;
@@ -57,7 +57,7 @@ impl Elasticity {
     }
 }
 
-/// A law with the elasticity of its material, from which it computes.
+/// A law with the elasticity of its material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elastic<L> {
     /// The law's parameters.

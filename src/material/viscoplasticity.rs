@@ -1,7 +1,7 @@
 //! Viscoplastic laws `G(s) = -E X(s)`: stress that relaxes by flow.
 //!
 //! A law is a file below and an entry in the list of `law.rs`: its [`Parameters`], as the job file has them, and its [`Flow`], which
-//! computes. Nothing else knows the laws by name.
+//! evaluates it. No other module names a law.
 
 mod drucker_prager;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Passes over cells, a pack of them at a time: gather nodal values, let the effects work, scatter forces.
 //!
-//! A batch is a pack of cells of one material, so that effects look their law up once a batch.
+//! A batch is a pack of cells of one material, so that an effect looks up its law once per batch.
 
 use super::{Geometry, SimplexPack, kernels, kernels::Corners};
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
 };
 use multiversion::multiversion;
 
-/// What a pass gathers for its effects.
+/// The fields that a pass gathers for its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Needs {
     /// Strain of the displacement.
@@ -28,7 +28,7 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// What either needs.
+    /// The union of both.
     pub fn or(self, other: Self) -> Self {
         Self {
             strain: self.strain || other.strain,
@@ -41,7 +41,7 @@ impl Needs {
     }
 }
 
-/// Nodal values with ghosts, `D` a node.
+/// Nodal fields with ghosts, `D` values a node.
 #[derive(Debug, Clone, Copy)]
 pub struct Nodal<'a> {
     /// Displacement in m.
@@ -66,18 +66,18 @@ impl<'a> Nodal<'a> {
     }
 }
 
-/// The share of the elastic stress that each cell of a batch still bears; all of it where nothing was weakened.
+/// The fraction of the elastic stress that each cell of a batch carries: 1 where nothing weakens it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Integrity(Option<[f64; LANES]>);
 
 impl Integrity {
-    /// The shares of the cells.
+    /// The fractions of the cells.
     #[inline(always)]
     pub fn shares(&self) -> [f64; LANES] {
         self.0.unwrap_or([1.0; LANES])
     }
 
-    /// Multiplies the shares of the cells by these.
+    /// Multiplies the fractions of the cells by these.
     pub fn weaken(&mut self, shares: [f64; LANES]) {
         let all = self.shares();
         self.0 = Some(std::array::from_fn(|lane| all[lane] * shares[lane]));
@@ -85,7 +85,7 @@ impl Integrity {
 }
 
 /// A pack of cells, with their gathered inputs and the outputs that effects add to. Fields that nothing needs are absent
-/// ([`Pack::ABSENT`]). All is on the stack of the pass.
+/// ([`Pack::ABSENT`]). A pass keeps its batch on the stack.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
     /// Position among the packs of the geometry.
@@ -110,15 +110,15 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     pub velocity_change: Corners<D>,
     /// Elastic stress `E e(u) + H` in Pa before anything weakens it; effects add to it.
     pub elastic_stress: Pack<S>,
-    /// The same before the step that is being taken, in the balance of an implicit step.
+    /// Elastic stress in Pa before the step; present in the energy balance of an implicit step.
     pub elastic_stress_before: Pack<S>,
-    /// What the cells still bear of it.
+    /// The fraction of the elastic stress that the cells carry.
     pub integrity: Integrity,
     /// Output: stress in Pa.
     pub stress: Pack<S>,
     /// Output: force in N on the nodes of cells.
     pub force: Corners<D>,
-    /// Nodal values that only strains are made of.
+    /// Nodal values from which only strains are computed.
     corners: [Corners<D>; 2],
 }
 
@@ -171,7 +171,7 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
     }
 }
 
-/// Gathers what is needed, makes the outputs zero, and asks for the next batch's cells.
+/// Gathers what is needed, sets the outputs to zero, and prefetches the geometry of the next batch.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn gather<const D: usize, const S: usize>(
     batch: &mut Batch<'_, D, S>,

@@ -58,7 +58,7 @@ impl<const D: usize> Simplex<D> {
     }
 }
 
-/// Cells side by side; where there are fewer than lanes, the others have no volume and no gradients.
+/// A pack of cells, one in each lane; lanes without a cell have zero volume and zero gradients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimplexPack<const D: usize> {
     /// Areas or volumes in m^D.
@@ -81,7 +81,7 @@ impl<const D: usize> SimplexPack<D> {
         self.gradients.iter_mut().zip(&cell.gradients).for_each(|(all, one)| all.set(lane, *one));
     }
 
-    /// Asks for them, as they are soon needed.
+    /// Prefetches the pack.
     #[inline(always)]
     pub(super) fn prefetch(&self) {
         prefetch(&self.volume);
@@ -111,7 +111,7 @@ fn dual_basis<const D: usize>(edges: &[[f64; D]; D]) -> [[f64; D]; D] {
     out
 }
 
-/// Cells of one material that follow each other, at most a pack of them.
+/// Consecutive cells of one material, at most one pack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CellRun {
     /// Local number of the first cell.
@@ -127,17 +127,17 @@ pub struct CellRun {
 pub struct Geometry<const D: usize> {
     /// The pack of each run.
     pub packs: Vec<SimplexPack<D>>,
-    /// All cells in their order, cut where the material changes: the batches of every pass.
+    /// All cells in the order of the mesh, split where the material changes: the batches of every pass.
     pub runs: Vec<CellRun>,
 }
 
 impl<const D: usize> Geometry<D> {
-    /// Measures every cell of a body of one material.
+    /// The geometry of all cells of a body of one material.
     pub fn new(mesh: &Mesh<D>) -> Self {
         Self::with_materials(mesh, |_| 0)
     }
 
-    /// Measures every cell of the mesh; `material` tells that of a region of the mesh.
+    /// The geometry of all cells of the mesh; `material` gives the material of a region of the mesh.
     pub fn with_materials(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
         let mut runs: Vec<CellRun> = Vec::new();
         for cell in 0..mesh.cells.len() / (D + 1) {
@@ -168,8 +168,8 @@ impl<const D: usize> Geometry<D> {
         self.packs[run].simplex(number - self.runs[run].first)
     }
 
-    /// The run of a cell: no run is longer than a pack, so that it is not before this one, and it is this one where no run is
-    /// shorter.
+    /// The run of a cell. Runs have at most as many cells as a pack has lanes, so that the search starts at `cell / LANES`; where all
+    /// runs are full it ends there.
     #[inline]
     fn run_of(&self, cell: usize) -> usize {
         let least = cell / LANES;

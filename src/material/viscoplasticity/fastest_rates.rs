@@ -1,5 +1,5 @@
-//! The fastest rates that laws state, which bound explicit steps, from both sides: against eigenvalues of the derivatives of the rates,
-//! by differences.
+//! Tests of the fastest rates that laws state, which bound explicit steps: they are close bounds, from above, on the eigenvalues of the
+//! derivatives of the rates, which are found by differences.
 
 use super::{DruckerPrager, Flow, FlowLaw, Maxwell, Metric, Norton, Perzyna, Viscoplasticity};
 use crate::{

@@ -10,25 +10,25 @@ use crate::{
 
 /// The parameters of a law.
 pub trait Parameters {
-    /// What computes.
+    /// The type that evaluates the law.
     type Flow: Flow;
 
-    /// Why there is no such law in plane stress and what to do about it, if so.
+    /// For laws that plane stress does not support: the reason, and what to do instead.
     const NOT_IN_PLANE_STRESS: Option<[&'static str; 2]> = None;
 
     /// The law in a material of this elasticity.
     fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Self::Flow;
 
-    /// What is wrong with parameters each of which is in its range.
+    /// The fault of parameters each of which is in its range, if there is one.
     fn fault(&self) -> Option<LawFault> {
         None
     }
 
-    /// Whether the material flows without a change of its volume.
+    /// Whether the flow preserves volume.
     fn keeps_volume(&self) -> bool;
 }
 
-/// What a law says of a point. The defaults are those of a law without yield surface and without hardening.
+/// The evaluation of a law at a point. The defaults are those of a law without yield surface and without hardening.
 pub trait Flow {
     /// The elastic tensor `E` in Pa.
     fn elasticity(&self) -> &Isotropic;
@@ -37,7 +37,7 @@ pub trait Flow {
     /// it. The stress rate is `-E X(s)`, the dissipation `s : X(s)` without what hardening stores.
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64);
 
-    /// The strain rates of stresses side by side, as [`rate`](Self::rate) gives them one by one; `None` if all are zero. Writes the
+    /// The strain rates of a pack of stresses, as [`rate`](Self::rate) gives them one by one; `None` if all are zero. Writes the
     /// growths of laws that harden.
     #[inline(always)]
     fn rates<const S: usize>(
@@ -69,13 +69,13 @@ pub trait Flow {
     /// to this one. Explicit steps of more than twice its inverse make stress grow.
     fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64;
 
-    /// Whether stress relaxes the faster the larger it is, without bound.
+    /// Whether the rate of relaxation grows with the stress without bound.
     fn is_power_law(&self) -> bool {
         false
     }
 
-    /// Of power laws what the fastest rate grows with: the stress beyond the yield stress over it, or without a yield surface the
-    /// stress over a stress of the law.
+    /// The argument of [`fastest_rate`](Self::fastest_rate) at a stress, for power laws: the overstress relative to the yield stress, or,
+    /// without a yield surface, the stress relative to a reference stress of the law.
     fn overstress<const S: usize>(&self, _s: &Mandel<S>, _accumulated: f64) -> f64 {
         0.0
     }
@@ -102,7 +102,7 @@ pub trait Flow {
     }
 }
 
-/// The strain rates of stresses side by side under a law that knows one at a time, and the growths.
+/// The strain rates of a pack of stresses under a law that evaluates one at a time, and the growths.
 #[inline(always)]
 pub(super) fn one_by_one<const S: usize>(
     law: &(impl Flow + ?Sized),

@@ -17,7 +17,7 @@ use crate::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The choice of laws, from the list of them: the one that the job holds, the one that computes, and calls of the chosen law.
+/// The choice of laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the chosen law.
 macro_rules! laws {
     ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
         /// The viscoplastic law.
@@ -27,11 +27,10 @@ macro_rules! laws {
         }
 
         impl Viscoplasticity {
-            /// Why it needs elasticity.
+            /// The message where elasticity is missing.
             pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity without elasticity has no stress to relax";
 
-            /// The names of the laws in the job, each with what plane stress makes of it
-            /// ([`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS)).
+            /// The names of the laws in the job, each with its [`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS).
             pub const NAMES: &'static [(&'static str, Option<[&'static str; 2]>)] =
                 &[$(($name, $law::NOT_IN_PLANE_STRESS),)*];
 
