@@ -1,4 +1,4 @@
-//! Finds the system's PETSc through pkg-config, with the CHOLMOD and the BLAS that it uses, and generates the raw bindings of what `src/petsc` calls.
+//! Finds the system's PETSc through pkg-config, with the CHOLMOD and the BLAS that it uses, and generates the raw bindings of what `src/petsc` and `src/sparse` call.
 
 use bindgen::callbacks::{IntKind, ParseCallbacks};
 use std::{

@@ -12,6 +12,8 @@ pub mod law;
 pub mod contact;
 pub mod material;
 pub mod job;
+pub mod bindings;
+pub mod sparse;
 pub mod petsc;
 pub mod agreement;
 pub mod session;

@@ -8,7 +8,8 @@ use std::{
 };
 
 /// Where `unsafe` may stand; folders end with a slash.
-const UNSAFE: [&str; 5] = [
+const UNSAFE: [&str; 6] = [
+    "src/sparse/",
     "src/petsc/",
     "src/output/hyperslab.rs",
     "src/output/identifier.rs",

@@ -85,7 +85,7 @@ impl<const D: usize> FieldOutput<D> {
         let computed = self.computed(at, |_| true)?;
         let mut fields = Vec::new();
         for (OutputField { name, place, shape, .. }, computed) in &computed {
-            fields.push(Field { name, place: *place, shape: *shape, values: &**computed.values });
+            fields.push(Field { name, place: *place, shape: *shape, values: &computed.values });
         }
         let of_cells: Vec<History> = at.body.cell_histories().collect();
         for history in &of_cells {

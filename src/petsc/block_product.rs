@@ -2,10 +2,12 @@ use super::{
     DistributedVector, check,
     compressed_rows::{Others, Parts, multiply, own_rows},
     shell::{Action, Shell},
-    symmetric_blocks::{Product, Stored, product},
     sys,
 };
-use crate::error::Result;
+use crate::{
+    error::Result,
+    sparse::{Product, Stored, product},
+};
 
 /// Products with a symmetric matrix of PETSc's, from copies: in blocks of the rows and columns of this rank, entry by entry of the
 /// columns of other ranks.

@@ -1,11 +1,13 @@
 use super::{
     DistributedVector, check,
     compressed_rows::{Others, Parts, multiply, own_rows},
-    rectangular_blocks::{Transfer, transfer},
     shell::{Action, Shell},
     sys,
 };
-use crate::error::Result;
+use crate::{
+    error::Result,
+    sparse::{Transfer, transfer},
+};
 
 /// Interpolation and restriction between two levels, from copies: in single precision of the rows and columns of this rank, in double
 /// precision of the columns of other ranks.

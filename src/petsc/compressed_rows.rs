@@ -1,7 +1,10 @@
 //! What PETSc's matrices in compressed rows are made of.
 
-use super::{DistributedVector, check, reference::Reference, symmetric_blocks::ScalarRows, sys};
-use crate::error::{Error, Result};
+use super::{DistributedVector, check, reference::Reference, sys};
+use crate::{
+    error::{Error, Result},
+    sparse::ScalarRows,
+};
 use std::{ffi::CStr, ptr, slice};
 
 /// The parts of a matrix: the columns that belong to this rank, and the others.

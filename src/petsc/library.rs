@@ -1,5 +1,8 @@
-use super::{c_string, check, keep_fault, sys, threads};
-use crate::error::{Error, Result};
+use super::{c_string, check, keep_fault, sys};
+use crate::{
+    error::{Error, Result},
+    sparse::one_unless_chosen,
+};
 use mpi::{environment::Universe, traits::AsRaw};
 use std::{
     cell::RefCell,
@@ -50,7 +53,7 @@ impl Petsc {
         let arguments = [c"solver", c"-skip_petscrc", c"-no_signal_handler"];
         let mut pointers: Vec<*mut c_char> = arguments.iter().map(|a| a.as_ptr().cast_mut()).collect();
         pointers.push(ptr::null_mut());
-        threads::one_unless_chosen();
+        one_unless_chosen();
         // PETSc keeps the argument vector for its whole life.
         let pointers = Box::leak(pointers.into_boxed_slice());
         // SAFETY: MPI is initialised, and its only universe is on this thread, so that no other starts PETSc; the

@@ -1,40 +1,9 @@
 use super::{
-    DistributedVector, block_product::BlockProduct, check, index, library::communicator,
+    BlockRows, DistributedVector, block_product::BlockProduct, check, index, library::communicator,
     reference::Reference, shell::Shell, sys,
 };
 use crate::error::{Error, Result};
 use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
-
-/// The rows this rank owns of a sparse matrix of dense blocks.
-#[derive(Debug, Clone, Default)]
-pub struct BlockRows {
-    /// Where each owned block row starts in `columns`; one more entry than rows.
-    pub offsets: Vec<usize>,
-    /// Global block columns, ascending within a row.
-    pub columns: Vec<u32>,
-    /// `block * block` values for each column, row by row.
-    pub values: Vec<f64>,
-}
-
-impl BlockRows {
-    /// Fails unless these are rows of a matrix of so many block columns that PETSc can count. Ranks have to agree on the outcome
-    /// before they make a matrix.
-    pub fn check(&self, block: usize, block_columns: usize) -> Result<()> {
-        index(block_columns * block, "unknowns")?;
-        index(self.columns.len() * block * block, "matrix entries of a rank")?;
-        let starts = self.offsets.first() == Some(&0) && self.offsets.is_sorted();
-        let sizes = self.offsets.last() == Some(&self.columns.len())
-            && self.values.len() == self.columns.len() * block * block;
-        let row = |range: &[usize]| {
-            let columns = &self.columns[range[0]..range[1]];
-            columns.is_sorted_by(|a, b| a < b) && columns.last().is_none_or(|&c| (c as usize) < block_columns)
-        };
-        if starts && sizes && self.offsets.windows(2).all(row) {
-            return Ok(());
-        }
-        Err(Error::Internal(format!("{} block rows that are none of a matrix", self.offsets.len())))
-    }
-}
 
 /// A sparse matrix spread over the ranks by rows.
 #[derive(Debug)]
@@ -204,21 +173,6 @@ mod tests {
     }
 
     #[test]
-    fn rows_have_ascending_columns_of_the_matrix_and_a_block_for_each() {
-        let rows = |columns: &[u32]| BlockRows {
-            offsets: vec![0, columns.len()],
-            columns: columns.to_vec(),
-            values: vec![1.0; columns.len() * 4],
-        };
-        assert!(rows(&[0, 2, 3]).check(2, 4).is_ok());
-        for wrong in [[0, 2, 2], [0, 3, 2], [0, 2, 4]] {
-            assert!(rows(&wrong).check(2, 4).is_err(), "{wrong:?}");
-        }
-        assert!(BlockRows { values: vec![1.0; 11], ..rows(&[0, 2, 3]) }.check(2, 4).is_err());
-        assert!(BlockRows { offsets: vec![1, 3], ..rows(&[0, 2, 3]) }.check(2, 4).is_err());
-    }
-
-    #[test]
     fn a_product_reads_entries_indices_and_vectors() {
         // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
         let index = size_of::<sys::PetscInt>() as u64;
@@ -233,7 +187,7 @@ mod tests {
                 let columns: Vec<u64> = columns.into_iter().map(|c| u64::try_from(c).unwrap()).collect();
                 assert_eq!(columns[..2], [8_589_934_590, 8_589_934_591]);
             }
-            Err(error) => assert!(super::super::INDEX_BITS == 32 && error.to_string().contains("32-bit")),
+            Err(error) => assert!(crate::sparse::INDEX_BITS == 32 && error.to_string().contains("32-bit")),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! PETSc: raw bindings in [`sys`], and owned, safe handles for what the solver calls. One file a PETSc class.
+//! PETSc: owned, safe handles for what the solver calls. One file a PETSc class.
 //!
 //! Every call that can fail returns `Result` with PETSc's own message and trace. All handles are collective over
 //! the ranks of the MPI universe given to [`Petsc::start`]: every rank creates, uses and drops them in the same order. PETSc stays
@@ -6,50 +6,41 @@
 //! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
-mod analysis;
 mod applied;
 mod block_product;
 mod block_transfer;
 mod callback;
-mod cholesky;
-mod cholmod;
 mod compressed_rows;
 mod dense;
-mod double_factor;
 mod ksp;
-mod large_pages;
 mod levels;
 mod library;
-mod lower_half;
 mod matrix;
-mod panel;
 mod projected;
 mod projected_operator;
-mod rectangular_blocks;
 mod reduced;
 mod reference;
 mod shell;
-mod single_blas;
-mod single_factor;
 mod snes;
-mod symmetric_blocks;
-pub mod sys;
-mod threads;
 mod variational_inequality;
 mod vector;
 
-pub use cholesky::{Cholesky, Precision};
 pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
-pub use matrix::{BlockRows, Matrix};
+pub use matrix::Matrix;
 pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use variational_inequality::{BoundedSnes, Limits, UNBOUNDED};
 pub use vector::{DistributedVector, Local, LocalRead, LocalWrite};
 
-use crate::error::{Error, Result};
+pub use crate::sparse::{BlockRows, Cholesky, INDEX_BITS, Precision};
+use crate::{
+    bindings as sys,
+    error::{Error, Result},
+    sparse::index,
+};
 use std::{
     cell::RefCell,
     ffi::{CStr, CString, c_char, c_int, c_void},
@@ -107,8 +98,6 @@ fn c_string(words: &str) -> Result<CString> {
     CString::new(words).map_err(|_| Error::Refused(format!("PETSc option {words:?} has a NUL character")))
 }
 
-/// Bits of PETSc's indices: 32 or 64, as it was built.
-pub const INDEX_BITS: u32 = sys::PetscInt::BITS;
 /// Whether PETSc was built with hypre.
 pub const HAS_HYPRE: bool = cfg!(petsc_hypre);
 /// Whether PETSc was built with MUMPS.
@@ -119,14 +108,4 @@ pub fn require(there: bool, what: &str, part: &str, remedy: &str) -> Result<()> 
     let words =
         || Error::Refused(format!("{what} needs {part}, which this PETSc was built without: {remedy}"));
     if there { Ok(()) } else { Err(words()) }
-}
-
-/// A count as PETSc's index, or an error that says which count is too large.
-fn index(count: usize, what: &str) -> Result<sys::PetscInt> {
-    sys::PetscInt::try_from(count).map_err(|_| {
-        Error::Refused(format!(
-            "{what}: {count} exceeds the {INDEX_BITS}-bit indices of this PETSc; use more ranks, a coarser mesh or a PETSc with \
-             64-bit indices"
-        ))
-    })
 }

@@ -17,6 +17,7 @@ use crate::{
     body::{Body, PassBytes},
     effect::Step,
     error::Result,
+    job::Scheme,
     petsc::{DistributedVector, Precision},
     session::Session,
     state::State,

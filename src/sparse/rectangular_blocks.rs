@@ -4,7 +4,7 @@ use super::symmetric_blocks::{ScalarRows, bytes_of, unit_of};
 use std::array;
 
 /// Products with a matrix and with its transpose.
-pub(super) trait Transfer {
+pub(crate) trait Transfer {
     /// `y = A x`.
     fn multiply(&self, x: &[f64], y: &mut [f64]);
 
@@ -16,7 +16,7 @@ pub(super) trait Transfer {
 }
 
 /// The matrix of these rows in blocks of so many rows and columns; `None` for sizes that have no code.
-pub(super) fn transfer(blocks: [usize; 2], rows: ScalarRows<'_>) -> Option<Box<dyn Transfer>> {
+pub(crate) fn transfer(blocks: [usize; 2], rows: ScalarRows<'_>) -> Option<Box<dyn Transfer>> {
     if !(rows.starts.len() - 1).is_multiple_of(blocks[0].max(1)) {
         return None;
     }
@@ -112,7 +112,7 @@ impl<const R: usize, const C: usize> Transfer for RectangularBlocks<R, C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::petsc::sys::PetscInt;
+    use crate::bindings::PetscInt;
 
     #[test]
     fn both_products_are_those_of_the_whole_matrix() {

@@ -11,7 +11,7 @@ use std::{
 const CHOICES: [&str; 3] = ["OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"];
 
 /// One thread a rank, unless the user chose another number.
-pub(super) fn one_unless_chosen() {
+pub(crate) fn one_unless_chosen() {
     if CHOICES.iter().all(|name| std::env::var_os(name).is_none()) {
         set(1);
     }

@@ -6,7 +6,7 @@ use crate::tensor::larger;
 use std::array;
 
 /// How a number is stored; products are summed in double precision.
-pub(super) trait Stored: Copy + Default + Into<f64> + 'static {
+pub(crate) trait Stored: Copy + Default + Into<f64> + 'static {
     fn round(value: f64) -> Self;
 }
 
@@ -24,7 +24,7 @@ impl Stored for f32 {
 
 /// Rows of scalars as PETSc keeps them: where each starts, ascending columns, values.
 #[derive(Clone, Copy)]
-pub(super) struct ScalarRows<'a> {
+pub(crate) struct ScalarRows<'a> {
     pub starts: &'a [sys::PetscInt],
     pub columns: &'a [sys::PetscInt],
     pub values: &'a [f64],
@@ -41,7 +41,7 @@ impl<'a> ScalarRows<'a> {
 }
 
 /// A product with a square matrix.
-pub(super) trait Product {
+pub(crate) trait Product {
     /// `y = A x`.
     fn multiply(&self, x: &[f64], y: &mut [f64]);
 
@@ -51,7 +51,7 @@ pub(super) trait Product {
 
 /// The matrix whose lower half these rows have, in blocks of this size, numbers stored as `T`. `None` for blocks of a size that
 /// has no code, and for rows that are no whole number of blocks.
-pub(super) fn product<T: Stored>(block: usize, rows: ScalarRows<'_>) -> Option<Box<dyn Product>> {
+pub(crate) fn product<T: Stored>(block: usize, rows: ScalarRows<'_>) -> Option<Box<dyn Product>> {
     if !(rows.starts.len() - 1).is_multiple_of(block.max(1)) {
         return None;
     }
