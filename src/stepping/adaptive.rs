@@ -1,5 +1,5 @@
-//! Steps chosen by their error, from a ladder: powers of two times the first one, so that matrices and preconditioners serve
-//! for many steps.
+//! Steps whose lengths are chosen by their error, among powers of two times the first length (levels), so that many steps share
+//! a matrix and its preconditioner.
 //!
 //! The error of a step is the part of a quantity `x` that no straight line through its values before has, `k_n / (k_n + k_{n-1})
 //! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes of second
@@ -29,7 +29,7 @@ const STEPS_BEFORE_GROWTH: u32 = 2;
 /// Share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
-/// What a job says of adaptive steps.
+/// Settings of adaptive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveSettings {
     /// Accepted error of a step, relative to the largest velocity and stress.
@@ -44,7 +44,7 @@ pub struct AdaptiveSettings {
     pub end: f64,
 }
 
-/// Where on its ladder a run is; saved in checkpoints.
+/// The level of a run with the numbers by which it changes; saved in checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pace {
@@ -64,16 +64,16 @@ pub struct Pace {
 #[derive(Debug)]
 pub struct Adaptive<const D: usize> {
     settings: AdaptiveSettings,
-    /// What acts on the body in time, once it is known.
+    /// Loads and obstacles that change with time, from the first step on.
     drives: Option<Drives<D>>,
     lowest: i32,
     highest: i32,
-    /// Where on the ladder it is.
+    /// Its level.
     pub pace: Pace,
 }
 
 impl<const D: usize> Adaptive<D> {
-    /// On the ladder through the first length.
+    /// Starts at the first length.
     pub fn new(settings: AdaptiveSettings) -> Self {
         let level = |length: f64| (length / settings.first).log2();
         let (lowest, highest) =
@@ -128,7 +128,7 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// The step to try next and what it must not go beyond: so short that loads and obstacles change along straight lines within
+    /// The step to try next and the time that it must not go beyond: so short that loads and obstacles change along straight lines within
     /// it, up to the tolerance. Collective.
     fn choose(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
         loop {
@@ -176,8 +176,8 @@ impl<const D: usize> Adaptive<D> {
         session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
     }
 
-    /// As long as all is at rest nothing tells how large velocity and stress will be: a step of the largest length does, or one to
-    /// where the piece of a load ends, which is then taken back.
+    /// Finds the sizes of velocity and stress for a body at rest, to which errors are relative: from a step of the largest length, or one
+    /// to where the piece of a load ends, which is not committed.
     fn look_ahead<const S: usize>(
         &mut self,
         session: &Session,
@@ -246,7 +246,7 @@ impl<const D: usize> Adaptive<D> {
     fn grow(&mut self, step: Step, error: f64) {
         let level = self.level_of(step).clamp(self.lowest, self.highest);
         if step.length < 0.999_999 * self.length(self.pace.level) {
-            // Cut to a time to land on, or on the way up again after that.
+            // Cut to a time to land on, or growing again after that.
             return;
         }
         self.pace.taken += 1;
@@ -273,14 +273,14 @@ mod tests {
     }
 
     #[test]
-    fn the_ladder_stays_within_its_bounds() {
+    fn levels_stay_within_their_bounds() {
         let adaptive = adaptive();
         assert_eq!((adaptive.lowest, adaptive.highest), (-3, 3));
         assert!((adaptive.length(-3) - 0.00125).abs() < 1e-17 && (adaptive.length(3) - 0.08).abs() < 1e-16);
     }
 
     #[test]
-    fn small_errors_let_steps_double_after_some_patience() {
+    fn small_errors_let_steps_double_after_two_steps() {
         let mut adaptive = adaptive();
         adaptive.grow(step(0.01), 1e-3);
         assert_eq!(adaptive.pace.level, 0, "one step is not enough");
@@ -341,7 +341,7 @@ mod tests {
         assert_eq!(adaptive.next_length(100.0, 0.01), 0.02);
         assert_eq!(adaptive.next_length(100.0, 0.005), 0.01);
         assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a power of two times the first length");
-        assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the ladder");
+        assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the shortest length");
         assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of what is left");
         assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "cut by the target, not here");
         assert_eq!(adaptive.next_length(0.16, 0.08), 0.08, "two steps are left");

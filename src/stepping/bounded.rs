@@ -1,4 +1,4 @@
-//! A step whose contacts are bounds on velocity components, as PETSc's own solver for variational inequalities sees it.
+//! A step whose contacts are bounds on velocity components, solved by PETSc's own solver for variational inequalities.
 //!
 //! `K v - b = 0` but where a velocity is at its bound, which exerts the force that is left there. It does not use the contact graphs and
 //! serves as an independent check of Newton's method on them.
@@ -80,7 +80,7 @@ impl Bounded {
     }
 }
 
-/// Why these contacts on this rank can't be solved this way, if they can't.
+/// Refuses contacts on this rank that can't be solved this way.
 pub(super) fn refuse<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
     match body.contacts.iter().find_map(Contact::more_than_bounds) {
         None => Ok(()),

@@ -3,7 +3,7 @@
 //!
 //! With `K = L L^T` and the motions on which contact laws act last, `L y = b` leaves `S v + C(v) = L_c y_c` for them, where
 //! `S = L_c L_c^T` is the Schur complement of the others; `L^T x = y` with `y_c = L_c^T v_c` gives all velocities. A step
-//! costs one linear solve, however many iterations Newton's method needs, and these see no residual but the contact's.
+//! costs one linear solve, however many iterations Newton's method needs, and the residual of these is that of the contact alone.
 //!
 //! With a factor in single precision, `K = L L^T + E`, solutions are corrected until the residual in double precision is small. The
 //! correction `d` of a velocity `v` solves `L L^T d + C(v + d) = r` with `r = b - K v`. The residual `r_c` along the motions on which

@@ -1,4 +1,4 @@
-//! What contacts take in before a step and give after it.
+//! Contacts before a step and after it.
 
 use crate::{
     body::Body,
@@ -7,7 +7,7 @@ use crate::{
     state::State,
 };
 
-/// Adds what contact released in a committed step.
+/// Adds what contact dissipated, lost to the scheme and gave to obstacles in a committed step.
 pub(super) fn released_by_contact<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
@@ -24,7 +24,7 @@ pub(super) fn released_by_contact<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Takes in what the step brings to the points of all contacts.
+/// Prepares the points of all contacts for a step.
 pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &State,
@@ -44,7 +44,7 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Puts the pressures of the step just taken into the state.
+/// Copies the pressures of the step just taken into the state.
 pub(super) fn commit_tractions<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &mut State,

@@ -27,7 +27,7 @@ const MESSAGES: f64 = 100e-6;
 /// V-cycles whose messages take as long as those of a set-up.
 const SET_UP_CYCLES: f64 = 100.0;
 
-/// Iterations of a step without contact, with it, and with friction, which may hold nodes that the preconditioner sees free.
+/// Iterations of a step without contact, with it, and with friction, which may hold nodes that are free in the preconditioner's matrix.
 struct Iterations {
     without: f64,
     contact: f64,
@@ -35,7 +35,7 @@ struct Iterations {
 }
 
 impl ProblemSize {
-    /// What a preconditioner has to serve in so many steps of this body.
+    /// The problem size of so many steps of this body.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,

@@ -1,4 +1,4 @@
-//! What drives a run from outside, loads and moving obstacles, looked at inside a step before it is tried.
+//! Loads and moving obstacles, evaluated inside a step before it is tried.
 //!
 //! Each of their expressions is sampled at a few places of the body's bounding box, the same on all ranks. Where a piece of one
 //! ends (`min`, `max`, `abs`, `sign`, `floor`, `ceil`, `round`) is found between two samples by bisection, and a step ends there.
@@ -26,9 +26,9 @@ struct Drive<const D: usize> {
     /// What it is of, for the log.
     what: &'static str,
     value: Scalar,
-    /// Where it is looked at.
+    /// Where it is sampled.
     places: Vec<Vector<D>>,
-    /// The largest value of a load in the run, the way that an obstacle goes.
+    /// The largest value of a load in the run, or the distance that an obstacle moves.
     largest: f64,
 }
 
@@ -83,7 +83,7 @@ impl<const D: usize> Drives<D> {
                 }
             }
         }
-        // All ranks look at the same: what they agree on is rounding.
+        // All ranks sample the same: their results differ by rounding at most.
         let [first, number] = session.largest(mine);
         let what = self.all.get(number as usize).map(|drive| drive.what);
         first.is_finite().then_some(Landing { time: -first, what })

@@ -1,4 +1,4 @@
-//! The equations of one step, `K v + C(v) = b`, as PETSc's SNES sees them.
+//! The equations of one step, `K v + C(v) = b`, in the form that PETSc's SNES takes.
 
 use crate::{
     effect::Contact,
@@ -142,7 +142,7 @@ pub(super) fn cycle(period: usize) -> String {
     )
 }
 
-/// Adds to `out` what `add` puts on the nodes, given the nodal values of `x`.
+/// Adds to `out` what `add` adds to nodal values, given those of `x`.
 fn add_contact<const D: usize>(
     ghosted: &mut Option<[DistributedVector; 2]>,
     contacts: &[Contact<D>],

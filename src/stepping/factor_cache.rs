@@ -1,6 +1,6 @@
 //! Matrices with their preconditioners, kept for when steps are of these lengths again.
 //!
-//! Step lengths are powers of two times the first one. The preconditioner of such a length serves all lengths near it: two matrices
+//! Step lengths are powers of two times the first one. The preconditioner of such a length is used for all lengths near it: two matrices
 //! `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
 
 use super::{

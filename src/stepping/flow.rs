@@ -1,4 +1,4 @@
-//! The forces of cells that flow, as Newton's method sees them.
+//! The forces of cells that flow in the equations that Newton's method solves.
 
 use super::equations::CellForces;
 use crate::{body::Cells, effect::Tangents, error::Result, petsc::DistributedVector};
@@ -43,8 +43,8 @@ impl Flow {
         FlowForces { flow: self, cells, start, symmetric }
     }
 
-    /// Brings the sum of all ranks to `out`, without held components.
-    fn hand_over(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
+    /// Adds the sum of all ranks to `out`, without held components.
+    fn add_sum_to(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
         let forces = self.forces.owned()?;
         let mut targets = out.owned_mut()?;
@@ -78,7 +78,7 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         self.displace(velocity)?;
         self.evaluate(false)?;
-        self.flow.hand_over(self.cells.fixed, forces)
+        self.flow.add_sum_to(self.cells.fixed, forces)
     }
 
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
@@ -99,6 +99,6 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
             forces.fill(0.0);
             self.cells.add_tangents(&flow.tangents, &values, &mut forces);
         }
-        self.flow.hand_over(self.cells.fixed, forces)
+        self.flow.add_sum_to(self.cells.fixed, forces)
     }
 }

@@ -20,7 +20,7 @@ use crate::{
     state::State,
 };
 
-/// Work vectors and what a step leaves for its energy balance.
+/// Work vectors, and the energies of a step that need the state before it.
 pub(super) struct Implicit {
     formula: fn(Step) -> Blend,
     /// The blend of the step in hand.

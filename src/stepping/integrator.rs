@@ -92,7 +92,7 @@ impl Integrator {
         }
     }
 
-    /// Does what is left to do for a solved step before it is committed. Collective.
+    /// Writes displacement, trial histories and energies of a solved step before it is committed. Collective.
     pub fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -106,7 +106,7 @@ impl Integrator {
         }
     }
 
-    /// Takes the solved velocity over into the state. Collective.
+    /// Commits the solved velocity to the state. Collective.
     pub fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         match self {
             Self::LaggedEuler(_) => state.commit(solved, step.time, step.length),

@@ -24,11 +24,11 @@ pub struct SolverSettings {
     pub newton_iterations: usize,
     /// Steps that one matrix is for, as far as is known.
     pub steps: u64,
-    /// How friction bounds find the pressure that they follow.
+    /// Where the pressure that friction bounds follow is found.
     pub friction: FrictionIteration,
 }
 
-/// What a preconditioner has to serve.
+/// The sizes by which a preconditioner is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProblemSize {
     /// Dimension of the space.
@@ -114,8 +114,8 @@ impl Preconditioner {
     /// Sets the method and the preconditioner; PETSc options that the user gave stay.
     ///
     /// Cholesky of a small matrix is done by CHOLMOD on every rank at once: MUMPS on several ranks sums in the order in
-    /// which messages arrive, so that no two runs agree to the last bit. It serves where the matrix is too large for that.
-    /// So does the faster way to GAMG's coarse matrices as soon as a rank has two neighbours.
+    /// which messages arrive, so that no two runs agree to the last bit. It is used where the matrix is too large for that.
+    /// The faster way to GAMG's coarse matrices sums so, too, as soon as a rank has two neighbours, and is not used then.
     pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
         ksp.set_method("cg")?;
         match self {

@@ -1,4 +1,4 @@
-//! What a step leaves beside the state.
+//! Numbers of iterations, contact points and energies of a step.
 
 use crate::{
     effect::{Energy, Peaks, PointCount},

@@ -35,7 +35,7 @@ pub(super) struct SprungRows {
 }
 
 impl Springs {
-    /// Says with a step that failed which motions contact has to hold, if there are any.
+    /// Adds to the failure of a step which motions contact has to hold, if there are any.
     pub fn explain(&self, failure: Agreed) -> Error {
         match &self.free {
             Some(free) if failure.is_failure() && !free.is_empty() => Error::Failed(format!(

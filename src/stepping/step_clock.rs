@@ -43,7 +43,7 @@ pub struct StepTraffic {
     /// Explicit stress, history and forces; loads that depend on time are not counted.
     pub history: u64,
     /// Matrices, factors and multigrid levels as often as they are read, not the vectors of iterations; `None` where the
-    /// solver does not tell.
+    /// solver does not count them.
     pub solve: Option<u64>,
     /// Energy balance.
     pub balance: u64,
@@ -56,7 +56,7 @@ impl Default for StepTraffic {
 }
 
 impl StepTraffic {
-    /// Adds a part of a solve; once one is not known, neither is the sum.
+    /// Adds a part of a solve; the sum is unknown once a part is.
     pub(super) fn add_solve(&mut self, bytes: Option<u64>) {
         self.solve = self.solve.zip(bytes).map(|(sum, more)| sum + more);
     }

@@ -10,7 +10,7 @@ use crate::{
     state::State,
 };
 
-/// Share of the root of the energy of motion up to which that of the stress does not matter, and the other way round.
+/// Share of the root of the kinetic energy below which that of the stress is rounding, and the other way round.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// Norms of velocity and stress.

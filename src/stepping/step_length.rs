@@ -10,7 +10,7 @@ pub const SNAP: f64 = 1e-6;
 pub struct Landing {
     /// In s.
     pub time: f64,
-    /// What is there, where the log should tell.
+    /// What is there, if the log reports it.
     pub what: Option<&'static str>,
 }
 

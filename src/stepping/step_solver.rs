@@ -129,7 +129,7 @@ impl StepSolver {
         Ok(is_new)
     }
 
-    /// The length whose preconditioner is set up: what is condensed serves no other.
+    /// The length whose preconditioner is set up: a condensed matrix is of no use for another.
     fn cached_length(&self, lengths: Lengths) -> f64 {
         if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
     }

@@ -166,7 +166,7 @@ impl Stepper {
         Ok(outcome)
     }
 
-    /// Solves a step and leaves the state as it was: another attempt may follow. Collective.
+    /// Solves a step without changing the state: another attempt may follow. Collective.
     pub fn attempt<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -231,7 +231,7 @@ impl Stepper {
         self.workspace.error(session, body, state, solved)
     }
 
-    /// Does what the scheme has left to do for the step that was attempted last, once. Collective.
+    /// Writes displacement, trial histories and energies of the step that was attempted last, unless they are there. Collective.
     fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,

@@ -22,6 +22,6 @@ impl<const D: usize> Contact<D> {
         let before = step.time - step.length;
         let recent = [before, blend.recent / blend.length];
         let earlier = [before - step.previous_length, blend.earlier / blend.length];
-        self.take_drift(Rate { time: step.time, before: [recent, earlier] })
+        self.set_drift(Rate { time: step.time, before: [recent, earlier] })
     }
 }

@@ -1,4 +1,4 @@
-//! Contacts whose laws are nothing but bounds on one velocity component each.
+//! Contacts whose laws are bounds on one velocity component each.
 
 use super::{
     Contact,
@@ -46,7 +46,7 @@ impl<const D: usize> Contact<D> {
     }
 }
 
-/// The axis along which a direction points, either way.
+/// The axis to which a direction is parallel.
 fn axis<const D: usize>(direction: &[f64; D]) -> Option<usize> {
     let along = (0..D).find(|&i| direction[i].abs() > 0.5)?;
     (0..D).all(|i| i == along || direction[i].abs() <= ALIGNED).then_some(along)

@@ -25,7 +25,7 @@ pub struct PointCount {
     pub sticking: usize,
     /// With friction and sliding.
     pub slipping: usize,
-    /// With friction whose bound follows a pressure that is not there.
+    /// With friction whose bound follows the pressure, which is zero.
     pub separated: usize,
 }
 

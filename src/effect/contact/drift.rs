@@ -19,10 +19,10 @@ impl<const D: usize> Contact<D> {
         drift.map(|drift| dot(drift, drift)).sum()
     }
 
-    /// Takes in how fast the obstacle moves along the boundary in a step, for friction. Refuses supports that hold one tangent
-    /// of a point along this motion and leave another free: what slides there has a direction that the free one does not see.
-    /// Where they hold all, they carry the friction, whatever it is.
-    pub(super) fn take_drift(&mut self, rate: Rate) -> Result<()> {
+    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold one tangent
+    /// of a point along this motion and leave another free: the direction of sliding depends on both, and only the free one is an
+    /// unknown. Where supports hold all tangents, the friction does not matter.
+    pub(super) fn set_drift(&mut self, rate: Rate) -> Result<()> {
         let Some(friction) = self.friction.as_mut().filter(|_| self.gap.may_drag()) else { return Ok(()) };
         let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
         let velocity = |point: &Point<D>| gap.velocity_along(&motion, rate.time, &point.place, &point.normal);

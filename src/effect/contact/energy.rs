@@ -1,4 +1,4 @@
-//! What a contact stores, dissipates and takes from its obstacle, and how deep it lies in that.
+//! Energies that a contact stores, dissipates and takes from its obstacle, and its penetration.
 
 use super::{
     Contact,
@@ -43,7 +43,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// How deep in m points here lie in the obstacle at `time`, at the most; minus infinity where none can touch it. A gap that
-    /// is no number does not count: the first step says so.
+    /// is not a number does not count: the first step refuses it.
     pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
         let depth = |point: &Point<D>| {
             let gap = self.gap.at(time, &point.place, &point.normal);

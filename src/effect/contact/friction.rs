@@ -10,7 +10,7 @@
 //!
 //! `p` is the contact pressure, which the bound follows in Newton's method, or a pressure that the fixed-point iteration
 //! holds. In terms of `dv`, where a point slides, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; where it sticks
-//! `dv = 0`. Where the normal graph is vertical, `dp` is what the normal equation of the node leaves open: `mu e` times that
+//! `dv = 0`. Where the normal graph is vertical, `dp` follows from the normal equation of the node: `mu e` times that
 //! equation is taken from the tangential ones ([`Friction::reduce`]).
 
 use super::{
@@ -45,7 +45,7 @@ pub(super) struct Friction<const D: usize> {
 pub(super) enum Motion {
     Sticks,
     Slides,
-    /// The law's bound follows a pressure that is not there.
+    /// The law's bound follows the pressure, which is zero.
     Separated,
 }
 
@@ -137,13 +137,13 @@ impl<const D: usize> Friction<D> {
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let shares = if found.traction == 0.0 {
-                // Nothing resists: the velocity stays what it is, to the last digit.
+                // Without traction the velocity is the unknown, to the last bit.
                 [1.0, 0.0]
             } else {
                 [found.speed / length, found.traction / length]
             };
             point.traction = unknown.map(|x| shares[1] * x);
-            // In two terms, so that a point that sticks has no velocity whatever the rounding.
+            // A point that sticks has no velocity, without rounding errors.
             let back = unknown.map(|x| shares[0] * x);
             point.set(&back, values);
         }
@@ -231,7 +231,7 @@ impl<const D: usize> Friction<D> {
         self.points.iter().for_each(|point| point.add(Vectors::Body, 1.0, &point.traction, nodal));
     }
 
-    /// Adds the change of the forces with the velocity where points slide; nothing of the pressure of vertical graphs.
+    /// Adds the change of the forces with the velocity where points slide, without that of the pressure of vertical graphs.
     pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];

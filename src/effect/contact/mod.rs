@@ -11,8 +11,8 @@
 //! ```
 //!
 //! In terms of `dv` the Jacobian is symmetric: `K + sum w f^2 c (1 - theta) / theta m m^T`, and `dv . m = 0` where `theta = 0`.
-//! With friction the tangential velocity at nodal points gives way to the parameter of the friction graph in the same way;
-//! see [`friction`].
+//! With friction, the unknown along the tangents of nodal points is the parameter of the friction graph in the same way; see
+//! [`friction`].
 //!
 //! Vectors hold `D` values a node of the body on this rank; those of Newton's method, in `newton.rs`, may hold the nodes of
 //! contacts alone.
@@ -175,7 +175,7 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap counts as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        self.take_drift(Rate::euler(time, length))
+        self.set_drift(Rate::euler(time, length))
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.

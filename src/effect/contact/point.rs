@@ -9,7 +9,7 @@ use crate::{
     tensor::{Vector, norm},
 };
 
-/// What stands for the unknown at a point.
+/// The unknown along the normal at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unknown {
     /// The parameter of the law's graph, in place of the velocity along `direction`.
@@ -49,7 +49,7 @@ pub(super) struct Point<const D: usize> {
     pub unknown: Unknown,
     /// Where the point was at first, in m.
     pub place: Vector<D>,
-    /// What the step brings.
+    /// Penetration and length of the step.
     pub context: NodeContext,
     /// `u_nu - gap` in m at the start of the step, both as they were then.
     pub penetration_before: f64,
@@ -107,7 +107,7 @@ impl<const D: usize> Point<D> {
         let free: Vector<D> =
             std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
         point.stretch = norm(&free);
-        // A shorter rest is rounding in the normal of a face that supports hold.
+        // A shorter one is rounding in the normal of a face that supports hold.
         if point.stretch > 1e-9 {
             point.direction = free.map(|x| x / point.stretch);
             point.unknown = Unknown::Parameter;

@@ -17,7 +17,7 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
     pub count: usize,
-    /// The contact pressure in Pa that the bound goes by.
+    /// The contact pressure in Pa that the bound follows.
     pub pressure: f64,
     /// `q` in Pa at the last evaluation.
     pub traction: Vector<D>,
