@@ -11,7 +11,7 @@
 //! equation for `m`, the projection's own with other factors. For `n = 1` `eta` is known; else it is the root of an increasing
 //! equation around that one.
 
-use super::{NO_YIELD_STRESS, Perzyna};
+use super::overstress::{NO_YIELD_STRESS, Perzyna};
 use crate::{
     law::increasing_root,
     material::{

@@ -10,7 +10,7 @@
 //! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`. Else its logarithm is solved for that of
 //! `f`, so that neither large exponents nor overstresses far beyond the yield stress take many iterations or overflow.
 
-use super::Perzyna;
+use super::overstress::Perzyna;
 use crate::{
     material::{
         Elastic,
