@@ -15,7 +15,7 @@ const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// A CSV file open for appending.
 #[derive(Debug)]
-pub struct CsvFile {
+pub(super) struct CsvFile {
     path: PathBuf,
     writer: BufWriter<File>,
     flushed: Instant,
@@ -23,7 +23,7 @@ pub struct CsvFile {
 
 impl CsvFile {
     /// Starts an empty table.
-    pub fn create(path: &Path, header: &str) -> Result<Self> {
+    pub(super) fn create(path: &Path, header: &str) -> Result<Self> {
         pass()?;
         let mut file = File::create(path).map_err(|e| Error::unwritable(path, e))?;
         writeln!(file, "{header}").map_err(|e| Error::unwritable(path, e))?;
@@ -32,7 +32,7 @@ impl CsvFile {
 
     /// Continues a table, keeping the rows whose first column is at most `last`; creates one if there is none or its header
     /// differs.
-    pub fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
+    pub(super) fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
         pass()?;
         let Ok(old) = File::open(path) else { return Self::create(path, header) };
         let mut lines = BufReader::new(old).lines();
@@ -57,14 +57,14 @@ impl CsvFile {
     }
 
     /// Appends a row, its columns joined by commas.
-    pub fn row(&mut self, row: fmt::Arguments<'_>) -> Result<()> {
+    pub(super) fn row(&mut self, row: fmt::Arguments<'_>) -> Result<()> {
         pass()?;
         writeln!(self.writer, "{row}").map_err(|e| Error::unwritable(&self.path, e))?;
         if self.flushed.elapsed() > FLUSH_EVERY { self.write_out() } else { Ok(()) }
     }
 
     /// Flushes all rows to the file.
-    pub fn flush(&mut self) -> Result<()> {
+    pub(super) fn flush(&mut self) -> Result<()> {
         pass()?;
         self.write_out()
     }
@@ -76,7 +76,7 @@ impl CsvFile {
 }
 
 /// Numbers joined by commas, as [`Number`] writes them.
-pub struct Numbers<'a>(pub &'a [f64]);
+pub(super) struct Numbers<'a>(pub &'a [f64]);
 
 impl Display for Numbers<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -89,7 +89,7 @@ impl Display for Numbers<'_> {
 }
 
 /// The shortest text that reads back as the same number, with an exponent where that is shorter to read.
-pub struct Number(pub f64);
+pub(super) struct Number(pub f64);
 
 impl Display for Number {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {

@@ -19,7 +19,7 @@ macro_rules! fields {
         pub(super) const COUNT: usize = [$(stringify!($field)),*].len();
 
         /// All of them, in the order of field files.
-        pub static FIELDS: [OutputField; COUNT] = [$($field),*];
+        pub(crate) static FIELDS: [OutputField; COUNT] = [$($field),*];
 
         /// What computes them, in the same order.
         pub(super) fn computations<const D: usize, const S: usize>() -> [Compute<D, S>; COUNT] {
@@ -38,14 +38,15 @@ fields! {
 }
 
 /// Displacement of the nodes.
-pub const DISPLACEMENT: OutputField = OutputField::plain("displacement", Place::Node, Shape::Vector, "m");
+pub(crate) const DISPLACEMENT: OutputField =
+    OutputField::plain("displacement", Place::Node, Shape::Vector, "m");
 
 fn displacement<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
     Ok(Some(Computed::of(at.state.displacement.owned()?)))
 }
 
 /// Velocity of the nodes.
-pub const VELOCITY: OutputField =
+pub(crate) const VELOCITY: OutputField =
     OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed");
 
 fn velocity<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
@@ -53,14 +54,14 @@ fn velocity<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Resu
 }
 
 /// Total stress of the cells.
-pub const STRESS: OutputField = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa");
+pub(crate) const STRESS: OutputField = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa");
 
 fn stress<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
     Ok(Some(Computed::of(at.stress.as_flattened())))
 }
 
 /// Von Mises norm of the total stress of the cells.
-pub const VON_MISES: OutputField = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
+pub(crate) const VON_MISES: OutputField = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
     .with_picture("von_mises", "von Mises stress");
 
 fn von_mises<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
@@ -68,7 +69,7 @@ fn von_mises<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Res
 }
 
 /// Traction of contact at the nodes, where it is an unknown of steps.
-pub const CONTACT_TRACTION: OutputField =
+pub(crate) const CONTACT_TRACTION: OutputField =
     OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa");
 
 fn contact_traction<'a, const D: usize, const S: usize>(

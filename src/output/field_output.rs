@@ -18,7 +18,7 @@ use hdf5::filters::deflate_available;
 use std::{collections::BTreeMap, path::Path};
 
 /// The field file of a run.
-pub struct FieldOutput<const D: usize> {
+pub(crate) struct FieldOutput<const D: usize> {
     file: FieldFile<D>,
     /// Which of [`FIELDS`] the run writes if it has them.
     is_wanted: [bool; COUNT],
@@ -28,7 +28,7 @@ impl<const D: usize> FieldOutput<D> {
     /// Creates the files in the job's output folder with the mesh, or continues them after this time; files that can't be read are
     /// renamed and kept. Refused if existing files and the job differ in a field that jobs ask for, and if compression is asked for
     /// and HDF5 has none. Collective.
-    pub fn open<const S: usize>(
+    pub(crate) fn open<const S: usize>(
         session: &Session,
         job: &Job,
         body: &Body<D, S>,
@@ -71,17 +71,17 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// Whether writing failed before, so that no step can follow.
-    pub fn is_broken(&self) -> bool {
+    pub(crate) fn is_broken(&self) -> bool {
         self.file.is_broken()
     }
 
     /// The last time written, if any.
-    pub fn last_time(&self) -> Option<f64> {
+    pub(crate) fn last_time(&self) -> Option<f64> {
         self.file.times().last().copied()
     }
 
     /// Appends a state. Collective.
-    pub fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
+    pub(crate) fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
         let computed = self.computed(at, |_| true)?;
         let mut fields = Vec::new();
         for (OutputField { name, place, shape, .. }, computed) in &computed {
@@ -101,7 +101,7 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// The figures of the fields of a state, by their names. Collective.
-    pub fn figures<const S: usize>(
+    pub(crate) fn figures<const S: usize>(
         &self,
         at: Converged<D, S>,
     ) -> Result<BTreeMap<&'static str, f64>, Agreed> {
@@ -129,7 +129,7 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// Closes the files. Collective.
-    pub fn close(self) -> Result<(), Agreed> {
+    pub(crate) fn close(self) -> Result<(), Agreed> {
         self.file.close()
     }
 }

@@ -10,7 +10,7 @@ use std::{
 
 /// Writes lines on rank 0 and nothing elsewhere.
 #[derive(Debug)]
-pub struct Log {
+pub(crate) struct Log {
     speaks: bool,
     on_terminal: bool,
     file: Option<File>,
@@ -20,14 +20,14 @@ pub struct Log {
 
 impl Log {
     /// A log that writes on rank 0 only and has no file yet; without `on_terminal` its lines go to the file only.
-    pub fn new(speaks: bool, on_terminal: bool) -> Self {
+    pub(crate) fn new(speaks: bool, on_terminal: bool) -> Self {
         Self { speaks, on_terminal, file: None, bar: None, warnings: Vec::new() }
     }
 
     /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
     ///
     /// The system releases the lock of a process that was killed. Where files can't be locked, nothing is refused.
-    pub fn claim(&mut self, path: &Path, create: bool) -> Result<()> {
+    pub(crate) fn claim(&mut self, path: &Path, create: bool) -> Result<()> {
         if !self.speaks || self.file.is_some() || !(create || path.exists()) {
             return Ok(());
         }
@@ -44,7 +44,7 @@ impl Log {
     }
 
     /// Writes to the file from now on; appends to it if the run continues an earlier one.
-    pub fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
+    pub(crate) fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
         match &self.file {
             Some(file) if !goes_on => file.set_len(0).map_err(|e| Error::unwritable(path, e)),
             _ => Ok(()),
@@ -52,7 +52,7 @@ impl Log {
     }
 
     /// Writes lines.
-    pub fn line(&mut self, words: impl AsRef<str>) {
+    pub(crate) fn line(&mut self, words: impl AsRef<str>) {
         if !self.speaks {
             return;
         }
@@ -65,19 +65,19 @@ impl Log {
     }
 
     /// Writes a warning and keeps it for the summary.
-    pub fn warning(&mut self, words: impl Into<String>) {
+    pub(crate) fn warning(&mut self, words: impl Into<String>) {
         let words = words.into();
         self.line(format!("warning: {words}"));
         self.warnings.push(words);
     }
 
     /// The warnings so far.
-    pub fn warnings(&self) -> &[String] {
+    pub(crate) fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
     /// Writes lines to the file and, where no progress bar moves, to the terminal.
-    pub fn quiet_line(&mut self, words: impl AsRef<str>) {
+    pub(crate) fn quiet_line(&mut self, words: impl AsRef<str>) {
         if self.speaks {
             if self.bar.is_none() && self.on_terminal {
                 print_line(words.as_ref());
@@ -94,7 +94,7 @@ impl Log {
     }
 
     /// Shows a progress bar if the output is a terminal.
-    pub fn start_progress(&mut self, steps: u64, taken: u64) {
+    pub(crate) fn start_progress(&mut self, steps: u64, taken: u64) {
         let wanted = self.speaks && self.on_terminal;
         if wanted && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
             let bar = ProgressBar::new(steps);
@@ -109,12 +109,12 @@ impl Log {
     }
 
     /// Whether a progress bar is shown.
-    pub fn has_bar(&self) -> bool {
+    pub(crate) fn has_bar(&self) -> bool {
         self.bar.is_some()
     }
 
     /// Moves the progress bar.
-    pub fn progress(&self, taken: u64, words: &str) {
+    pub(crate) fn progress(&self, taken: u64, words: &str) {
         if let Some(bar) = &self.bar {
             bar.set_position(taken);
             bar.set_message(words.to_owned());
@@ -122,7 +122,7 @@ impl Log {
     }
 
     /// Removes the progress bar.
-    pub fn end_progress(&mut self) {
+    pub(crate) fn end_progress(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }

@@ -84,7 +84,7 @@ impl OutputField {
 
 /// A converged state, from which fields are computed.
 #[derive(Clone, Copy)]
-pub struct Converged<'a, const D: usize, const S: usize> {
+pub(crate) struct Converged<'a, const D: usize, const S: usize> {
     /// The ranks.
     pub session: &'a Session,
     /// The body.
@@ -96,7 +96,7 @@ pub struct Converged<'a, const D: usize, const S: usize> {
 }
 
 /// A field of a state.
-pub struct Computed<'a> {
+pub(crate) struct Computed<'a> {
     /// Values of the nodes or cells that this rank owns, in the order of the mesh.
     pub values: Box<dyn Deref<Target = [f64]> + 'a>,
     /// Its [`figures`](OutputField::figures), the same on all ranks; as many as they have names.

@@ -17,7 +17,7 @@ const INSIDE: f64 = -1e-9;
 
 /// The probes of a job; each is evaluated by one rank.
 #[derive(Debug)]
-pub struct Probes<const D: usize> {
+pub(crate) struct Probes<const D: usize> {
     names: Vec<String>,
     /// Local cell and barycentric coordinates, on the rank that evaluates.
     places: Vec<Option<(usize, [f64; 4])>>,
@@ -28,7 +28,7 @@ pub struct Probes<const D: usize> {
 
 impl<const D: usize> Probes<D> {
     /// Finds the points (name, coordinates in m) in the mesh; one outside the body is refused. Collective.
-    pub fn locate(session: &Session, mesh: &Mesh<D>, points: &[(String, Vector<D>)]) -> Result<Self> {
+    pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, points: &[(String, Vector<D>)]) -> Result<Self> {
         let mut places = Vec::new();
         for (name, point) in points {
             let here = find(mesh, point);
@@ -50,12 +50,12 @@ impl<const D: usize> Probes<D> {
     }
 
     /// Whether there are no probes.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 
     /// Opens the file on rank 0, if there are probes; continues it after this step if one is given.
-    pub fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
+    pub(crate) fn open(&mut self, folder: &Path, goes_on_after: Option<u64>) -> Result<()> {
         if self.is_empty() {
             return Ok(());
         }
@@ -91,7 +91,7 @@ impl<const D: usize> Probes<D> {
     }
 
     /// Writes the rows of a step. Collective.
-    pub fn write(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
+    pub(crate) fn write(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
         self.values(session, mesh, state)?;
         let Some(file) = &mut self.file else { return Ok(()) };
         for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {
@@ -101,7 +101,7 @@ impl<const D: usize> Probes<D> {
     }
 
     /// Flushes all rows to the file.
-    pub fn flush(&mut self) -> Result<()> {
+    pub(crate) fn flush(&mut self) -> Result<()> {
         self.file.as_mut().map_or(Ok(()), CsvFile::flush)
     }
 }

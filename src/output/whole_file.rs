@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use std::path::Path;
 
 /// Writes the text to a file; an older file of this name is replaced only when the new one is complete. On one rank.
-pub fn write_whole(path: &Path, text: &str) -> Result<()> {
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<()> {
     pass()?;
     let mut part = path.as_os_str().to_owned();
     part.push(".part");

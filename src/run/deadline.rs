@@ -53,7 +53,7 @@ pub(super) struct Deadline {
 
 impl Deadline {
     /// The limits of this job. The end of the Slurm job, known to at least one rank, is shared with all. Collective.
-    pub fn new(session: &Session, job: &Job, clock: Clock) -> Self {
+    pub(super) fn new(session: &Session, job: &Job, clock: Clock) -> Self {
         let own =
             slurm_end(std::env::var(SLURM_END).ok().as_deref()).map_or(f64::INFINITY, |end| end - now());
         let left = -session.largest([-own])[0];
@@ -78,7 +78,7 @@ impl Deadline {
     }
 
     /// Logs the end of the Slurm job, if there is one.
-    pub fn log_limit(&self, log: &mut Log) {
+    pub(super) fn log_limit(&self, log: &mut Log) {
         let Limits { slurm, margin, .. } = self.limits;
         if let Some(over) = self.over {
             log.warning(format!("{SLURM_END} is over by {over:.0} s; it is passed over"));
@@ -90,7 +90,7 @@ impl Deadline {
     }
 
     /// Takes in how long a checkpoint took.
-    pub fn add_save(&mut self, spent: Duration) {
+    pub(super) fn add_save(&mut self, spent: Duration) {
         self.longest_save = self.longest_save.max(spent);
     }
 
@@ -100,7 +100,7 @@ impl Deadline {
     }
 
     /// Called after each step: the reason why the run has to stop now, if it has to; the same on all ranks. Collective.
-    pub fn passed(&mut self, session: &Session) -> Option<String> {
+    pub(super) fn passed(&mut self, session: &Session) -> Option<String> {
         self.add_round(self.checked.elapsed());
         self.checked = Instant::now();
         if self.limits.wall.is_infinite() && self.limits.slurm.is_infinite() {

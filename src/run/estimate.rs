@@ -15,7 +15,7 @@ use serde::Serialize;
 
 /// The estimated cost of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimate {
+pub(super) struct Estimate {
     /// Bytes by part, over all ranks.
     pub memory_bytes: MemoryEstimate,
     /// Seconds.
@@ -24,7 +24,7 @@ pub struct Estimate {
 
 /// Bytes by part, over all ranks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MemoryEstimate {
+pub(super) struct MemoryEstimate {
     /// The program itself with MPI, PETSc and HDF5.
     pub program: u64,
     /// Mesh and geometry.
@@ -45,7 +45,7 @@ pub struct MemoryEstimate {
 
 /// Seconds, without output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TimeEstimate {
+pub(super) struct TimeEstimate {
     /// Assembly and preconditioner.
     pub set_up: f64,
     /// One step.
@@ -63,7 +63,7 @@ const CELL: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {
     /// For a body under this preconditioner. Collective.
-    pub fn new<const D: usize, const S: usize>(
+    pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         inventory: &Inventory,

@@ -58,7 +58,7 @@ pub(super) struct Wanted<'a, const D: usize> {
 
 impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Prepares the profiles and opens the files; those of a run that is continued are cut after the state's step. Collective.
-    pub fn open(
+    pub(super) fn open(
         session: &Session,
         wanted: Wanted<D>,
         body: &Body<D, S>,
@@ -103,7 +103,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Writes what is due after a step. Collective.
-    pub fn after_step(
+    pub(super) fn after_step(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -128,13 +128,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Writes the fields of the initial state, if they are due and not in the file yet. Collective.
-    pub fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    pub(super) fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let missing = self.fields.last_time().is_none_or(|time| time < state.time);
         if missing && due(self.every, state) { self.write_fields(session, body, state) } else { Ok(()) }
     }
 
     /// Writes the fields of the last state unless the file has them, and flushes all tables. Collective.
-    pub fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    pub(super) fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
         if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
@@ -151,7 +151,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Numbers that sum up the fields of a state, by their names in `summary.json`. Collective.
-    pub fn figures(&self, at: Converged<D, S>) -> Result<BTreeMap<&'static str, f64>, Agreed> {
+    pub(super) fn figures(&self, at: Converged<D, S>) -> Result<BTreeMap<&'static str, f64>, Agreed> {
         self.fields.figures(at)
     }
 
@@ -163,7 +163,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Writes a checkpoint and removes the oldest. Collective.
-    pub fn checkpoint(
+    pub(super) fn checkpoint(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -185,13 +185,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     }
 
     /// Bytes that this run wrote: the growth of tables and fields, and all checkpoints. On rank 0; 0 elsewhere.
-    pub fn written(&self) -> u64 {
+    pub(super) fn written(&self) -> u64 {
         let tables = if self.history.is_some() { length_of_all(&self.folder) } else { 0 };
         tables.saturating_sub(self.before) + self.checkpoints
     }
 
     /// Closes the field files. Collective.
-    pub fn close(self) -> Result<(), Agreed> {
+    pub(super) fn close(self) -> Result<(), Agreed> {
         self.fields.close()
     }
 }

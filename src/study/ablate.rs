@@ -29,7 +29,7 @@ const COMPARED: [(Quantity, Space); 3] =
     [(Quantity::Displacement, Space::V), (Quantity::Velocity, Space::H), (Quantity::Stress, Space::Q)];
 
 /// Paths of the effects in an effective job, such as `material.viscosity` and `contact.0`.
-pub fn effects(job: &Job) -> Result<Vec<String>> {
+pub(super) fn effects(job: &Job) -> Result<Vec<String>> {
     let document = document(job)?;
     let mut found = Vec::new();
     for (key, schema) in Kind::job().root().properties() {
@@ -75,7 +75,7 @@ fn document(job: &Job) -> Result<Value> {
 }
 
 /// The job without the table or key `path`; refused if the job is not valid without it.
-pub fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
+pub(super) fn without(job: &Job, path: &str, folder: &Path) -> Result<Loaded> {
     let mut document = document(job)?;
     let parts: Vec<&str> = path.split('.').collect();
     remove(&mut document, &parts);
@@ -111,7 +111,7 @@ fn remove(value: &mut Value, parts: &[&str]) {
 }
 
 /// Runs the base job whole and without each effect; `None` if it was requested to stop. Collective.
-pub fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
+pub(super) fn ablate(session: &Session, plan: &Plan, say: &dyn Fn(&str)) -> Result<Option<Ablation>> {
     let folder = folder(plan);
     let Some(whole) = run(session, plan, "whole", plan.base.clone(), say)? else {
         return Ok(None);

@@ -7,7 +7,7 @@ use crate::job::{Document, Job};
 const MOST_RUNS: usize = 1000;
 
 /// Checks the keys of the study against each other and against its base job; `products` is the number of runs of [product].
-pub fn check(study: &Study, base: &Job, products: usize, document: &mut Document) {
+pub(super) fn check(study: &Study, base: &Job, products: usize, document: &mut Document) {
     let count = study.run.len() + products;
     if count == 0 {
         document.fault("", "the study has no runs", "add [[run]] tables, or lists in [product]");

@@ -16,7 +16,7 @@ use crate::{
 use std::path::Path;
 
 /// A run and what its fields are compared with.
-pub struct Compared<'a> {
+pub(super) struct Compared<'a> {
     /// 2 or 3.
     pub dimension: usize,
     /// The folder of the run.
@@ -27,7 +27,7 @@ pub struct Compared<'a> {
 
 impl<'a> Compared<'a> {
     /// A run of the study and its reference; nothing in a study without one.
-    pub fn with_reference(
+    pub(super) fn with_reference(
         plan: &'a Plan,
         planned: &'a Planned,
         record: &Record,
@@ -51,7 +51,7 @@ impl<'a> Compared<'a> {
     }
 
     /// Errors in norms. Collective.
-    pub fn errors(&self, session: &Session, norms: &[Norm]) -> Result<Errors> {
+    pub(super) fn errors(&self, session: &Session, norms: &[Norm]) -> Result<Errors> {
         if norms.is_empty() {
             return Ok(Errors::default());
         }
@@ -63,7 +63,12 @@ impl<'a> Compared<'a> {
 }
 
 /// Adds the errors of a run in all norms and at all probes. Collective.
-pub fn add_errors(session: &Session, plan: &Plan, compared: &Compared, run: &mut RunResult) -> Result<()> {
+pub(super) fn add_errors(
+    session: &Session,
+    plan: &Plan,
+    compared: &Compared,
+    run: &mut RunResult,
+) -> Result<()> {
     let found = compared.errors(session, &plan.study.norm)?;
     run.errors = found.measured.into_iter().map(|m| Some(ErrorResult::new(m))).collect();
     for (error, place) in run.errors.iter_mut().flatten().zip(&found.places) {
@@ -83,7 +88,12 @@ pub fn add_errors(session: &Session, plan: &Plan, compared: &Compared, run: &mut
 }
 
 /// Compares every run with the one that differs from it by the tightest tolerance only. Collective.
-pub fn add_tolerances(session: &Session, plan: &Plan, ran: &[Ran], results: &mut Results) -> Result<()> {
+pub(super) fn add_tolerances(
+    session: &Session,
+    plan: &Plan,
+    ran: &[Ran],
+    results: &mut Results,
+) -> Result<()> {
     let same = |a: &Planned, b: &Planned| {
         (&a.cells, a.step, a.adaptive, a.scheme, &a.set) == (&b.cells, b.step, b.adaptive, b.scheme, &b.set)
     };

@@ -27,7 +27,7 @@ fn sizes(plan: &Plan, ran: &[Ran]) -> Vec<Option<Size>> {
 }
 
 /// Adds the orders that runs show against coarser ones, and what the accuracy gained costs.
-pub fn add_orders(plan: &Plan, ran: &[Ran], results: &mut Results) {
+pub(super) fn add_orders(plan: &Plan, ran: &[Ran], results: &mut Results) {
     let coarser = refinements(&sizes(plan, ran));
     for (at, refined) in coarser.iter().enumerate() {
         for norm in 0..results.norms.len() {
@@ -43,7 +43,7 @@ pub fn add_orders(plan: &Plan, ran: &[Ran], results: &mut Results) {
 }
 
 /// A run's error in a norm.
-pub fn error_of(results: &Results, run: usize, norm: usize) -> Option<f64> {
+pub(super) fn error_of(results: &Results, run: usize, norm: usize) -> Option<f64> {
     results.runs[run].errors.get(norm)?.as_ref().map(|error| error.error)
 }
 
@@ -65,7 +65,7 @@ fn digits_per_second(results: &Results, coarse: usize, fine: usize, norm: usize)
 }
 
 /// Sets errors beside published ones.
-pub fn add_published(plan: &Plan, ran: &[Ran], results: &mut Results) {
+pub(super) fn add_published(plan: &Plan, ran: &[Ran], results: &mut Results) {
     let coarser = refinements(&sizes(plan, ran));
     for (at, norm) in plan.study.norm.iter().enumerate().filter(|(_, norm)| !norm.published.is_empty()) {
         for (run, published) in norm.published.iter().enumerate() {

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What a run is compared with.
-pub enum Against<'a, const D: usize> {
+pub(super) enum Against<'a, const D: usize> {
     /// The fields of another run.
     Run(&'a StoredFields<D>),
     /// Expressions.
@@ -22,7 +22,7 @@ pub enum Against<'a, const D: usize> {
 }
 
 /// A run and what it is compared with, on this rank's share of the cells.
-pub struct Pair<'a, const D: usize> {
+pub(super) struct Pair<'a, const D: usize> {
     run: &'a StoredFields<D>,
     against: Against<'a, D>,
     pieces: Vec<Piece<D>>,
@@ -33,7 +33,7 @@ pub struct Pair<'a, const D: usize> {
 
 impl<'a, const D: usize> Pair<'a, D> {
     /// Cuts the meshes along each other. Collective.
-    pub fn new(session: &Session, run: &'a StoredFields<D>, against: Against<'a, D>) -> Self {
+    pub(super) fn new(session: &Session, run: &'a StoredFields<D>, against: Against<'a, D>) -> Self {
         let cells = match &against {
             Against::Run(other) => other.mesh.count(),
             Against::Exact(_) => run.mesh.count(),
@@ -50,7 +50,13 @@ impl<'a, const D: usize> Pair<'a, D> {
     }
 
     /// The squares of a norm at a time, of which the run has the step `step`. Collective.
-    pub fn squares(&self, session: &Session, of: Quantity, space: Space, step: usize) -> Result<Squares> {
+    pub(super) fn squares(
+        &self,
+        session: &Session,
+        of: Quantity,
+        space: Space,
+        step: usize,
+    ) -> Result<Squares> {
         let mut mine = Squares::default();
         let visited = self.visit(of, space, step, |_, squares| mine.add(squares));
         session.agree(visited)?;
@@ -59,7 +65,7 @@ impl<'a, const D: usize> Pair<'a, D> {
     }
 
     /// The squares of the errors in each cell of the run's mesh at its step `step`. Collective.
-    pub fn squares_of_cells(
+    pub(super) fn squares_of_cells(
         &self,
         session: &Session,
         of: Quantity,
@@ -141,7 +147,7 @@ fn mean_square<const D: usize>(corners: &[Vector<D>]) -> f64 {
 }
 
 /// The strain in each cell, as stored tensors.
-pub fn strains<const D: usize>(mesh: &StoredMesh<D>, nodal: &[Vector<D>]) -> Vec<[f64; 6]> {
+pub(super) fn strains<const D: usize>(mesh: &StoredMesh<D>, nodal: &[Vector<D>]) -> Vec<[f64; 6]> {
     let of = |cell: usize| {
         let gradient = mesh.geometry[cell].field_gradient(&mesh.of_corners(nodal, cell)[..=D]);
         symmetric(&gradient)

@@ -315,6 +315,6 @@ steps and schemes, and measures errors against a reference and what they cost. P
 ";
 
 /// Studies, as a kind of document.
-pub fn kind() -> Kind {
+pub(super) fn kind() -> Kind {
     Kind { name: "study", prefix: "study.", opening: OPENING, schema: &SCHEMA }
 }

@@ -14,7 +14,7 @@ use crate::{
 use std::time::{Duration, Instant};
 
 /// The outcome of a run.
-pub enum Outcome {
+pub(super) enum Outcome {
     /// It was run now, or found as an earlier study left it.
     Ran {
         /// Its record.
@@ -27,7 +27,7 @@ pub enum Outcome {
 }
 
 /// Runs a planned run, unless its folder holds it already. A run that fails is an outcome, not an error. Collective.
-pub fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Result<Outcome> {
+pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Result<Outcome> {
     let folder = planned.loaded.job.output_folder();
     let mut digests = Ok(String::new());
     if session.is_first() {

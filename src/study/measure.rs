@@ -31,7 +31,7 @@ pub struct Measured {
 
 /// What a run is compared with.
 #[derive(Clone, Copy)]
-pub enum Target<'a> {
+pub(super) enum Target<'a> {
     /// The folder of another run; whether times between its steps are allowed.
     Run(&'a Path, bool),
     /// Expressions.
@@ -40,7 +40,7 @@ pub enum Target<'a> {
 
 /// Errors of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Errors {
+pub(super) struct Errors {
     /// One for each norm.
     pub measured: Vec<Measured>,
     /// Where each sits in time and space.
@@ -70,7 +70,7 @@ struct Kind {
 }
 
 /// Errors of the run in `folder` in some norms. Collective.
-pub fn errors<const D: usize>(
+pub(super) fn errors<const D: usize>(
     session: &Session,
     folder: &Path,
     target: Target,
@@ -175,7 +175,12 @@ fn contained<const D: usize>(times: &[f64], reference: &StoredFields<D>) -> Resu
 }
 
 /// The error of one value at a probe; `point` is where it is. In each process by itself.
-pub fn probe_error(folder: &Path, target: Target, probe: &ProbeError, point: &[f64]) -> Result<Measured> {
+pub(super) fn probe_error(
+    folder: &Path,
+    target: Target,
+    probe: &ProbeError,
+    point: &[f64],
+) -> Result<Measured> {
     let mine = column(folder, probe)?;
     let theirs = match target {
         Target::Run(path, _) => column(path, probe)?,

@@ -29,7 +29,7 @@ impl Refined {
 
 /// What orders need to know of a run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Size {
+pub(super) struct Size {
     /// Runs are refinements of each other only within a family: scheme, tolerance and other overrides.
     pub family: String,
     /// Cells over all the mesh to the power -1/dimension.
@@ -40,7 +40,7 @@ pub struct Size {
 
 /// A run, what it refines, and by which factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Refinement {
+pub(super) struct Refinement {
     /// Position of the coarser run.
     pub of: usize,
     /// What was refined.
@@ -51,7 +51,7 @@ pub struct Refinement {
 
 /// Of each run the next coarser ones: in the mesh, in the step, and, where there are neither, in both. `None` stands
 /// for runs without results.
-pub fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
+pub(super) fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
     let of = |at: usize| -> Vec<Refinement> {
         let Some(fine) = &sizes[at] else { return Vec::new() };
         let mut found: Vec<Refinement> = Vec::new();
@@ -84,13 +84,13 @@ pub fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
 }
 
 /// The order that two errors show.
-pub fn observed(coarse: f64, fine: f64, factor: f64) -> Option<f64> {
+pub(super) fn observed(coarse: f64, fine: f64, factor: f64) -> Option<f64> {
     let order = (coarse / fine).ln() / factor.ln();
     order.is_finite().then_some(order)
 }
 
 /// The order that theory predicts: the study's, or that of smooth solutions.
-pub fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
+pub(super) fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
     let mesh: f64 = if norm.space == Space::H { 2.0 } else { 1.0 };
     let step = f64::from(scheme.order());
     norm.expected_order.unwrap_or(match what {

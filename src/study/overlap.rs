@@ -13,7 +13,7 @@ const SLIVER: f64 = 1e-13;
 
 /// A simplex in one cell of each mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece<const D: usize> {
+pub(super) struct Piece<const D: usize> {
     /// Cell of the first mesh.
     pub one: u32,
     /// Cell of the second mesh.
@@ -25,10 +25,10 @@ pub struct Piece<const D: usize> {
 }
 
 /// Corners of a simplex, `D + 1` used.
-pub type Corners<const D: usize> = [Vector<D>; 4];
+pub(super) type Corners<const D: usize> = [Vector<D>; 4];
 
 /// The pieces that lie in the cells `range` of the second mesh.
-pub fn overlap<const D: usize>(
+pub(super) fn overlap<const D: usize>(
     one: &StoredMesh<D>,
     other: &StoredMesh<D>,
     range: std::ops::Range<usize>,

@@ -282,7 +282,7 @@ fn by(cells: &[u32]) -> String {
 }
 
 /// Removes what a study does not use, and directs the files of the run to its own folder.
-pub fn trim(job: &mut Job, folder: &Path) {
+pub(super) fn trim(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
     job.output.profile.clear();
     job.checkpoint = None;

@@ -31,7 +31,7 @@ struct Curve {
 }
 
 /// All pictures of the results.
-pub fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
+pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     let mut pictures = Vec::new();
     for (at, norm) in results.norms.iter().enumerate() {
         pictures.extend(costs(results, at, norm)?);

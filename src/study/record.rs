@@ -16,7 +16,7 @@ const FILE: &str = "run.json";
 
 /// A run, finished or failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub(super) struct Record {
     /// Digest of job, mesh file, solver and number of ranks.
     pub digest: String,
     /// `completed` or `failed`.
@@ -94,7 +94,7 @@ pub fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
 
 impl Record {
     /// A run that has not been tried yet.
-    pub fn new(digest: String) -> Self {
+    pub(super) fn new(digest: String) -> Self {
         Self {
             digest,
             status: "failed".into(),
@@ -109,12 +109,12 @@ impl Record {
     }
 
     /// Whether the run reached its end.
-    pub fn is_complete(&self) -> bool {
+    pub(super) fn is_complete(&self) -> bool {
         self.status == "completed"
     }
 
     /// Adds what a repetition left in `summary.json`.
-    pub fn add_summary(&mut self, folder: &Path) -> Result<()> {
+    pub(super) fn add_summary(&mut self, folder: &Path) -> Result<()> {
         let path = folder.join("summary.json");
         let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
         let summary: serde_json::Value =
@@ -132,7 +132,7 @@ impl Record {
     }
 
     /// Marks the run as finished and keeps the digests of its files.
-    pub fn complete(&mut self, folder: &Path) -> Result<()> {
+    pub(super) fn complete(&mut self, folder: &Path) -> Result<()> {
         for name in ["fields.vtkhdf", "probes.csv"] {
             if folder.join(name).exists() {
                 self.files.insert(name.into(), file_digest(&folder.join(name))?);
@@ -143,7 +143,7 @@ impl Record {
     }
 
     /// Writes the record to the run's folder, at once.
-    pub fn write(&self, folder: &Path) -> Result<()> {
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
         let (path, part) = (folder.join(FILE), folder.join("run.json.part"));
         let text = serde_json::to_string_pretty(self)
@@ -153,7 +153,7 @@ impl Record {
     }
 
     /// The record of a complete run with this digest and this many repetitions, if its files are still as it left them.
-    pub fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
+    pub(super) fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
         let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
         let record: Self = serde_json::from_str(&text).ok()?;
         let sound =
@@ -167,7 +167,7 @@ impl Record {
     }
 
     /// Gives the record of rank 0 to all ranks. Collective.
-    pub fn share(session: &Session, mine: Option<Self>) -> Result<Option<Self>> {
+    pub(super) fn share(session: &Session, mine: Option<Self>) -> Result<Option<Self>> {
         let text = mine.and_then(|record| serde_json::to_string(&record).ok()).unwrap_or_default();
         let mut length = text.len() as u64;
         let first = session.world().process_at_rank(0);
@@ -184,7 +184,7 @@ impl Record {
 }
 
 /// Digest of all that makes a run what it is.
-pub fn digest(planned: &Planned, ranks: usize) -> Result<String> {
+pub(super) fn digest(planned: &Planned, ranks: usize) -> Result<String> {
     let mut hash = Xxh3::new();
     hash.update(planned.loaded.job.to_toml()?.as_bytes());
     hash.update(VERSION.as_bytes());

@@ -10,7 +10,7 @@ use super::{
 use crate::{error::Result, session::Session};
 
 /// Adds both parts of the errors of all runs whose mesh carries the reference's steps. Collective.
-pub fn add_parts(
+pub(super) fn add_parts(
     session: &Session,
     plan: &Plan,
     ran: &[Ran],

@@ -93,7 +93,7 @@ pub struct FieldAt<'a, const D: usize> {
 }
 
 /// The field file of a run.
-pub struct StoredFields<const D: usize> {
+pub(super) struct StoredFields<const D: usize> {
     path: PathBuf,
     file: hdf5::File,
     /// The mesh.
@@ -104,7 +104,7 @@ pub struct StoredFields<const D: usize> {
 
 impl<const D: usize> StoredFields<D> {
     /// Opens the field file in a run's folder. In each process by itself.
-    pub fn open(folder: &Path) -> Result<Self> {
+    pub(super) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join("fields.vtkhdf");
         let unreadable = |error: hdf5::Error| Error::unreadable(&path, error);
         let file = hdf5::File::open(&path).map_err(unreadable)?;
@@ -127,7 +127,7 @@ impl<const D: usize> StoredFields<D> {
     }
 
     /// The values of a quantity at step `step` of the file.
-    pub fn values(&self, of: Quantity, step: usize) -> Result<Values<D>> {
+    pub(super) fn values(&self, of: Quantity, step: usize) -> Result<Values<D>> {
         let field = of.field();
         let name = field.name;
         let rows = match field.place {
@@ -150,7 +150,7 @@ impl<const D: usize> StoredFields<D> {
     }
 
     /// The values at a time: of the step at that time, or between two steps the straight line between them.
-    pub fn values_at(&self, of: Quantity, time: f64) -> Result<Values<D>> {
+    pub(super) fn values_at(&self, of: Quantity, time: f64) -> Result<Values<D>> {
         let behind = self.times.partition_point(|t| *t < time * (1.0 - SAME_TIME));
         let Some(&next) = self.times.get(behind) else {
             let (path, last) = (self.path.display(), self.times.last().copied().unwrap_or_default());
@@ -165,7 +165,7 @@ impl<const D: usize> StoredFields<D> {
     }
 
     /// Whether there is a step at this time.
-    pub fn has_time(&self, time: f64) -> bool {
+    pub(super) fn has_time(&self, time: f64) -> bool {
         self.times.iter().any(|t| (t - time).abs() <= SAME_TIME * time.abs())
     }
 }

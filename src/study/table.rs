@@ -7,7 +7,7 @@ use super::{
 
 /// A table with a title and lines below it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Table {
+pub(super) struct Table {
     /// What it shows.
     pub title: String,
     /// Names of the columns; the first is text, the others are numbers.
@@ -25,7 +25,7 @@ impl Table {
     }
 
     /// In columns, for the terminal.
-    pub fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let width = |column: usize| {
             let cells = self.rows.iter().chain([&self.header]).filter_map(|row| row.get(column));
             cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -47,7 +47,7 @@ impl Table {
     }
 
     /// As a section of a Markdown document.
-    pub fn markdown(&self) -> String {
+    pub(super) fn markdown(&self) -> String {
         let escaped = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
         let line =
             |row: &Vec<String>| format!("| {} |\n", row.iter().map(escaped).collect::<Vec<_>>().join(" | "));
@@ -65,7 +65,7 @@ impl Table {
 }
 
 /// The study's norms, then its probes.
-pub fn norms(study: &Study) -> Vec<NormResult> {
+pub(super) fn norms(study: &Study) -> Vec<NormResult> {
     let norm = |norm: &Norm| NormResult {
         name: format!("{}_{:?}_{}", quantity(norm.of), norm.space, over(norm.over)).to_lowercase(),
         meaning: meaning(norm),
@@ -120,7 +120,7 @@ fn meaning(norm: &Norm) -> String {
 }
 
 /// All tables of the results, in the order in which they are read.
-pub fn all(results: &Results) -> Vec<Table> {
+pub(super) fn all(results: &Results) -> Vec<Table> {
     let mut tables: Vec<Table> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
     tables.extend(targets(results));
     tables.push(costs(results));

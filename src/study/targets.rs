@@ -6,7 +6,7 @@ use super::{
 };
 
 /// One for each error that the study asks for.
-pub fn targets(study: &Study, results: &Results) -> Vec<TargetResult> {
+pub(super) fn targets(study: &Study, results: &Results) -> Vec<TargetResult> {
     let mut lines: Vec<String> = Vec::new();
     for run in &results.runs {
         if !lines.contains(&run.line()) {

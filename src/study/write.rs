@@ -14,7 +14,7 @@ const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,norm,error
 const MEASURED: usize = 12;
 
 /// Writes all files. On one rank.
-pub fn all(plan: &Plan, results: &Results) -> Result<()> {
+pub(super) fn all(plan: &Plan, results: &Results) -> Result<()> {
     let folder = &plan.folder;
     std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
     let json = serde_json::to_string_pretty(results)

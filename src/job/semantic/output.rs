@@ -6,7 +6,7 @@ use crate::job::report::Fault;
 use crate::job::source::Value;
 
 /// Whatever the mesh.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     check_unique(findings, "output.probe", "name", "probes are called");
     check_unique(findings, "output.profile", "on", "profiles are along");
     check_expected(findings);
@@ -72,7 +72,7 @@ fn check_expected(findings: &mut Findings<'_>) {
 }
 
 /// What depends on dimension and names of the mesh.
-pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     let size: Option<Vec<f64>> = root.read("mesh.rectangle.size").or_else(|| root.read("mesh.box.size"));
     for probe in items(root, "output.probe") {

@@ -7,7 +7,7 @@ use crate::job::{report::Fault, source::Value};
 const MOST_STEPS: f64 = 1e12;
 
 /// Steps that fit into the time, checkpoints that have an occasion, PETSc options as PETSc spells them.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
     check_landings(findings);
     check_checkpoint(findings);
