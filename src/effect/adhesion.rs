@@ -1,13 +1,6 @@
 use super::{
-    energy::Energy,
-    evolution::Evolution,
-    history::HistoryStore,
-    node_history::NodeHistory,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
-    surface::{SurfaceEffect, SurfaceState, SurfaceStep},
-    tangents::Tangents,
+    Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, SurfaceState,
+    SurfaceStep, Tangents, evolution::Evolution, node_history::NodeHistory,
 };
 use crate::{
     contact,
@@ -80,7 +73,7 @@ impl<const D: usize> Adhesion<D> {
         let [mut drive, mut energy, mut viscosity] = [0.0; 3];
         for (law, point) in group {
             let law = &self.laws[*law];
-            drive += point.weight * law.drive(&at(displacement, point), &point.normal);
+            drive += point.weight * law.drive(&value_at(displacement, point), &point.normal);
             energy += point.weight * law.energy;
             viscosity += point.weight * law.viscosity;
         }
@@ -90,7 +83,7 @@ impl<const D: usize> Adhesion<D> {
     /// Energy in J that intact bonds at the points of a node store.
     fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
         let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
-            point.weight * self.laws[*law].potential(&at(displacement, point), &point.normal)
+            point.weight * self.laws[*law].potential(&value_at(displacement, point), &point.normal)
         };
         group.iter().map(of_point).sum()
     }
@@ -113,7 +106,7 @@ impl<const D: usize> Adhesion<D> {
             [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
             energy.debonding += (before * before - *after * *after) * self.potential(group, displacement);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&at(displacement, point), &point.normal);
+                let traction = self.laws[*law].traction(&value_at(displacement, point), &point.normal);
                 push(point, point.weight * *after * *after, &traction, forces);
             }
         }
@@ -151,7 +144,7 @@ impl<const D: usize> Adhesion<D> {
             let mut truncated = false;
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = at(displacement, point);
+                let displacement = value_at(displacement, point);
                 pull = add_scaled(&pull, point.weight, &law.traction(&displacement, normal));
                 if tangents.is_some() {
                     let own = law.tangent(&displacement, normal);
@@ -176,7 +169,7 @@ impl<const D: usize> Adhesion<D> {
     }
 }
 
-fn at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
+fn value_at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
     std::array::from_fn(|i| nodal[point.node as usize * D + i])
 }
 
@@ -196,13 +189,13 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
 
     fn evaluate(
         &mut self,
-        evaluation: Evaluation,
+        at: Evaluation,
         step: Step,
         displacement: &[f64],
         forces: &mut [f64],
-        outcome: &mut Outcome<'_>,
+        outcome: &mut Outcome,
     ) {
-        match evaluation {
+        match at {
             Evaluation::Converged => self.add_explicit(step, displacement, forces, &mut outcome.energy),
             Evaluation::Start(_) => {}
             Evaluation::End(blend) => {
@@ -212,16 +205,16 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn add_energy(&self, evaluation: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+    fn add_energy(&self, at: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
         for (group, bonding) in self.groups().zip(&self.bonding.converged) {
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = at(state.displacement, point);
+                let displacement = value_at(state.displacement, point);
                 let share = point.weight * bonding * bonding;
                 let potential = law.potential(&displacement, normal);
                 energy.stored_in_bonds += share * potential;
-                if evaluation == Evaluation::Converged {
-                    let change = at(state.velocity, point).map(|v| step.length * v);
+                if at == Evaluation::Converged {
+                    let change = value_at(state.velocity, point).map(|v| step.length * v);
                     let before = std::array::from_fn(|i| displacement[i] - change[i]);
                     let gain = potential - law.potential(&before, normal);
                     energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
@@ -230,14 +223,8 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn add_step_energy(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        ends: SurfaceStep<'_>,
-        energy: &mut Energy,
-    ) {
-        let Evaluation::End(blend) = evaluation else { return };
+    fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy) {
+        let Evaluation::End(blend) = at else { return };
         self.advance(Evolution { blend, length: step.length }, ends.after);
         let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
         for (group, (before, after)) in self.groups().zip(bondings) {
@@ -247,9 +234,9 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
             energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&at(ends.after, point), &point.normal);
+                let traction = self.laws[*law].traction(&value_at(ends.after, point), &point.normal);
                 energy.numerical +=
-                    step.length * point.weight * after * dot(&traction, &at(ends.velocity, point));
+                    step.length * point.weight * after * dot(&traction, &value_at(ends.velocity, point));
             }
         }
     }
@@ -259,7 +246,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         for (group, bonding) in self.groups().zip(self.bonding.last_three()) {
             let off = curvature.error(bonding.map(|b| b * b));
             for (law, point) in group {
-                let potential = self.laws[*law].potential(&at(displacement, point), &point.normal);
+                let potential = self.laws[*law].potential(&value_at(displacement, point), &point.normal);
                 let twice = 2.0 * point.weight * potential;
                 error.error += off * off * twice;
                 error.size += bonding[0] * bonding[0] * twice;
@@ -269,7 +256,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
 
     fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
         for (law, point) in &self.points {
-            let (law, x) = (&self.laws[*law], at(x, point));
+            let (law, x) = (&self.laws[*law], value_at(x, point));
             let along = dot(&x, &point.normal);
             let more = law.stiffness - law.tangential_stiffness();
             push(point, point.weight * law.tangential_stiffness(), &x, forces);

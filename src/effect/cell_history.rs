@@ -1,7 +1,4 @@
-use super::{
-    history::{History, HistoryStore},
-    step::Evaluation,
-};
+use super::{Evaluation, History, HistoryStore};
 use crate::{simd::Pack, space::CellRun};
 use std::borrow::Cow;
 
@@ -143,8 +140,8 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
         self.earlier.as_ref().map(|values| self.written(self.earlier_name, values, 1))
     }
 
-    fn keep_earlier(&mut self, evaluation: Evaluation) {
-        if !(self.is_earlier_for_end && evaluation == Evaluation::Converged) {
+    fn keep_earlier(&mut self, at: Evaluation) {
+        if !(self.is_earlier_for_end && at == Evaluation::Converged) {
             self.earlier.get_or_insert_with(|| self.converged.clone());
         }
     }

@@ -1,12 +1,6 @@
 use super::{
-    energy::Energy,
-    history::HistoryStore,
-    node_history::NodeHistory,
-    outcome::Outcome,
-    step::{Blend, Evaluation, Step},
-    step_error::{Curvature, StressError},
-    surface::{SurfaceEffect, SurfaceState, SurfaceStep},
-    tangents::Tangents,
+    Blend, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect,
+    SurfaceState, SurfaceStep, Tangents, node_history::NodeHistory,
 };
 use crate::{
     contact::Memory,
@@ -105,13 +99,13 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
 
     fn evaluate(
         &mut self,
-        evaluation: Evaluation,
+        at: Evaluation,
         step: Step,
         displacement: &[f64],
         forces: &mut [f64],
-        outcome: &mut Outcome<'_>,
+        outcome: &mut Outcome,
     ) {
-        match evaluation {
+        match at {
             Evaluation::Converged => {
                 let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
                 for ((law, point), (before, after)) in self.points.iter().zip(pressures) {

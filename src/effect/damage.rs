@@ -1,12 +1,6 @@
 use super::{
-    cell_history::CellHistory,
-    energy::Energy,
-    evolution::Evolution,
-    history::HistoryStore,
-    interior::{Effect, Phases},
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
+    Curvature, Effect, Energy, Evaluation, HistoryStore, Outcome, Phases, Step, StressError,
+    cell_history::CellHistory, evolution::Evolution,
 };
 use crate::{
     material::{self, ByMaterial, Elastic},
@@ -42,7 +36,7 @@ impl Damage {
     fn advance_explicitly<const D: usize, const S: usize>(
         &mut self,
         step: Step,
-        batch: &mut Batch<'_, D, S>,
+        batch: &mut Batch<D, S>,
         energy: &mut Energy,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
@@ -60,8 +54,8 @@ impl Damage {
     fn advance_implicitly<const D: usize, const S: usize>(
         &mut self,
         evolution: Evolution,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
+        batch: &mut Batch<D, S>,
+        outcome: &mut Outcome,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(&Pack([before])) = self.damage.converged(batch.number) else { return };
@@ -139,9 +133,9 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         "damage"
     }
 
-    fn phases(&self, evaluation: Evaluation) -> Phases {
+    fn phases(&self, at: Evaluation) -> Phases {
         let stress = Needs { strain: true, elastic_stress: true, ..Needs::default() };
-        let is_explicit = evaluation == Evaluation::Converged;
+        let is_explicit = at == Evaluation::Converged;
         Phases {
             start: is_explicit.then_some(stress),
             end: !is_explicit,
@@ -151,14 +145,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
-    fn evaluate(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
-    ) {
-        match evaluation {
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
+        match at {
             Evaluation::Converged => self.advance_explicitly(step, batch, &mut outcome.energy),
             Evaluation::Start(_) => {}
             Evaluation::End(blend) => {
@@ -167,7 +155,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
-    fn add_step_energy(&self, _: Evaluation, _: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_step_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some([Pack([before]), Pack([after])]) = self.damage.both(batch.number) else { return };
         for lane in 0..batch.count {
@@ -179,14 +167,14 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
         }
     }
 
-    fn weaken(&self, batch: &mut Batch<'_, D, S>) {
+    fn weaken(&self, batch: &mut Batch<D, S>) {
         if let Some(Pack([damage])) = self.damage.converged(batch.number) {
             batch.integrity.weaken(left(damage));
         }
     }
 
     /// An error `e` of the damage is an error of the stress of `e` times the undamaged stress.
-    fn add_error(&self, curvature: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some([Pack([now]), Pack([before]), Pack([earlier])]) = self.damage.last_three(batch.number)
         else {

@@ -1,11 +1,5 @@
 use super::{
-    energy::Energy,
-    interior::{Effect, Phases},
-    isotropic,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
-    term::{ElasticLaw, Term},
+    Curvature, Effect, ElasticLaw, Energy, Evaluation, Outcome, Phases, Step, StressError, Term, isotropic,
 };
 use crate::{
     material::ByMaterial,
@@ -27,9 +21,9 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         "elasticity"
     }
 
-    fn phases(&self, evaluation: Evaluation) -> Phases {
+    fn phases(&self, at: Evaluation) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
-        let after = Needs { strain_rate: evaluation == Evaluation::Converged, ..strain };
+        let after = Needs { strain_rate: at == Evaluation::Converged, ..strain };
         Phases {
             start: Some(strain),
             energy: Some(after),
@@ -43,37 +37,37 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         Term::Elasticity(&self.law)
     }
 
-    fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<'_, D, S>, _: &mut Outcome<'_>) {
+    fn evaluate(&mut self, _: Evaluation, _: Step, batch: &mut Batch<D, S>, _: &mut Outcome) {
         let Some(law) = self.law.get(batch.material) else { return };
         isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &batch.integrity, &mut batch.stress);
     }
 
-    fn add_elastic_stress(&self, batch: &mut Batch<'_, D, S>) {
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
         let sound = Integrity::default();
         isotropic::add_stresses(&law.tensor, 1.0, &batch.strain, &sound, &mut batch.elastic_stress);
     }
 
-    fn add_stress(&self, evaluation: Evaluation, step: Step, batch: &mut Batch<'_, D, S>) {
+    fn add_stress(&self, at: Evaluation, step: Step, batch: &mut Batch<D, S>) {
         let Some(law) = self.law.get(batch.material) else { return };
         let before = |lane| add_scaled(&batch.strain.lane(lane), -step.length, &batch.strain_rate.lane(lane));
-        let is_lagged = evaluation == Evaluation::Converged;
+        let is_lagged = at == Evaluation::Converged;
         let strain = if is_lagged { Pack::from_lanes(before) } else { batch.strain };
         isotropic::add_stresses(&law.tensor, 1.0, &strain, &batch.integrity, &mut batch.stress);
     }
 
-    fn add_energy(&self, evaluation: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material) else { return };
         let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
         if !law.with_history {
             energy.elastic += 0.5 * square(&batch.strain);
         }
-        if evaluation == Evaluation::Converged {
+        if at == Evaluation::Converged {
             energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
         }
     }
 
-    fn add_step_energy(&self, _: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_step_energy(&self, _: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
         let share = batch.integrity.shares();
         for lane in 0..batch.count {
@@ -86,7 +80,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         }
     }
 
-    fn add_error(&self, _: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
+    fn add_error(&self, _: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
         let Some(law) = self.law.get(batch.material).filter(|law| !law.with_history) else { return };
         error.size += isotropic::square(&law.tensor, batch.cells, &batch.integrity, &batch.strain);
     }

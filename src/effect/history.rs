@@ -26,7 +26,7 @@ pub trait HistoryStore {
     fn earlier_history(&self) -> Option<History<'_>>;
 
     /// Keeps the values before the last step from now on, if step errors or laws evaluated at this state need them.
-    fn keep_earlier(&mut self, evaluation: Evaluation);
+    fn keep_earlier(&mut self, at: Evaluation);
 
     /// Makes the trial values the converged ones.
     fn commit(&mut self);

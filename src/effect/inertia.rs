@@ -1,11 +1,4 @@
-use super::{
-    energy::Energy,
-    interior::{Effect, Phases},
-    mass,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    term::Term,
-};
+use super::{Effect, Energy, Evaluation, Outcome, Phases, Step, Term, mass};
 use crate::{
     material::ByMaterial,
     space::{Batch, Needs},
@@ -33,21 +26,15 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
         Term::Mass(&self.density)
     }
 
-    fn evaluate(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        batch: &mut Batch<'_, D, S>,
-        _: &mut Outcome<'_>,
-    ) {
-        let length = match evaluation {
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, _: &mut Outcome) {
+        let length = match at {
             Evaluation::Converged => step.length,
             Evaluation::Start(blend) | Evaluation::End(blend) => blend.length,
         };
         mass::add_to_batch(&self.density, 1.0 / length, batch);
     }
 
-    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(&density) = self.density.get(batch.material) else { return };
         energy.kinetic += 0.5 * mass::square(density, batch.cells, &batch.velocity);
         energy.numerical -= 0.5 * mass::square(density, batch.cells, &batch.velocity_change);

@@ -1,11 +1,4 @@
-use super::{
-    energy::Energy,
-    history::HistoryStore,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
-    term::Term,
-};
+use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, Term};
 use crate::space::{Batch, Needs};
 
 /// Phases of a step in which an effect takes part.
@@ -31,7 +24,7 @@ pub trait Effect<const D: usize, const S: usize> {
     fn name(&self) -> &'static str;
 
     /// Where it takes part, if laws are evaluated at this state.
-    fn phases(&self, evaluation: Evaluation) -> Phases;
+    fn phases(&self, at: Evaluation) -> Phases;
 
     /// What it is in the linearised equation of motion.
     fn term(&self) -> Term<'_> {
@@ -47,50 +40,29 @@ pub trait Effect<const D: usize, const S: usize> {
     ///
     /// Effects that weaken also weaken the batch as their trial history has it: at the start they are evaluated before the others, at
     /// the end they come last in the body's list.
-    fn evaluate(
-        &mut self,
-        _evaluation: Evaluation,
-        _step: Step,
-        _batch: &mut Batch<'_, D, S>,
-        _outcome: &mut Outcome<'_>,
-    ) {
-    }
+    fn evaluate(&mut self, _at: Evaluation, _step: Step, _batch: &mut Batch<D, S>, _outcome: &mut Outcome) {}
 
     /// Adds its part of the elastic stress of the converged displacement and history, to `elastic_stress` of the batch;
     /// called in all phases in which some effect needs that.
-    fn add_elastic_stress(&self, _batch: &mut Batch<'_, D, S>) {}
+    fn add_elastic_stress(&self, _batch: &mut Batch<D, S>) {}
 
     /// Weakens the batch's cells as the converged history has it; called in the phases energy and stress if it weakens.
-    fn weaken(&self, _batch: &mut Batch<'_, D, S>) {}
+    fn weaken(&self, _batch: &mut Batch<D, S>) {}
 
     /// Adds its part of the total stress after the commit.
-    fn add_stress(&self, _evaluation: Evaluation, _step: Step, _batch: &mut Batch<'_, D, S>) {}
+    fn add_stress(&self, _at: Evaluation, _step: Step, _batch: &mut Batch<D, S>) {}
 
     /// Adds its energies after the commit.
-    fn add_energy(
-        &self,
-        _evaluation: Evaluation,
-        _step: Step,
-        _batch: &Batch<'_, D, S>,
-        _energy: &mut Energy,
-    ) {
-    }
+    fn add_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
 
     /// Adds the energies of an implicit step that was solved, evaluated at its end and not yet committed: what flow and damage take up,
     /// and the scheme's own terms of the elastic energy. The batch has the strains and elastic stresses before the step and after it,
     /// the strain rate, and what cells bear.
-    fn add_step_energy(
-        &self,
-        _evaluation: Evaluation,
-        _step: Step,
-        _batch: &Batch<'_, D, S>,
-        _energy: &mut Energy,
-    ) {
-    }
+    fn add_step_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
 
     /// Adds the stress without viscosity at the end of a step that was solved and not yet committed, and the error that its trial
     /// histories make in it, given those before. Effects that weaken also weaken the batch as their trial history has it.
-    fn add_error(&self, _curvature: Curvature, _batch: &mut Batch<'_, D, S>, _error: &mut StressError) {}
+    fn add_error(&self, _curvature: Curvature, _batch: &mut Batch<D, S>, _error: &mut StressError) {}
 
     /// The histories that it keeps for cells.
     fn histories(&self) -> Vec<&dyn HistoryStore> {

@@ -11,7 +11,7 @@ use multiversion::multiversion;
 pub(super) fn add_to_batch<const D: usize, const S: usize>(
     density: &ByMaterial<f64>,
     factor: f64,
-    batch: &mut Batch<'_, D, S>,
+    batch: &mut Batch<D, S>,
 ) {
     let Some(density) = density.get(batch.material) else { return };
     let factor = factor * density / ((D + 1) * (D + 2)) as f64;

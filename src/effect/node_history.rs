@@ -1,7 +1,4 @@
-use super::{
-    history::{History, HistoryStore},
-    step::Evaluation,
-};
+use super::{Evaluation, History, HistoryStore};
 use std::borrow::Cow;
 
 /// Converged and trial values of some of the nodes that a rank owns, one a node. Other nodes take no storage.

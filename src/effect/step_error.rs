@@ -45,7 +45,7 @@ impl StressError {
     pub(super) fn add_history<const D: usize, const S: usize>(
         &mut self,
         elasticity: &Isotropic,
-        batch: &Batch<'_, D, S>,
+        batch: &Batch<D, S>,
         curvature: Curvature,
         [now, before, earlier]: [&Pack<S>; 3],
     ) {

@@ -1,10 +1,4 @@
-use super::{
-    energy::Energy,
-    history::HistoryStore,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
-};
+use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError};
 
 /// Nodal fields of the converged state with ghosts, `D` values a node.
 #[derive(Debug, Clone, Copy)]
@@ -43,25 +37,19 @@ pub trait SurfaceEffect<const D: usize> {
     /// the outcome takes them.
     fn evaluate(
         &mut self,
-        evaluation: Evaluation,
+        at: Evaluation,
         step: Step,
         displacement: &[f64],
         forces: &mut [f64],
-        outcome: &mut Outcome<'_>,
+        outcome: &mut Outcome,
     );
 
     /// Adds its energies after the commit.
-    fn add_energy(&self, evaluation: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
+    fn add_energy(&self, at: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
 
     /// Writes the trial history of a solved implicit step and adds the energies that need the histories before and after it: what it
     /// dissipates, and the terms of the scheme.
-    fn add_step_energy(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        ends: SurfaceStep<'_>,
-        energy: &mut Energy,
-    );
+    fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy);
 
     /// Adds the force at the end of a step that was solved and not yet committed, given the displacement there, and the error that
     /// its trial history makes in it, given those before.

@@ -104,7 +104,7 @@ impl Term<'_> {
     }
 
     /// Adds the force of its form to the batch, given velocity and strain rate: nodal forces, or minus the stress.
-    pub fn add_force<const D: usize, const S: usize>(&self, batch: &mut Batch<'_, D, S>) {
+    pub fn add_force<const D: usize, const S: usize>(&self, batch: &mut Batch<D, S>) {
         if let Self::Mass(density) = self {
             mass::add_to_batch(density, 1.0, batch);
         } else if let Some(tensor) = self.tensor(batch.material) {

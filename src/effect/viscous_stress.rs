@@ -1,10 +1,4 @@
-use super::{
-    energy::Energy,
-    interior::{Effect, Phases},
-    isotropic,
-    step::{Evaluation, Step},
-    term::Term,
-};
+use super::{Effect, Energy, Evaluation, Phases, Step, Term, isotropic};
 use crate::{
     material::{ByMaterial, Isotropic},
     space::{Batch, Integrity, Needs},
@@ -31,13 +25,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
         Term::Viscosity(&self.tensor)
     }
 
-    fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<'_, D, S>) {
+    fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
         isotropic::add_stresses(tensor, 1.0, &batch.strain_rate, &whole, &mut batch.stress);
     }
 
-    fn add_energy(&self, _: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_energy(&self, _: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
         energy.viscous += step.length * isotropic::square(tensor, batch.cells, &whole, &batch.strain_rate);

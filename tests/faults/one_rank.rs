@@ -43,7 +43,7 @@ impl Effect<2, 3> for Faulty {
         Term::Mass(&self.density)
     }
 
-    fn evaluate(&mut self, _: Evaluation, step: Step, batch: &mut Batch<'_, 2, 3>, _: &mut Outcome<'_>) {
+    fn evaluate(&mut self, _: Evaluation, step: Step, batch: &mut Batch<2, 3>, _: &mut Outcome) {
         let now = self.here && step.time > 0.11;
         assert!(!now || self.fault != Fault::Panic, "this law panicked at t = {} s", step.time);
         if now && self.fault == Fault::Law {

@@ -53,44 +53,38 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
         self.inner.name()
     }
 
-    fn phases(&self, evaluation: Evaluation) -> Phases {
-        self.inner.phases(evaluation)
+    fn phases(&self, at: Evaluation) -> Phases {
+        self.inner.phases(at)
     }
 
     fn term(&self) -> Term<'_> {
         self.inner.term()
     }
 
-    fn add_elastic_stress(&self, batch: &mut Batch<'_, D, S>) {
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         self.note_batch("elastic stress", batch);
         self.inner.add_elastic_stress(batch);
     }
 
-    fn weaken(&self, batch: &mut Batch<'_, D, S>) {
+    fn weaken(&self, batch: &mut Batch<D, S>) {
         self.note("weaken");
         self.inner.weaken(batch);
     }
 
-    fn evaluate(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
-    ) {
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
         self.note_batch("explicit", batch);
-        assert_eq!(evaluation, Evaluation::Converged);
-        self.inner.evaluate(evaluation, step, batch, outcome);
+        assert_eq!(at, Evaluation::Converged);
+        self.inner.evaluate(at, step, batch, outcome);
     }
 
-    fn add_energy(&self, evaluation: Evaluation, step: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         self.note_batch("energy", batch);
-        self.inner.add_energy(evaluation, step, batch, energy);
+        self.inner.add_energy(at, step, batch, energy);
     }
 
-    fn add_stress(&self, evaluation: Evaluation, step: Step, batch: &mut Batch<'_, D, S>) {
+    fn add_stress(&self, at: Evaluation, step: Step, batch: &mut Batch<D, S>) {
         self.note_batch("stress", batch);
-        self.inner.add_stress(evaluation, step, batch);
+        self.inner.add_stress(at, step, batch);
     }
 }
 

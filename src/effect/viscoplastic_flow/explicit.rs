@@ -4,7 +4,7 @@
 
 use super::ViscoplasticFlow;
 use crate::{
-    effect::{outcome::Outcome, step::Step},
+    effect::{Outcome, Step},
     material::{Flow, FlowLaw},
     simd::{LANES, Pack, sum},
     space::{Batch, Integrity, SimplexPack},
@@ -73,8 +73,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
     pub(super) fn advance_explicitly<const D: usize>(
         &mut self,
         step: Step,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
+        batch: &mut Batch<D, S>,
+        outcome: &mut Outcome,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some((converged, trial)) = self.stress.both_mut(batch.number) else { return };

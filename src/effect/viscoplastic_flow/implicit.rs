@@ -6,11 +6,7 @@
 
 use super::ViscoplasticFlow;
 use crate::{
-    effect::{
-        energy::Energy,
-        outcome::Outcome,
-        step::{Blend, Step},
-    },
+    effect::{Blend, Energy, Outcome, Step},
     material::{Extrapolated, Flow, FlowLaw, Tangent},
     simd::Pack,
     space::Batch,
@@ -23,8 +19,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
         &mut self,
         blend: Blend,
         step: Step,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
+        batch: &mut Batch<D, S>,
+        outcome: &mut Outcome,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(&converged) = self.stress.converged(batch.number) else { return };
@@ -70,7 +66,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         &self,
         blend: Blend,
         step: Step,
-        batch: &Batch<'_, D, S>,
+        batch: &Batch<D, S>,
         energy: &mut Energy,
     ) {
         let Some(elasticity) = self.laws.get(batch.material).map(FlowLaw::elasticity) else { return };

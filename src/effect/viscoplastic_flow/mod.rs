@@ -2,15 +2,8 @@ mod explicit;
 mod implicit;
 
 use super::{
-    cell_history::CellHistory,
-    energy::Energy,
-    history::HistoryStore,
-    interior::{Effect, Phases},
-    isotropic,
-    outcome::Outcome,
-    step::{Evaluation, Step},
-    step_error::{Curvature, StressError},
-    term::{FlowProperties, Term},
+    Curvature, Effect, Energy, Evaluation, FlowProperties, HistoryStore, Outcome, Phases, Step, StressError,
+    Term, cell_history::CellHistory, isotropic,
 };
 use crate::{
     material::{ByMaterial, Flow, FlowLaw},
@@ -50,10 +43,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         "viscoplasticity"
     }
 
-    fn phases(&self, evaluation: Evaluation) -> Phases {
+    fn phases(&self, at: Evaluation) -> Phases {
         let strain = Needs { strain: true, ..Needs::default() };
         let both = Needs { strain_rate: true, ..strain };
-        let is_explicit = evaluation == Evaluation::Converged;
+        let is_explicit = at == Evaluation::Converged;
         Phases {
             start: Some(if is_explicit { both } else { Needs::default() }),
             end: !is_explicit,
@@ -68,14 +61,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         Term::Flow(self.properties)
     }
 
-    fn evaluate(
-        &mut self,
-        evaluation: Evaluation,
-        step: Step,
-        batch: &mut Batch<'_, D, S>,
-        outcome: &mut Outcome<'_>,
-    ) {
-        match evaluation {
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
+        match at {
             Evaluation::Converged => self.advance_explicitly(step, batch, outcome),
             Evaluation::Start(_) => {
                 let Some(history) = self.stress.converged(batch.number) else { return };
@@ -85,17 +72,17 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         }
     }
 
-    fn add_elastic_stress(&self, batch: &mut Batch<'_, D, S>) {
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
         let Some(history) = self.stress.converged(batch.number) else { return };
         isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
     }
 
-    fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<'_, D, S>) {
+    fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
         let Some(history) = self.stress.converged(batch.number) else { return };
         isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
     }
 
-    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<'_, D, S>, energy: &mut Energy) {
+    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(history) = self.stress.converged(batch.number) else { return };
         let (strain, integrity) = (&batch.strain, &batch.integrity);
@@ -103,19 +90,13 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
             0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
-    fn add_step_energy(
-        &self,
-        evaluation: Evaluation,
-        step: Step,
-        batch: &Batch<'_, D, S>,
-        energy: &mut Energy,
-    ) {
-        if let Evaluation::End(blend) = evaluation {
+    fn add_step_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        if let Evaluation::End(blend) = at {
             self.add_energy_of_implicit_flow(blend, step, batch, energy);
         }
     }
 
-    fn add_error(&self, curvature: Curvature, batch: &mut Batch<'_, D, S>, error: &mut StressError) {
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(histories) = self.stress.last_three(batch.number) else { return };
         error.add_history(law.elasticity(), batch, curvature, histories);

@@ -1,6 +1,6 @@
 //! Perzyna's law in plane stress.
 //!
-//! In the components `p`, `q`, `r` of [`Perzyna`](crate::material::Perzyna) both `E` (eigenvalues `e`) and the projection
+//! In the components `p`, `q`, `r` of [`Perzyna`] both `E` (eigenvalues `e`) and the projection
 //! are diagonal. With the projected stress `t`, its multiplier `m` and `eta = k / (2 lambda) (f / Y)^(n - 1)`
 //!
 //! ```text
