@@ -1,8 +1,6 @@
 //! A time scheme at work: what is its own in a step.
 
-use super::{
-    bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler,
-};
+use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
 use crate::{
     body::Body,
     effect::{Blend, Energy, Evaluation, Peaks, Step},

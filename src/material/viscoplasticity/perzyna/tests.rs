@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use std::array;
 
 const PAPER: Elasticity = Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
 const METRICS: [Metric; 3] = [Metric::Elasticity, Metric::Compliance, Metric::Frobenius];
