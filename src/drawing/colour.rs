@@ -15,7 +15,7 @@ pub const LINES: [Colour; 7] = [
 ];
 
 /// Text and axes.
-pub const INK: Colour = [0x1a, 0x1a, 0x1a];
+pub(super) const INK: Colour = [0x1a, 0x1a, 0x1a];
 
 /// Light backgrounds behind parts of a chart.
 pub const BANDS: [Colour; 3] = [[0xdb, 0xe9, 0xf6], [0xfd, 0xeb, 0xd0], [0xe6, 0xe6, 0xe6]];
@@ -60,7 +60,7 @@ pub fn hex([red, green, blue]: Colour) -> String {
 }
 
 /// A colour in less light.
-pub fn dimmed(colour: Colour, light: f64) -> Colour {
+pub(super) fn dimmed(colour: Colour, light: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * light).round() as u8)
 }
 

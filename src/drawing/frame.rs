@@ -12,7 +12,7 @@ const LEFT: f64 = 56.0;
 const TOP: f64 = 54.0;
 
 /// Where a body stands in a drawing, beside its axes and colour bar.
-pub struct Frame {
+pub(super) struct Frame {
     low: [f64; 2],
     zoom: f64,
     width: f64,
@@ -77,7 +77,7 @@ impl Frame {
 
 /// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
 /// name of the picture keeps them apart.
-pub fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
+pub(super) fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
     let name = plain_name(name);
     let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
     let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");

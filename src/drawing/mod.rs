@@ -9,7 +9,7 @@ pub mod chart;
 pub mod colour;
 pub mod frame;
 pub mod markup;
-pub mod paint;
+mod paint;
 pub mod picture;
 pub mod scale;
 pub mod view;

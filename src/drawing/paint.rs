@@ -28,7 +28,7 @@ pub struct Triangle {
 
 /// How the edges of few triangles are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edges {
+pub(super) enum Edges {
     /// With each triangle, so that later ones cover them.
     OfEach,
     /// Over all triangles: for those that do not cover each other.
@@ -36,7 +36,7 @@ pub enum Edges {
 }
 
 /// The triangles as SVG elements; later ones cover earlier ones. `height` is that of the drawing.
-pub fn paint(triangles: &[Triangle], edges: Edges, height: f64) -> Result<String> {
+pub(super) fn paint(triangles: &[Triangle], edges: Edges, height: f64) -> Result<String> {
     if triangles.len() > POLYGONS { image(triangles, height) } else { Ok(polygons(triangles, edges)) }
 }
 

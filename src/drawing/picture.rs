@@ -65,7 +65,7 @@ impl Picture {
 }
 
 /// A name fit for a file and for an id of a page.
-pub fn plain_name(name: &str) -> String {
+pub(super) fn plain_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
 }
 

@@ -2,7 +2,7 @@
 
 /// The part of a number line that a picture shows, and where it is marked.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scale {
+pub(super) struct Scale {
     /// Smallest value shown, in shown units.
     pub low: f64,
     /// Largest value shown, in shown units.

@@ -128,7 +128,7 @@ pub fn widest_along(points: &[[f64; 3]], faces: &[u32]) -> usize {
 
 /// How points of the body become points of the picture, before it is fitted to its frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum View {
+pub(super) enum View {
     /// x to the right, y up.
     Plane,
     /// Oblique, without perspective.

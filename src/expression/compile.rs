@@ -40,7 +40,7 @@ impl Fault {
 }
 
 /// The program that evaluates `text`.
-pub fn compile(text: &str) -> Result<Vec<Instruction>, Fault> {
+pub(super) fn compile(text: &str) -> Result<Vec<Instruction>, Fault> {
     if text.len() > LONGEST {
         let message = format!("this expression has {} characters", text.len());
         return Err(Fault::new(0..text.len(), message, format!("at most {LONGEST} are allowed")));

@@ -4,7 +4,7 @@ use super::program::{Binary, Instruction, Unary, Variable};
 
 /// What a name stands for.
 #[derive(Clone, Copy)]
-pub enum Meaning {
+pub(super) enum Meaning {
     /// A variable or a constant.
     Value(Instruction),
     /// A function of one argument.
@@ -48,12 +48,12 @@ const NAMES: &[(&str, Meaning)] = &[
 ];
 
 /// What `name` stands for.
-pub fn meaning(name: &str) -> Option<Meaning> {
+pub(super) fn meaning(name: &str) -> Option<Meaning> {
     NAMES.iter().find(|(known, _)| *known == name).map(|(_, meaning)| *meaning)
 }
 
 /// Every name, variables first.
-pub fn names() -> impl Iterator<Item = &'static str> {
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
     NAMES.iter().map(|(name, _)| *name)
 }
 

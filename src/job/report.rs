@@ -13,7 +13,7 @@ const SHOWN: usize = 60;
 
 /// A stretch of the job file or of an override.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place {
+pub(crate) struct Place {
     /// 0 for the job file, then one for each override.
     pub file: usize,
     /// First byte.
@@ -31,7 +31,7 @@ impl Place {
 
 /// One thing that is wrong with a job.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Fault {
+pub(crate) struct Fault {
     at: Place,
     message: String,
     label: String,
@@ -53,7 +53,7 @@ impl Fault {
 
 /// The texts that faults point into.
 #[derive(Debug, Clone)]
-pub struct Texts {
+pub(crate) struct Texts {
     kind: &'static str,
     files: SimpleFiles<String, String>,
     colour: bool,

@@ -11,7 +11,7 @@ use super::report::{Fault, Place};
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
-pub struct Node {
+pub(crate) struct Node {
     /// What stands there.
     pub value: Value,
     /// Where it stands; of a table its header.
@@ -22,7 +22,7 @@ pub struct Node {
 
 /// A TOML value.
 #[derive(Debug, Clone)]
-pub enum Value {
+pub(crate) enum Value {
     /// A string.
     Text(String),
     /// A whole number.
@@ -120,7 +120,7 @@ impl Node {
 }
 
 /// Reads the text of file 0.
-pub fn parse(text: &str) -> Result<Node, Fault> {
+pub(super) fn parse(text: &str) -> Result<Node, Fault> {
     match DeTable::parse(text) {
         Ok(table) => Ok(table_node(table.into_inner(), 0, 0, Place::new(0, 0..0))),
         Err(error) => Err(syntax_fault(&error, 0, 0..text.len())),
@@ -128,7 +128,7 @@ pub fn parse(text: &str) -> Result<Node, Fault> {
 }
 
 /// Reads one value that stands at the bytes `range` of an override.
-pub fn parse_value(text: &str, file: usize, range: Range<usize>) -> Result<Node, Fault> {
+pub(super) fn parse_value(text: &str, file: usize, range: Range<usize>) -> Result<Node, Fault> {
     match DeValue::parse(&text[range.clone()]) {
         Ok(value) => Ok(node(value, file, range.start)),
         Err(error) => Err(syntax_fault(&error, file, range)),

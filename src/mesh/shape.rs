@@ -5,7 +5,7 @@ use crate::tensor::{Vector, add_scaled, norm};
 
 /// The facet of a positively oriented cell opposite to its node `opposite`, its normal pointing outward.
 #[inline]
-pub fn facet_of<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D] {
+pub(super) fn facet_of<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D] {
     const TRIANGLE: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
     const TETRAHEDRON: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
     std::array::from_fn(|i| match D {
@@ -56,7 +56,7 @@ pub fn centroid<const D: usize>(points: &[Vector<D>]) -> Vector<D> {
 }
 
 /// The longest edge between any two of the corners (m).
-pub fn longest_edge<const D: usize>(corners: &[Vector<D>]) -> f64 {
+pub(super) fn longest_edge<const D: usize>(corners: &[Vector<D>]) -> f64 {
     edges(corners).fold(0.0, f64::max)
 }
 
@@ -118,7 +118,7 @@ impl<const D: usize> GlobalMesh<D> {
     }
 
     /// The corners of a facet (m).
-    pub fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
+    pub(super) fn facet_corners(&self, facet: usize) -> [Vector<D>; D] {
         self.facets[facet].map(|node| self.nodes[node as usize])
     }
 }

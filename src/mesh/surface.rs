@@ -5,7 +5,7 @@ use super::shape::facet_of;
 use crate::error::{Error, Result};
 
 /// In place of a neighbour: nothing but the outside lies behind this facet.
-pub const OUTSIDE: u32 = u32::MAX;
+pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// The cells behind each facet of each cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct Topology<const D: usize> {
 
 /// The graph whose vertices are cells and whose edges are shared facets, in compressed rows as METIS reads it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DualGraph {
+pub(super) struct DualGraph {
     /// Cell `c` has the neighbours `adjacency[offsets[c]..offsets[c + 1]]` (METIS: `xadj`).
     pub offsets: Vec<i32>,
     /// Neighbouring cells (METIS: `adjncy`).
@@ -88,12 +88,12 @@ impl<const D: usize> Topology<D> {
     }
 
     /// How many facets of cells have no cell on their other side.
-    pub fn facets_without_neighbour(&self) -> usize {
+    pub(super) fn facets_without_neighbour(&self) -> usize {
         self.neighbours.iter().filter(|&&neighbour| neighbour == OUTSIDE).count()
     }
 
     /// The facets on the outer surface, outward, and the cell behind each; in the order of the cells.
-    pub fn outer_facets(&self, cells: &[u32]) -> (Vec<[u32; D]>, Vec<u32>) {
+    pub(super) fn outer_facets(&self, cells: &[u32]) -> (Vec<[u32; D]>, Vec<u32>) {
         let outside = |place: &usize| self.neighbours[*place] == OUTSIDE;
         let count = self.facets_without_neighbour();
         let (mut facets, mut behind) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -106,7 +106,7 @@ impl<const D: usize> Topology<D> {
     }
 
     /// The graph of cells that share a facet.
-    pub fn dual_graph(&self) -> DualGraph {
+    pub(super) fn dual_graph(&self) -> DualGraph {
         let shared = self.neighbours.iter().filter(|&&neighbour| neighbour != OUTSIDE).count();
         let mut graph = DualGraph {
             offsets: Vec::with_capacity(self.neighbours.len() / (D + 1) + 1),

@@ -7,7 +7,7 @@ const GAP: f64 = 6.0;
 
 /// The order of points along a curve, and the length of the curve up to each; the pieces of a curve with gaps follow each
 /// other.
-pub fn along_curve(points: &[[f64; 3]]) -> (Vec<usize>, Vec<f64>) {
+pub(super) fn along_curve(points: &[[f64; 3]]) -> (Vec<usize>, Vec<f64>) {
     let order = if points.len() > MANY { (0..points.len()).collect() } else { chain(points) };
     let steps: Vec<f64> = order.windows(2).map(|pair| distance(points[pair[0]], points[pair[1]])).collect();
     let mut sorted = steps.clone();

@@ -14,7 +14,7 @@ const SIGNS: [&str; 5] = ["job.toml", "summary.json", "history.csv", "probes.csv
 
 /// A file that is not there or cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Gap {
+pub(super) struct Gap {
     /// Its name.
     pub file: &'static str,
     /// Why, in words.
@@ -25,7 +25,7 @@ pub struct Gap {
 
 /// The files, read.
 #[derive(Debug, Default)]
-pub struct Found {
+pub(super) struct Found {
     /// The folder.
     pub folder: PathBuf,
     /// Text of the effective job.

@@ -27,7 +27,7 @@ const MOST_DOTS: usize = 150;
 const MOST_ARROWS: usize = 70;
 
 /// A boundary at the last time in `profiles.csv`.
-pub struct Boundary<'a> {
+pub(super) struct Boundary<'a> {
     /// Its name.
     pub name: &'a str,
     /// When, in s.
@@ -51,7 +51,7 @@ struct Behind<'a> {
 }
 
 /// What acts on a boundary.
-pub struct Laws {
+pub(super) struct Laws {
     /// Along the normal.
     pub normal: Law,
     /// In sliding.
@@ -382,14 +382,14 @@ fn is_quantity(column: &str) -> bool {
 }
 
 /// The unit of a column, by its name.
-pub fn unit_of(column: &str) -> &'static str {
+pub(super) fn unit_of(column: &str) -> &'static str {
     let known =
         [("displacement", "m"), ("velocity", "m/s"), ("pressure", "Pa"), ("traction", "Pa"), ("gap", "m")];
     known.iter().find(|(word, _)| column.contains(word)).map_or("", |(_, unit)| unit)
 }
 
 /// With a capital letter in front.
-pub fn capital(words: &str) -> String {
+pub(super) fn capital(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

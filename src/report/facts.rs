@@ -46,7 +46,7 @@ const MORE_MEMBERS: [(&str, &str, &str); 13] = [
 ];
 
 /// Status in one sentence, and the table of everything that `summary.json` says about the run.
-pub fn summary(summary: &Value) -> String {
+pub(super) fn summary(summary: &Value) -> String {
     let mut rows: Vec<(String, String)> = Vec::new();
     let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
     for &(member, words, unit) in MEMBERS.iter().chain(figures).chain(&MORE_MEMBERS) {
@@ -72,7 +72,7 @@ pub fn summary(summary: &Value) -> String {
 }
 
 /// How the run ended, in a sentence.
-pub fn ending(summary: &Value) -> String {
+pub(super) fn ending(summary: &Value) -> String {
     let status = summary.get("status").and_then(Value::as_str).unwrap_or("unknown");
     let value = |name: &str| summary.get(name).map_or_else(|| "?".into(), plain);
     let seconds =
@@ -89,7 +89,7 @@ pub fn ending(summary: &Value) -> String {
 }
 
 /// What the run warned of, if it did.
-pub fn warnings(summary: &Value) -> String {
+pub(super) fn warnings(summary: &Value) -> String {
     let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let items: String =
         warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(&plain(warning)))).collect();
@@ -100,7 +100,7 @@ pub fn warnings(summary: &Value) -> String {
 }
 
 /// The certificates and what they mean for the run.
-pub fn certificates(found: &Found) -> String {
+pub(super) fn certificates(found: &Found) -> String {
     let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
         return paragraph("No certificates: they are in summary.json.");
     };
@@ -155,7 +155,7 @@ pub fn certificates(found: &Found) -> String {
 }
 
 /// The seconds of each phase as bars.
-pub fn phases(summary: &Value) -> Option<Picture> {
+pub(super) fn phases(summary: &Value) -> Option<Picture> {
     let seconds = summary.get("wall_seconds")?.as_object()?;
     let total = seconds.get("total").and_then(Value::as_f64);
     let named = seconds.iter().filter(|(name, _)| *name != "total");

@@ -16,7 +16,7 @@ const GREY: Colour = [0x55; 3];
 
 /// What rubs at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rubbing {
+pub(super) struct Rubbing {
     /// Sliding velocity in m/s, not negative.
     pub speed: f64,
     /// Friction traction in Pa, not negative.
@@ -26,7 +26,12 @@ pub struct Rubbing {
 }
 
 /// The law over the sliding velocity, and the nodes: their traction, or that over their pressure where the law follows it.
-pub fn picture(name: &str, time: f64, law: &FrictionLaw, nodes: &[Rubbing]) -> Result<Option<Picture>> {
+pub(super) fn picture(
+    name: &str,
+    time: f64,
+    law: &FrictionLaw,
+    nodes: &[Rubbing],
+) -> Result<Option<Picture>> {
     let touching: Vec<&Rubbing> =
         nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
     if touching.is_empty() {

@@ -17,7 +17,7 @@ const TIME: Axis = Axis { quantity: "t", unit: "s" };
 const MOST_PROBES: usize = 7;
 
 /// Each quantity of the probes over time, a line a probe.
-pub fn probes(table: &Table) -> Result<Vec<Picture>> {
+pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
     let mut out = Vec::new();
@@ -50,7 +50,7 @@ pub fn probes(table: &Table) -> Result<Vec<Picture>> {
 }
 
 /// Energies, dissipations with work, and what is missing in their balance. `unit` is that of energies.
-pub fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
+pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     let columns = |roles: &[Role]| -> Vec<&str> {
         let all = Energy::COLUMNS.into_iter().zip(Energy::ROLES);
         all.filter(|(_, role)| roles.contains(role)).map(|(column, _)| column).collect()
@@ -102,7 +102,7 @@ fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str])
 }
 
 /// How the steps went: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
-pub fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
+pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
     let mut out = Vec::new();
     for (column, quantity, unit, caption) in [
         ("newton_iterations", "Newton iterations", "", "Newton iterations of each step"),

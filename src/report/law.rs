@@ -10,7 +10,7 @@ use crate::{
 
 /// A law whose pressure is a graph over one quantity of the node.
 #[derive(Debug, Clone)]
-pub struct Law {
+pub(super) struct Law {
     law: NormalResponse,
     /// The distance that the body may move before it is felt, where the law is one of the displacement.
     gap: Option<Gap>,

@@ -10,7 +10,7 @@ const STYLE: &str = include_str!("style.css");
 
 /// A page as it grows.
 #[derive(Debug, Default)]
-pub struct Page {
+pub(super) struct Page {
     title: String,
     head: String,
     sections: Vec<(String, String, String)>,

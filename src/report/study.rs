@@ -13,12 +13,12 @@ use std::{
 };
 
 /// Whether a study left this folder.
-pub fn is_study(folder: &Path) -> bool {
+pub(super) fn is_study(folder: &Path) -> bool {
     ["study.json", "study.md"].iter().any(|name| folder.join(name).is_file())
 }
 
 /// The page: what `study.md` says, or the tables of `study.json` where there is none; and all SVG files of the folder.
-pub fn page(folder: &Path) -> Result<Page> {
+pub(super) fn page(folder: &Path) -> Result<Page> {
     let words = folder.join("study.md");
     let mut captions = Vec::new();
     let (title, body) = if words.is_file() {

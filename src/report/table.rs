@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Columns of numbers and words.
 #[derive(Debug, Clone, Default)]
-pub struct Table {
+pub(super) struct Table {
     header: Vec<String>,
     rows: Vec<Vec<f64>>,
     /// The words of the one column that has words, by row.

@@ -57,7 +57,7 @@ pub trait Grid<const D: usize> {
 }
 
 /// Bricks shared out among parts by cutting the longest side of a box in two again and again.
-pub struct Bisection<const D: usize> {
+pub(super) struct Bisection<const D: usize> {
     bricks: [usize; D],
     parts: usize,
 }
