@@ -26,7 +26,7 @@ use crate::{
 };
 
 /// The indicator as a field that runs write.
-pub const ERROR_INDICATOR: OutputField = OutputField {
+pub(super) const FIELD: OutputField = OutputField {
     name: "error_indicator",
     place: Place::Cell,
     shape: Shape::Scalar,
@@ -51,12 +51,10 @@ pub const ERROR_INDICATOR: OutputField = OutputField {
 };
 
 /// Computes the field; its figures are total and relative size. Collective.
-pub(super) fn compute<'a, const D: usize, const S: usize>(
-    at: Converged<'a, D, S>,
-) -> Result<Option<Computed<'a>>> {
+pub(super) fn compute<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Computed<'a>> {
     let indicator = &mut ErrorIndicator::new(at.session, at.body)?;
     let Indicated { cells, total, relative } = indicator.of(at.session, at.body, at.stress)?;
-    Ok(Some(Computed { values: Box::new(cells), figures: vec![total, relative] }))
+    Ok(Computed { values: Box::new(cells), figures: vec![total, relative] })
 }
 
 /// The indicator of a body, with room for the means.

@@ -2,81 +2,64 @@
 //! list. Histories of effects are appended automatically.
 
 use super::{
-    error_indicator::{self, ERROR_INDICATOR},
+    error_indicator,
     field::{Place, Shape},
     output_field::{Computed, Converged, OutputField},
 };
-use crate::{error::Result, tensor};
+use crate::{error::Result, tensor::von_mises};
 
 /// Computes a field; none where the run has no such field, on all ranks alike. Collective.
 type Compute<const D: usize, const S: usize> =
     for<'a> fn(Converged<'a, D, S>) -> Result<Option<Computed<'a>>>;
 
-/// Makes [`FIELDS`] of a list: each field with what computes it.
+/// Makes [`FIELDS`] of a list: the meaning of each field, its name in the program, what it is, and what computes it.
 macro_rules! fields {
-    ($($field:ident: $compute:path,)*) => {
+    ($($(#[$meaning:meta])* $name:ident = $field:expr, |$at:ident| $computed:expr;)*) => {
+        $($(#[$meaning])* pub(crate) const $name: OutputField = $field;)*
+
         /// How many there are.
-        pub(super) const COUNT: usize = [$(stringify!($field)),*].len();
+        pub(super) const COUNT: usize = [$(stringify!($name)),*].len();
 
         /// All of them, in the order of field files.
-        pub(crate) static FIELDS: [OutputField; COUNT] = [$($field),*];
+        pub(crate) static FIELDS: [OutputField; COUNT] = [$($name),*];
 
         /// What computes them, in the same order.
         pub(super) fn computations<const D: usize, const S: usize>() -> [Compute<D, S>; COUNT] {
-            [$($compute),*]
+            [$({
+                fn compute<'a, const D: usize, const S: usize>(
+                    $at: Converged<'a, D, S>,
+                ) -> Result<Option<Computed<'a>>> {
+                    Ok(Some($computed))
+                }
+                compute
+            }),*]
         }
     };
 }
 
 fields! {
-    DISPLACEMENT: displacement,
-    VELOCITY: velocity,
-    STRESS: stress,
-    VON_MISES: von_mises,
-    ERROR_INDICATOR: error_indicator::compute,
-    CONTACT_TRACTION: contact_traction,
-}
-
-/// Displacement of the nodes.
-pub(crate) const DISPLACEMENT: OutputField =
-    OutputField::plain("displacement", Place::Node, Shape::Vector, "m");
-
-fn displacement<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
-    Ok(Some(Computed::of(at.state.displacement.owned()?)))
-}
-
-/// Velocity of the nodes.
-pub(crate) const VELOCITY: OutputField =
-    OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed");
-
-fn velocity<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
-    Ok(Some(Computed::of(at.state.velocity.owned()?)))
-}
-
-/// Total stress of the cells.
-pub(crate) const STRESS: OutputField = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa");
-
-fn stress<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
-    Ok(Some(Computed::of(at.stress.as_flattened())))
-}
-
-/// Von Mises norm of the total stress of the cells.
-pub(crate) const VON_MISES: OutputField = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
-    .with_picture("von_mises", "von Mises stress");
-
-fn von_mises<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Option<Computed<'a>>> {
-    Ok(Some(Computed::of(at.stress.iter().map(tensor::von_mises).collect::<Vec<_>>())))
-}
-
-/// Traction of contact at the nodes, where it is an unknown of steps.
-pub(crate) const CONTACT_TRACTION: OutputField =
-    OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa");
-
-fn contact_traction<'a, const D: usize, const S: usize>(
-    at: Converged<'a, D, S>,
-) -> Result<Option<Computed<'a>>> {
-    let Some(traction) = &at.state.contact_traction else { return Ok(None) };
-    Ok(Some(Computed::of(traction.owned()?)))
+    /// Displacement of the nodes.
+    DISPLACEMENT = OutputField::plain("displacement", Place::Node, Shape::Vector, "m"),
+        |at| Computed::of(at.state.displacement.owned()?);
+    /// Velocity of the nodes.
+    VELOCITY = OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed"),
+        |at| Computed::of(at.state.velocity.owned()?);
+    /// Total stress of the cells.
+    STRESS = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa"),
+        |at| Computed::of(at.stress.as_flattened());
+    /// Von Mises norm of the total stress of the cells.
+    VON_MISES = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
+            .with_picture("von_mises", "von Mises stress"),
+        |at| Computed::of(at.stress.iter().map(von_mises).collect::<Vec<_>>());
+    /// See [`error_indicator`].
+    ERROR_INDICATOR = error_indicator::FIELD,
+        |at| error_indicator::compute(at)?;
+    /// Traction of contact at the nodes, where it is an unknown of steps.
+    CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
+        |at| match &at.state.contact_traction {
+            Some(traction) => Computed::of(traction.owned()?),
+            None => return Ok(None),
+        };
 }
 
 #[cfg(test)]
