@@ -1,6 +1,6 @@
 //! `summary.json`: the results of a run in one object.
 
-use super::{Inventory, VERSION};
+use super::Inventory;
 use crate::{
     certificate::Certificates,
     effect::Peaks,
@@ -138,11 +138,6 @@ impl Summary {
             )
         });
         slip.into_iter().chain(strain)
-    }
-
-    /// The version, for use where the struct is filled.
-    pub fn version() -> &'static str {
-        VERSION
     }
 }
 

@@ -348,7 +348,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             status,
             error,
             warnings: Vec::new(),
-            version: Summary::version(),
+            version: super::VERSION,
             petsc_version: self.session.petsc().version()?,
             ranks: self.session.ranks(),
             dimension: D,
