@@ -14,7 +14,10 @@
 //! equation is taken from the tangential ones ([`Friction::reduce`]).
 
 use super::{
-    point::{Point, Unknown, Vectors},
+    point::{
+        Point, Unknown,
+        Vectors::{self, Body, Newton},
+    },
     reference::{ReferenceValues, worst},
     tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
 };
@@ -108,7 +111,7 @@ impl<const D: usize> Friction<D> {
     /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
     pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
-            point.traction = point.along(Vectors::Body, traction);
+            point.traction = point.along(Body, traction);
             point.pressure = points[point.at].pressure;
         }
     }
@@ -120,9 +123,7 @@ impl<const D: usize> Friction<D> {
 
     /// Turns velocities into unknowns.
     pub fn unmap(&self, values: &mut [f64]) {
-        self.points
-            .iter()
-            .for_each(|point| point.add(Vectors::Newton, 1.0 / self.scale, &point.traction, values));
+        self.points.iter().for_each(|point| point.add(Newton, 1.0 / self.scale, &point.traction, values));
         self.add_drift(-1.0, values);
     }
 
@@ -133,7 +134,7 @@ impl<const D: usize> Friction<D> {
             self.take_pressures(points);
         }
         for point in &mut self.points {
-            let unknown = point.along(Vectors::Newton, values);
+            let unknown = point.along(Newton, values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let shares = if found.traction == 0.0 {
@@ -153,7 +154,7 @@ impl<const D: usize> Friction<D> {
     /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
     fn add_drift(&self, factor: f64, values: &mut [f64]) {
         let pairs = self.points.iter().zip(&self.drift);
-        pairs.for_each(|(point, drift)| point.add(Vectors::Newton, factor, drift, values));
+        pairs.for_each(|(point, drift)| point.add(Newton, factor, drift, values));
     }
 
     /// The points with their sliding velocities.
@@ -176,7 +177,7 @@ impl<const D: usize> Friction<D> {
     pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
         let (law, scale, follows) = (self.law, self.scale, self.follows);
         for point in &mut self.points {
-            let unknown = point.along(Vectors::Newton, values);
+            let unknown = point.along(Newton, values);
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let at_rest = length == 0.0 || found.speed == 0.0;
@@ -202,7 +203,7 @@ impl<const D: usize> Friction<D> {
     pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;
         for point in &mut self.points {
-            let unknown = point.along(Vectors::Newton, values);
+            let unknown = point.along(Newton, values);
             let Tangent { toward, theta, coefficient, .. } = point.tangent;
             let ahead = dot(&toward, &unknown);
             let pressed = coefficient * points[point.at].change / scale;
@@ -216,27 +217,25 @@ impl<const D: usize> Friction<D> {
 
     /// Adds the forces of the last evaluation.
     pub fn add_forces(&self, forces: &mut [f64]) {
-        self.points
-            .iter()
-            .for_each(|point| point.add(Vectors::Newton, point.weight, &point.traction, forces));
+        self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.traction, forces));
     }
 
     /// Adds the change of the forces along the last direction.
     pub fn add_derivative(&self, forces: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(Vectors::Newton, point.weight, &point.change, forces));
+        self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.change, forces));
     }
 
     /// Adds the tractions to nodal values.
     pub fn add_tractions(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(Vectors::Body, 1.0, &point.traction, nodal));
+        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.traction, nodal));
     }
 
     /// Adds the change of the forces with the velocity where points slide, without that of the pressure of vertical graphs.
     pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
-            let pressed = normal.slope * normal.along(Vectors::Newton, direction);
-            point.add(Vectors::Newton, point.weight, &point.sliding_change(direction, pressed), forces);
+            let pressed = normal.slope * normal.along(Newton, direction);
+            point.add(Newton, point.weight, &point.sliding_change(direction, pressed), forces);
         }
     }
 
@@ -246,8 +245,8 @@ impl<const D: usize> Friction<D> {
         for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
             let normal = &points[point.at];
             if normal.theta == 0.0 {
-                let open = normal.along(Vectors::Newton, values);
-                point.add(Vectors::Newton, -point.tangent.coefficient * open, &point.tangent.toward, values);
+                let open = normal.along(Newton, values);
+                point.add(Newton, -point.tangent.coefficient * open, &point.tangent.toward, values);
             }
         }
     }
@@ -266,12 +265,12 @@ impl<const D: usize> Friction<D> {
     pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
         for point in &self.points {
             if point.tangent.sticks {
-                let open = point.along(Vectors::Newton, open);
+                let open = point.along(Newton, open);
                 point.set(&open.map(|force| force / (self.scale * point.weight)), values);
             } else {
                 let normal = &points[point.at];
-                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(Vectors::Newton, values);
-                point.add(Vectors::Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
+                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(Newton, values);
+                point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
             }
         }
     }
@@ -294,7 +293,7 @@ impl<const D: usize> Friction<D> {
 
     /// What happens at each point, at velocities in a vector of Newton's method.
     pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
-        self.sliding(Vectors::Newton, velocity).map(|(point, sliding)| {
+        self.sliding(Newton, velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
                 return Motion::Separated;
             }
@@ -308,12 +307,12 @@ impl<const D: usize> Friction<D> {
     pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
         // Points are ordered by node, at most one a node.
         let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
-        found.map_or([0.0; D], |at| self.points[at].along(Vectors::Body, nodal))
+        found.map_or([0.0; D], |at| self.points[at].along(Body, nodal))
     }
 
     /// Power in W that friction dissipates at these velocities.
     pub fn power(&self, velocity: &[f64]) -> f64 {
-        let sliding = self.sliding(Vectors::Body, velocity);
+        let sliding = self.sliding(Body, velocity);
         sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
     }
 
@@ -327,7 +326,7 @@ impl<const D: usize> Friction<D> {
     pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         // Beside the velocity of the obstacle a slower sliding is rounding.
         let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
-        self.sliding(Vectors::Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
+        self.sliding(Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
             [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })
@@ -347,7 +346,7 @@ impl<const D: usize> Friction<D> {
         let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
         let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
         let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
-            let open = point.along(Vectors::Newton, residual);
+            let open = point.along(Newton, residual);
             let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
@@ -360,26 +359,26 @@ impl<const D: usize> Friction<D> {
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };
-        worst(self.sliding(Vectors::Newton, velocity).map(distance))
+        worst(self.sliding(Newton, velocity).map(distance))
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.
     pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
-        self.points.iter().for_each(|point| point.add(Vectors::Body, 1.0, &point.tangents[0], nodal));
+        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
     }
 
     /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
     pub fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
         for point in &self.points {
-            let along = point.along(Vectors::Body, x);
-            point.add(Vectors::Body, factor * point.weight, &along, forces);
+            let along = point.along(Body, x);
+            point.add(Body, factor * point.weight, &along, forces);
         }
     }
 
     /// `integral of w_tau^2` over the points here.
     pub fn square(&self, nodal: &[f64]) -> f64 {
         let square = |point: &TangentialPoint<D>| {
-            point.weight * point.along(Vectors::Body, nodal).iter().map(|x| x * x).sum::<f64>()
+            point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
         };
         self.points.iter().map(square).sum()
     }

@@ -20,16 +20,15 @@
 //! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
 //! unknown; their law must not have vertical parts.
 
-mod blend;
 mod bounds;
 mod count;
 mod directions;
-mod drift;
 mod energy;
 mod friction;
 mod inclusion;
 mod newton;
 mod point;
+mod prepare;
 mod reference;
 mod sliding;
 mod squares;
@@ -38,14 +37,14 @@ mod tangential_point;
 mod unknowns;
 
 use crate::{
-    contact::{Gap, NodeContext, NormalResponse, Rate},
+    contact::{Gap, NormalResponse},
     error::Result,
     mesh::Mesh,
     session::Session,
     space::surface_points,
 };
 use friction::Friction;
-use point::{Point, Unknown, Vectors, gauss_points};
+use point::{Point, Vectors::Body, gauss_points};
 
 pub use crate::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
@@ -71,8 +70,8 @@ pub struct Contact<const D: usize> {
     derivatives: Derivatives,
 }
 
-/// What the points hold of the derivatives of the laws. Newton's method of PETSc decides when they are taken and used, so that the order
-/// of calls is checked, in debug builds, where they are.
+/// Which derivatives of the laws the points hold. PETSc calls what takes and what uses them, so that the order of calls is checked in
+/// debug builds.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 enum Derivatives {
     /// Nothing yet.
@@ -146,52 +145,11 @@ impl<const D: usize> Contact<D> {
         self.points.iter().map(|point| point.weight).sum()
     }
 
-    /// Adds the normals at the points to nodal values.
-    pub fn add_normals(&self, nodal: &mut [f64]) {
-        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_along(Vectors::Body, point.stretch, nodal);
-        }
-    }
-
-    /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
-    pub fn normal_square(&self, nodal: &[f64]) -> f64 {
-        let points = self.points.iter().filter(|_| !self.needs_ghosts);
-        points.map(|p| p.weight * (p.stretch * p.along(Vectors::Body, nodal)).powi(2)).sum()
-    }
-
-    /// Evaluates the gap and the obstacle's motion for a step of this length to `time`, from the displacement at its start (with
-    /// ghosts).
-    pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
-        if !self.law.depends_on_displacement() {
-            return Ok(());
-        }
-        for point in &mut self.points {
-            let gap_at = |time| self.gap.at(time, &point.place, &point.normal);
-            let (gap, before) = (gap_at(time)?, gap_at(time - length)?);
-            let along = point.normal_component(Vectors::Body, displacement);
-            point.context = NodeContext { penetration: along - gap, step_length: length };
-            point.penetration_before = along - before;
-            point.shift = 0.0;
-            // Without an obstacle at the start of the step, the gap counts as closed there: equal to the displacement.
-            point.growth = if before.is_finite() { gap - before } else { gap - along };
-        }
-        self.set_drift(Rate::euler(time, length))
-    }
-
-    /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
-    pub fn restore_pressures(&mut self, traction: &[f64]) {
-        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
-            point.pressure = point.along(Vectors::Body, traction);
-        }
-        if let Some(friction) = &mut self.friction {
-            friction.restore_pressures(&self.points, traction);
-        }
-    }
-
-    /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given velocities with ghosts: `-sigma_nu` along the free normal, and `-sigma_tau`.
+    /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
+    /// along the free normal, and `-sigma_tau`.
     pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_along(Vectors::Body, point.pressure_at(&self.law, Vectors::Body, velocity), nodal);
+            point.add_along(Body, point.pressure_at(&self.law, Body, velocity), nodal);
         }
         if let Some(friction) = &self.friction {
             friction.add_tractions(nodal);

@@ -83,16 +83,4 @@ impl<const D: usize> Contact<D> {
     pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
         self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
     }
-
-    /// Adds a unit velocity along a tangent at each point with friction to nodal values.
-    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
-        if let Some(friction) = &self.friction {
-            friction.add_unit_sliding(nodal);
-        }
-    }
-
-    /// `integral of w_tau^2` over the points with friction on this rank.
-    pub fn tangential_square(&self, nodal: &[f64]) -> f64 {
-        self.friction.as_ref().map_or(0.0, |friction| friction.square(nodal))
-    }
 }

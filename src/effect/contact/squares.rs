@@ -1,4 +1,4 @@
-//! Sums of squares of velocities at the points of a contact.
+//! Motions of the boundary of a contact, and sums of squares of velocities at its points. Vectors are those of the body.
 
 use super::{Contact, point::Vectors::Body};
 
@@ -13,5 +13,30 @@ impl<const D: usize> Contact<D> {
         if let Some(friction) = &self.friction {
             friction.add_squares(tangential, x, forces);
         }
+    }
+
+    /// Adds the normals at the points to nodal values.
+    pub fn add_normals(&self, nodal: &mut [f64]) {
+        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
+            point.add_along(Body, point.stretch, nodal);
+        }
+    }
+
+    /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
+    pub fn normal_square(&self, nodal: &[f64]) -> f64 {
+        let points = self.points.iter().filter(|_| !self.needs_ghosts);
+        points.map(|p| p.weight * (p.stretch * p.along(Body, nodal)).powi(2)).sum()
+    }
+
+    /// Adds a unit velocity along a tangent at each point with friction to nodal values.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        if let Some(friction) = &self.friction {
+            friction.add_unit_sliding(nodal);
+        }
+    }
+
+    /// `integral of w_tau^2` over the points with friction on this rank.
+    pub fn tangential_square(&self, nodal: &[f64]) -> f64 {
+        self.friction.as_ref().map_or(0.0, |friction| friction.square(nodal))
     }
 }

@@ -1,6 +1,6 @@
 //! The tangential side of a contact point.
 
-use super::point::Vectors;
+use super::point::Vectors::{self, Body, Newton};
 use crate::tensor::{Vector, dot, norm};
 
 /// A length below which a direction is rounding.
@@ -50,7 +50,7 @@ impl<const D: usize> Tangent<D> {
 impl<const D: usize> TangentialPoint<D> {
     /// Its node on this rank.
     pub fn node(&self) -> usize {
-        self.numbers[Vectors::Body as usize]
+        self.numbers[Body as usize]
     }
 
     /// Removes what is not orthogonal to this direction from the tangents.
@@ -91,15 +91,15 @@ impl<const D: usize> TangentialPoint<D> {
 
     /// Replaces the part of a value along the tangents in a vector of Newton's method.
     pub fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
-        let now = self.along(Vectors::Newton, nodal);
+        let now = self.along(Newton, nodal);
         let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
-        self.add(Vectors::Newton, 1.0, &change, nodal);
+        self.add(Newton, 1.0, &change, nodal);
     }
 
     /// Change of the traction at a point that slides, with a change of the velocity, a vector of Newton's method, and of the pressure.
     pub fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
         let Tangent { toward, slopes, coefficient, .. } = self.tangent;
-        let velocity = self.along(Vectors::Newton, direction);
+        let velocity = self.along(Newton, direction);
         let ahead = dot(&toward, &velocity);
         std::array::from_fn(|i| {
             slopes[1] * (velocity[i] - ahead * toward[i])
