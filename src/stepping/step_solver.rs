@@ -296,11 +296,14 @@ impl StepSolver {
                 session.agree(self.factor_in_double(problem, trial))?;
                 continue;
             }
+            if is_relaxed {
+                return Err(self.springs.explain(failure));
+            }
             // The start may be much less than the solution, above all at rest.
             let mut answer = forces.like()?;
             self.precondition(forces, &mut answer)?;
             let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
-            if is_relaxed || !floor.is_finite() || floor <= tolerance {
+            if !floor.is_finite() || floor <= tolerance {
                 return Err(self.springs.explain(failure));
             }
             if !self.is_nonlinear() {

@@ -39,6 +39,7 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         }
         for point in &mut self.points {
+            debug_assert!(point.shift == 0.0, "the point was prepared");
             point.shift = point.normal_component(Body, shift);
             point.context.penetration += point.shift;
             point.context.step_length = blend.length;
