@@ -37,6 +37,14 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     for contact in &mut body.contacts {
         contact.prepare(step.time, step.length, &displacement)?;
     }
+    restore_pressures(body, state)
+}
+
+/// Sets the pressures of all contacts to those of the converged state.
+pub(super) fn restore_pressures<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+) -> Result<()> {
     if let Some(traction) = &state.contact_traction {
         let traction = traction.owned()?;
         body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));

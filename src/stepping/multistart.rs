@@ -1,6 +1,6 @@
 //! A step solved from other start velocities, to see whether it has other solutions.
 
-use super::{StepOutcome, problem::StepProblem, step_solver::StepSolver};
+use super::{StepOutcome, contacts::restore_pressures, problem::StepProblem, step_solver::StepSolver};
 use crate::{
     error::{Error, Result},
     petsc::DistributedVector,
@@ -38,7 +38,7 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
             _ => {}
         }
     }
-    problem.restore_pressures()?;
+    restore_pressures(problem.body, problem.state)?;
     match session.agree(solver.solve(problem, trial)) {
         Ok(outcome) => {
             let solutions = others.len() + usize::from(is_new(&others, trial)?);

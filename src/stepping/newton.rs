@@ -3,6 +3,7 @@
 use super::{
     StepOutcome,
     bounded::Bounded,
+    contacts::restore_pressures,
     equations::{CellForces, ContactEquations, Effort, Scratch, cycle},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
@@ -123,7 +124,7 @@ impl Newton {
             if let Some(why) = attempt.failure {
                 (failure, next) = (why, fallbacks.next());
                 trial.copy_from(&self.start)?;
-                problem.restore_pressures()?;
+                restore_pressures(problem.body, problem.state)?;
                 continue;
             }
             // Where the pressure rose so much that the friction graph folded over its parameter: the same with a larger one.

@@ -41,15 +41,6 @@ pub(super) struct System<'a> {
 }
 
 impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
-    /// Sets the pressures of all contacts to those of the converged state.
-    pub fn restore_pressures(&mut self) -> Result<()> {
-        if let Some(traction) = &self.state.contact_traction {
-            let traction = traction.owned()?;
-            self.body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));
-        }
-        Ok(())
-    }
-
     /// That the step failed, why, and what to do.
     pub fn failed(&self, why: &str, remedy: &str) -> Error {
         let Step { time, length, .. } = self.step;

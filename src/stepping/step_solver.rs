@@ -2,6 +2,7 @@
 
 use super::{
     StepOutcome,
+    contacts::restore_pressures,
     factor_cache::{Cached, FactorCache, Krylov},
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
     problem::{REMEDY, StepProblem, System},
@@ -360,7 +361,7 @@ impl StepSolver {
             self.between.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
         let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
         condensed.start_again(trial)?;
-        problem.restore_pressures()?;
+        restore_pressures(problem.body, problem.state)?;
         condensed.precision = Precision::Double;
         let rows = self.springs.rows(problem.session, problem.body, length)?;
         condensed.prepare(problem.session, problem.body, rows, matrix, problem.forces)?;
