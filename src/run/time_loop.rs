@@ -234,14 +234,13 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
             return;
         }
-        let left = self.seconds_per_step() * (last - step) as f64;
         let line = StepLine {
             step,
             last,
             time: self.state.time,
             outcome,
             imbalance: self.totals.energy_imbalance,
-            left,
+            left: self.seconds_per_step() * (last - step) as f64,
         };
         self.line.clear();
         let written = write!(self.line, "{line}");
@@ -251,8 +250,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     /// Mean seconds per step so far.
     fn seconds_per_step(&self) -> f64 {
-        let taken = self.state.step - self.stepping.1;
-        self.stepping.0.elapsed().as_secs_f64() / taken.max(1) as f64
+        self.stepping.0.elapsed().as_secs_f64() / (self.state.step - self.stepping.1).max(1) as f64
     }
 
     /// Whether a signal, a limit of wall time or `[checkpoint]` requests a stop or a checkpoint now; the same on all ranks. Collective.
@@ -339,34 +337,34 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         error: Option<String>,
         restarted_from: Option<String>,
     ) -> Result<Summary> {
-        let stress = self.body.stress(&self.state)?;
-        let von_mises = stress.iter().map(von_mises).fold(0.0, larger);
         let (session, body, state) = (self.session, &self.body, &self.state);
+        let stress = body.stress(state)?;
+        let von_mises = stress.iter().map(von_mises).fold(0.0, larger);
         let of_fields = self.outputs.figures(Converged { session, body, state, stress: &stress })?;
-        let mesh = &self.body.mesh;
+        let mesh = &body.mesh;
         Ok(Summary {
             status,
             error,
             warnings: Vec::new(),
             version: super::VERSION,
-            petsc_version: self.session.petsc().version()?,
-            ranks: self.session.ranks(),
+            petsc_version: session.petsc().version()?,
+            ranks: session.ranks(),
             dimension: D,
             cells: mesh.total_cells,
             nodes: mesh.total_nodes,
-            unknowns: self.body.unknowns(self.session),
-            effects: self.body.effect_names(),
+            unknowns: body.unknowns(session),
+            effects: body.effect_names(),
             scheme: self.scheme.scheme().name(),
             preconditioner: self.scheme.preconditioner().0.name(),
             factor_precision: self.scheme.factor_precision().map(Precision::name),
-            steps: self.state.step,
-            time: self.state.time,
+            steps: state.step,
+            time: state.time,
             rejected_steps: self.totals.pace.map_or(0, |pace| pace.rejected),
             set_ups: self.scheme.set_ups,
             newton_iterations: self.totals.newton_iterations,
             linear_iterations: self.totals.linear_iterations,
             restarted_from,
-            final_von_mises: self.session.largest([von_mises])[0],
+            final_von_mises: session.largest([von_mises])[0],
             peaks: self.totals.peaks,
             of_fields,
             max_inclusion_residual: self.totals.max_inclusion_residual,
@@ -379,16 +377,16 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             }),
             certificates: self.certificates.clone(),
             wall_seconds: phases::seconds(
-                self.session,
+                session,
                 self.clock,
                 self.setup,
                 &self.scheme.clock,
                 self.outputs.spent,
             ),
-            traffic_bytes: phases::traffic(self.session, &self.scheme.traffic, self.outputs.written()),
-            peak_memory_bytes: self.session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
+            traffic_bytes: phases::traffic(session, &self.scheme.traffic, self.outputs.written()),
+            peak_memory_bytes: session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
-            inventory: Inventory::of(self.session, &self.body, &self.scheme),
+            inventory: Inventory::of(session, body, &self.scheme),
         })
     }
 }
