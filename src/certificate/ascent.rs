@@ -18,13 +18,13 @@ pub(super) trait Quotient {
     /// Weights of the forms in numerator and denominator near a vector on which the forms have these values.
     fn weights(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>);
 
-    /// The number wanted, given the values of the forms; it grows with the quotient.
+    /// The result, given the values of the forms; an increasing function of the quotient.
     fn value(&self, values: &[f64]) -> f64;
 }
 
 /// What an ascent found.
 pub(super) struct Peak {
-    /// The number wanted; approached from below.
+    /// The result, approached from below.
     pub value: f64,
     /// Where it was found.
     pub vector: DistributedVector,
@@ -66,7 +66,7 @@ impl Direction {
 /// When an ascent ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
-    /// Relative change of the number wanted, below which two iterations in turn have to stay.
+    /// Relative change of the result that ends an ascent when two successive iterations stay below it.
     pub tolerance: f64,
     /// Most iterations.
     pub iterations: usize,

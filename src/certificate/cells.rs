@@ -1,4 +1,4 @@
-//! A step that explicit stress leaves stable for certain, from each cell by itself.
+//! A lower bound of the largest stable explicit step, from single cells.
 //!
 //! The forms of `k^2 (E e(w), e(w)) < 4 (M w, w) + 2 k (A e(w), e(w))` are sums over cells: where it holds in every cell, it holds
 //! for the body (Irons and Treharne 1971). In a cell the strain `e` and its trace decide the stresses, and the mass is at least
@@ -6,7 +6,7 @@
 
 use crate::{body::Body, effect::Form, session::Session, space::Simplex};
 
-/// The step in s below which every cell is stable; `None` where springs on the surface, which are no cell's, are explicit too.
+/// The step in s below which every cell is stable; `None` where springs on the surface, which belong to no cell, are explicit, too.
 /// Collective.
 pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
     session: &Session,

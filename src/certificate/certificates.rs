@@ -21,22 +21,22 @@ pub struct Certificates {
     pub unbounded_growth: Option<String>,
     /// `|gamma|^2` of the normal trace in m; null where it is infinite: the supports leave a rigid motion against the contact.
     pub trace_norm_squared: Option<f64>,
-    /// Contact pressure in Pa up to which a step has one solution, if pressures are given, where friction weakens under a
-    /// pressure that no law bounds, with the margin; 0: at none.
+    /// Contact pressure in Pa up to which a step with given pressures has one solution, with the margin, where friction weakens and
+    /// the normal law does not bound the pressure; 0: at no pressure.
     pub slip_pressure_bound: Option<f64>,
     /// Largest stable step in s.
     pub explicit_step_bound: Option<f64>,
-    /// Whether the largest stable step may be longer than that: of a large mesh the bound of its cells is enough, where no step
-    /// is longer.
+    /// Whether `explicit_step_bound` is only a lower bound of the largest stable step: that of the single cells of a large mesh, which
+    /// is enough where no step is longer.
     #[serde(skip)]
     pub explicit_bound_is_least: bool,
-    /// Whether it holds for overstresses up to the yield stress only: there are power laws.
+    /// Whether the bound holds only for overstresses up to the yield stress, as with power laws.
     #[serde(skip)]
     pub explicit_bound_follows_stress: bool,
     /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
     #[serde(skip)]
     pub flowing_step_bound: Option<f64>,
-    /// What `theta` and `theta_step` say nothing of, in words; absent if there is nothing.
+    /// Cases that `theta` and `theta_step` do not cover, in words; absent if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_covered: Vec<String>,
 }

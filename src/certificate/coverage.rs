@@ -1,9 +1,9 @@
-//! What the certificates say nothing of.
+//! Cases that the certificates do not cover.
 
 use super::Certificates;
 use crate::{body::Body, effect::Contact};
 
-/// What depends on contact pressures that are part of the solution, and what may soften at the end of a step.
+/// Sentences on effects that depend on the unknown contact pressures, and on effects that may soften the body at the end of a step.
 pub(super) fn not_covered<const D: usize, const S: usize>(
     body: &Body<D, S>,
     theta_step: Option<f64>,

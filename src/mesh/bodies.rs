@@ -1,4 +1,4 @@
-//! What holds together by facets, across ranks.
+//! Bodies across ranks: cells that are connected through shared facets.
 
 use super::{
     Mesh,
@@ -15,8 +15,8 @@ use crate::{
 impl<const D: usize> Mesh<D> {
     /// The bodies of the whole mesh, numbered by their first cell, and which of them the cells here belong to. Collective.
     ///
-    /// Ranks find what holds together among their own cells and meet over facets at the owner of each facet's first node. What
-    /// all ranks then know is one number for each such piece of a body.
+    /// Each rank finds the connected pieces of its own cells; the owner of a facet's first node finds the pieces that share the facet.
+    /// All ranks then hold one number for each piece.
     pub fn bodies(&self, session: &Session) -> Result<Bodies, Agreed> {
         let topology = session.agree(self.topology())?;
         let Bodies { count, mut of_cell } = topology.bodies();

@@ -1,4 +1,4 @@
-//! One rank's part of a mesh, put together from pieces; and how rank 0 hands pieces of a whole mesh out.
+//! One rank's part of a mesh, assembled from pieces; and the distribution of a whole mesh by rank 0.
 
 use super::{
     Boundary, GlobalMesh, Names, Tags,
@@ -56,7 +56,7 @@ pub struct Mesh<const D: usize> {
     pub boundaries: Vec<Boundary>,
     /// Facets between ranks.
     pub edge_cut: usize,
-    /// Cells of the fullest rank over the average.
+    /// Largest number of cells on a rank over the mean.
     pub imbalance: f64,
     /// Digest of the whole mesh, independent of the partition.
     pub digest: u64,
@@ -114,8 +114,8 @@ impl<const D: usize> Mesh<D> {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Puts the ranks' pieces together, whose nodes are owned by ranks: numbers the nodes, asks owners for the numbers of
-    /// ghosts, and counts what the ranks have together. Collective, with the same outcome on all ranks.
+    /// Assembles the mesh from the ranks' pieces, whose nodes are owned by ranks: numbers the nodes, asks owners for the numbers of
+    /// ghosts, and computes totals. Collective, with the same outcome on all ranks.
     pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self, Agreed> {
         let (rank, ranks, world) = (session.rank(), session.ranks(), session.world());
         let digest = session.total(piece.digest(rank, &names) as usize) as u64;
@@ -181,7 +181,7 @@ impl<const D: usize> Mesh<D> {
         Ok(mesh)
     }
 
-    /// How many facets of the cells here have their other cell on another rank.
+    /// Number of facets between a cell of this rank and one of another rank.
     fn facets_to_others(&self) -> Result<usize> {
         let topology = self.topology()?;
         Ok(topology.facets_without_neighbour() - self.facets.len())

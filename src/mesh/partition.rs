@@ -15,7 +15,7 @@ pub struct Partition {
     pub node_ranks: Vec<u32>,
     /// Facets whose two cells are on different ranks.
     pub edge_cut: usize,
-    /// Cells of the fullest rank over the average.
+    /// Largest number of cells on a rank over the mean.
     pub imbalance: f64,
 }
 
@@ -24,7 +24,7 @@ pub struct Partition {
 pub enum Method {
     /// Into all parts at once.
     KWay,
-    /// In two again and again: consecutive parts lie side by side, so that several of them are a good part, too.
+    /// By recursive bisection: consecutive parts are neighbours, so that several of them together are a good part, too.
     Recursive,
 }
 

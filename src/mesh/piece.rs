@@ -36,7 +36,7 @@ pub struct Piece<const D: usize> {
 }
 
 impl<const D: usize> Piece<D> {
-    /// One piece of several, with what they share once.
+    /// Merges pieces; nodes, cells and facets that several of them have are kept once.
     pub fn merged(pieces: &[Self]) -> Self {
         let mut out = Self::default();
         let (nodes, node_places) = union(pieces, |piece| &piece.node_ids);

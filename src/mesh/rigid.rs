@@ -6,35 +6,35 @@ use crate::tensor::{Vector, add_scaled, cross, dot, norm};
 /// A rigid motion: translation, then rotation about x, y, z through the body's centre, lengths in units of its radius.
 pub(super) type Motion = [f64; 6];
 
-/// A unit row that adds less than this to the span of the others adds nothing.
+/// A unit constraint whose distance to the span of the others is below this counts as dependent on them.
 const INDEPENDENT: f64 = 1e-9;
 
-/// What the bodies of a mesh are held by, and the points that bodies share.
+/// The constraints on the bodies of a mesh, and the points that bodies share.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Skeleton<const D: usize> {
     /// Coordinates in m.
     pub points: Vec<Vector<D>>,
-    /// Components held there, by a body that can't move.
+    /// Components held at each point by a body that can't move.
     pub held: Vec<[bool; D]>,
     /// The bodies, by number.
     pub bodies: Vec<Body<D>>,
 }
 
-/// A body as far as its rigid motions go.
+/// The constraints on the rigid motions of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Body<const D: usize> {
-    /// What holds it, as rows on its motions.
+    /// Linear constraints on its motions.
     pub rows: Vec<Motion>,
-    /// The points at which it touches another body.
+    /// The points that it shares with other bodies.
     pub points: Vec<usize>,
-    /// Its middle, in m.
+    /// Centre of mass in m.
     pub centre: Vector<D>,
-    /// How far it reaches from there, in m.
+    /// Largest distance of its nodes from the centre, in m.
     pub radius: f64,
 }
 
 impl<const D: usize> Skeleton<D> {
-    /// The motions that every body can still do, in words.
+    /// The free motions of each body that can move, in words.
     pub fn free_motions(mut self) -> Vec<String> {
         let mut loose: Vec<usize> = (0..self.bodies.len()).collect();
         loop {

@@ -1,4 +1,4 @@
-//! What the bodies of a mesh are held by, gathered from all ranks.
+//! The constraints on the bodies of a mesh, gathered from all ranks.
 
 use super::{
     Mesh,
@@ -15,12 +15,11 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// The rigid motions each body can still do when `held` components of its nodes are held, and nodes along the directions
-/// `along`, in words: one text for each body that can move, none when every body is held. Collective, with the same words on all
-/// ranks.
+/// The rigid motions that remain free when the components `held` of nodes and the directions `along` at nodes are constrained: one
+/// sentence for each body that can move, none if every body is held. Collective, with the same sentences on all ranks.
 ///
-/// A node held at `x` along a direction is one row on the motion `t + w × (x - c)`; what is orthogonal to all rows is free.
-/// A body that touches a held body in single nodes is held there.
+/// A node at `x` that is held along a direction gives one linear constraint on the motion `t + w × (x - c)`; motions orthogonal to
+/// all constraints are free. A body that shares single nodes with a held body is held at these nodes.
 pub fn free_motions<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
@@ -30,8 +29,8 @@ pub fn free_motions<const D: usize>(
     Ok(skeleton(session, mesh, held, along)?.free_motions())
 }
 
-/// The bodies; for each the rows that span all that its held nodes hold, at most six of every rank, and the points in
-/// which it touches others. Collective, the same on all ranks.
+/// The bodies, each with constraints that span those of its held nodes, at most six from each rank, and the points that it shares
+/// with other bodies. Collective, the same on all ranks.
 fn skeleton<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
@@ -122,7 +121,7 @@ fn frames<const D: usize>(
     Ok(centres.into_iter().zip(radii).map(body).collect())
 }
 
-/// The nodes in which bodies touch: global number, body and place of each, by number. The same on all ranks. Collective.
+/// The nodes that bodies share: global number, body and coordinates of each, ordered by number. Collective, the same on all ranks.
 fn joints<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,

@@ -4,7 +4,7 @@ use super::Tags;
 use super::shape::facet_of;
 use crate::error::{Error, Result};
 
-/// In place of a neighbour: nothing but the outside lies behind this facet.
+/// In place of a neighbour: the facet is on the outer surface.
 pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// The cells behind each facet of each cell.
@@ -23,7 +23,7 @@ pub(super) struct DualGraph {
     pub adjacency: Vec<i32>,
 }
 
-/// The parts of a mesh that hold together by facets.
+/// The parts of a mesh that are connected through shared facets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bodies {
     /// How many there are.

@@ -1,4 +1,4 @@
-//! What applying a preconditioner reads.
+//! Memory traffic of a preconditioner.
 
 use super::{Ksp, check, levels::Level, library::is_set, matrix::bytes_of_a_product, sys};
 use crate::error::Result;
@@ -9,9 +9,9 @@ use std::{
 };
 
 impl Ksp {
-    /// Bytes of this rank that the preconditioner, which must be set up, moves at the least when it is applied once by CG or
-    /// GMRES: V-cycles of multigrid with Chebyshev's smoother, without the coarsest level, or a factor twice. `None`
-    /// for all else.
+    /// Least number of bytes that one application of the preconditioner by CG or GMRES moves on this rank: a V-cycle of multigrid with
+    /// Chebyshev's smoother, without the coarsest level, or two passes over a factor. `None` for other preconditioners. The
+    /// preconditioner must be set up.
     pub fn bytes_applied(&self, ranks: usize) -> Result<Option<u64>> {
         let (pc, mut kind, mut method) = (self.preconditioner()?, ptr::null(), ptr::null());
         // SAFETY: live solver; names and preconditioner are its own.
@@ -36,8 +36,8 @@ fn is_one_of(name: *const c_char, names: &[&CStr]) -> bool {
     !name.is_null() && names.contains(&unsafe { CStr::from_ptr(name) })
 }
 
-/// A V-cycle: on each level but the coarsest the smoother before, which starts from zero, the residual, the smoother behind, and
-/// the way down and up.
+/// Bytes of a V-cycle: on each level but the coarsest the smoother before the coarse correction, which starts from zero, the residual,
+/// the smoother after it, restriction and interpolation.
 fn cycle(pc: sys::PC, copies: &[Level]) -> Result<Option<u64>> {
     let mut levels = 0;
     // SAFETY: a live preconditioner that is multigrid.
@@ -66,7 +66,7 @@ fn cycle(pc: sys::PC, copies: &[Level]) -> Result<Option<u64>> {
     Ok(Some(bytes))
 }
 
-/// A product with a matrix of PETSc's.
+/// Bytes of a product with a matrix of PETSc's.
 fn product(matrix: sys::Mat) -> Result<u64> {
     let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
     let (mut block, mut rows, mut columns) = (1, 0, 0);
@@ -81,7 +81,7 @@ fn product(matrix: sys::Mat) -> Result<u64> {
     Ok(bytes_of_a_product(entries as usize, count(block), [count(rows), count(columns)]))
 }
 
-/// Both halves of a solve with a factor.
+/// Bytes of a forward and a backward substitution with a factor of PETSc's.
 fn factor(pc: sys::PC) -> Result<Option<u64>> {
     let (mut matrix, mut counts) = (ptr::null_mut(), MaybeUninit::<sys::MatInfo>::zeroed());
     // SAFETY: a live factorisation, which owns its matrix.

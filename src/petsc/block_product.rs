@@ -9,19 +9,19 @@ use crate::{
     sparse::{Product, Stored, product},
 };
 
-/// Products with a symmetric matrix of PETSc's, from copies: in blocks of the rows and columns of this rank, entry by entry of the
-/// columns of other ranks.
+/// Products with a symmetric matrix of PETSc's, from a copy of its entries: blocks for the columns of this rank, single entries for
+/// those of other ranks.
 pub(super) struct BlockProduct {
     own: Box<dyn Product>,
     others: Option<Others>,
 }
 
-/// The sizes of blocks that have code.
+/// The sizes of blocks that products are compiled for.
 const SIZES: [sys::PetscInt; 4] = [1, 2, 3, 6];
 
 impl BlockProduct {
-    /// A shell that multiplies as this matrix in compressed rows does, its numbers stored as `T`; `None` on all ranks alike for
-    /// other formats and for blocks of a size that has no code. Collective.
+    /// A shell matrix that multiplies as this matrix in compressed rows does, with entries stored as `T`. `None`, on all ranks alike,
+    /// for other formats and other sizes of blocks. Collective.
     pub fn shell<T: Stored>(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut block = 0;
         // SAFETY: live matrix; PETSc writes a number.

@@ -9,19 +9,19 @@ use crate::{
     sparse::{Transfer, transfer},
 };
 
-/// Interpolation and restriction between two levels, from copies: in single precision of the rows and columns of this rank, in double
-/// precision of the columns of other ranks.
+/// Interpolation and restriction between two levels, from a copy of the entries: in single precision for the columns of this rank, in
+/// double precision for those of other ranks.
 pub(super) struct BlockTransfer {
     own: Box<dyn Transfer>,
     others: Option<Others>,
 }
 
-/// The sizes of blocks that have code.
+/// The sizes of blocks that products are compiled for.
 const SIZES: [[sys::PetscInt; 2]; 4] = [[2, 3], [3, 3], [3, 6], [6, 6]];
 
 impl BlockTransfer {
-    /// A shell that multiplies as this matrix in compressed rows and its transpose do; `None` on all ranks alike for other
-    /// formats and for blocks of a size that has no code. Collective.
+    /// A shell matrix that multiplies as this matrix in compressed rows and its transpose do. `None`, on all ranks alike, for other
+    /// formats and other sizes of blocks. Collective.
     pub fn shell(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut blocks = [0; 2];
         let [rows, columns] = &mut blocks;

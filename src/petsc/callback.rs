@@ -1,4 +1,4 @@
-//! What all callbacks from PETSc share: errors are kept, panics are resumed outside of PETSc.
+//! Callbacks from PETSc: an error is kept and returned, a panic is resumed, after PETSc has returned.
 
 use super::{DistributedVector, sys};
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ use std::{
 /// What a callback returns to make PETSc stop.
 pub(super) const USER_ERROR: sys::PetscErrorCode = sys::PETSC_ERR_USER as sys::PetscErrorCode;
 
-/// The object that callbacks of one solve work on, on the frame of that solve.
+/// The object that the callbacks of a solve work on; it lives on the stack frame of the solve.
 pub(super) struct Callback<'a, T: ?Sized> {
     target: RefCell<&'a mut T>,
     error: RefCell<Option<Error>>,
@@ -25,12 +25,12 @@ impl<'a, T: ?Sized> Callback<'a, T> {
         Self { target: RefCell::new(target), error: RefCell::new(None), panic: Cell::new(None) }
     }
 
-    /// What PETSc hands back to the trampolines; valid while `self` stays where it is.
+    /// The context that PETSc passes to callbacks; valid while `self` is not moved.
     pub fn pointer(&self) -> *mut c_void {
         ptr::from_ref(self).cast_mut().cast()
     }
 
-    /// Runs a callback; the first error and a panic are kept.
+    /// Runs a callback; keeps the first error, or a panic.
     pub fn run(&self, body: impl FnOnce(&mut T) -> Result<()>) -> sys::PetscErrorCode {
         match catch_unwind(AssertUnwindSafe(|| body(&mut self.target.borrow_mut()))) {
             Ok(result) => {
@@ -55,8 +55,8 @@ impl<'a, T: ?Sized> Callback<'a, T> {
     }
 }
 
-/// Runs a callback that changes `y`. From the first error of its solve on, every `y` is filled with NaN on this rank, which norms
-/// carry to all ranks.
+/// Runs a callback that changes `y`. After the first error in a solve every `y` of this rank is filled with NaN, so that the norms
+/// of all ranks become NaN.
 ///
 /// # Safety
 /// `context` is null or the pointer of a [`Callback`] that works on a `T` and stays for the call; `y` is alive.

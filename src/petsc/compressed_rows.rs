@@ -1,4 +1,4 @@
-//! What PETSc's matrices in compressed rows are made of.
+//! The arrays of PETSc's matrices in compressed rows.
 
 use super::{DistributedVector, check, reference::Reference, sys};
 use crate::{
@@ -29,7 +29,7 @@ impl Parts {
         Ok(Some(Self { own, others: Some((others, numbers)) }))
     }
 
-    /// What multiplies with the columns of other ranks of this matrix. Collective.
+    /// Products with the columns of this matrix that belong to other ranks. Collective.
     pub fn others(&self, matrix: sys::Mat) -> Result<Option<Others>> {
         self.others.map(|(columns, numbers)| Others::new(matrix, columns, numbers)).transpose()
     }
@@ -42,7 +42,7 @@ fn is_type(matrix: sys::Mat, name: &CStr) -> Result<bool> {
     Ok(found != 0)
 }
 
-/// Shows the rows of a matrix that is this rank's alone.
+/// Calls a function with the rows of a matrix that is on this rank alone.
 pub(super) fn own_rows<T>(
     matrix: sys::Mat,
     look: impl FnOnce(ScalarRows<'_>) -> Option<T>,
@@ -77,7 +77,7 @@ pub(super) struct Others {
     values: DistributedVector,
 }
 
-/// `y = A x` from the product with this rank's own columns, which is made while the values of the others are on their way. Collective.
+/// `y = A x`: the product with the columns of this rank is computed while the values of the other columns are sent. Collective.
 pub(super) fn multiply(
     others: Option<&Others>,
     own: impl FnOnce(&[f64], &mut [f64]),
@@ -177,7 +177,7 @@ impl Others {
         })
     }
 
-    /// Ends that and adds the product with the columns of other ranks to `y`.
+    /// Receives the values and adds the product with the columns of other ranks to `y`.
     fn end_adding(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: as above.
@@ -188,8 +188,8 @@ impl Others {
         Ok(())
     }
 
-    /// Adds the product of the transposed columns with `x`, laid out like the rows, to the `y` of the ranks that they belong
-    /// to. Collective.
+    /// Adds the product of the transposed columns with `x`, laid out like the rows, to `y` on the ranks that own the columns.
+    /// Collective.
     pub fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         // SAFETY: live vector.
         let mut values = unsafe { DistributedVector::view(self.values.raw.get())? };

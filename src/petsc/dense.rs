@@ -49,7 +49,7 @@ impl DenseCholesky {
     }
 }
 
-/// `L L^T` column after column, for a matrix given in the same way.
+/// `L L^T` of a square matrix `L`; both are given column after column.
 pub fn times_own_transpose(size: usize, columns: &[f64]) -> Result<Vec<f64>> {
     let matrix = sequential(size, columns)?;
     let mut array = ptr::null();

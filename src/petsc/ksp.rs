@@ -8,8 +8,8 @@ use super::{
 use crate::error::Result;
 use std::ptr;
 
-/// Growth of the residual that counts as divergence: that of CG may grow by the root of the matrix' condition number before it falls,
-/// and bodies that contact alone holds have large ones.
+/// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number before it
+/// falls, and the condition number of a body that is held by contact alone is large.
 const DIVERGENCE: f64 = 1e12;
 
 /// A Krylov solver with its preconditioner.
@@ -18,7 +18,7 @@ const DIVERGENCE: f64 = 1e12;
 #[derive(Debug)]
 pub struct Ksp {
     pub(super) raw: Reference<sys::_p_KSP>,
-    /// What the smoothers of multigrid multiply with.
+    /// The matrices that smoothers and transfers of multigrid multiply with.
     pub(super) levels: Vec<Level>,
     applications: u64,
 }
@@ -79,8 +79,8 @@ impl Ksp {
         }
     }
 
-    /// A solver by another method with the same operator and preconditioner, whose options carry this prefix. Its norm
-    /// is that of the preconditioned residual.
+    /// A solver by another method with the same operator and preconditioner, whose options carry this prefix. It tests the norm of
+    /// the preconditioned residual.
     pub(super) fn sharing_preconditioner(&self, prefix: &str, method: &str) -> Result<Self> {
         let other = Self::new(prefix)?;
         let (pc, method) = (self.preconditioner()?, c_string(method)?);
@@ -105,13 +105,13 @@ impl Ksp {
         self.set_matrices(matrix, matrix)
     }
 
-    /// Solves with the first matrix; the second makes the preconditioner, anew if it is another one than before.
+    /// Solves with the first matrix; the preconditioner is made from the second, again if that is not the matrix of before.
     pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.
         check(unsafe { sys::KSPSetOperators(self.raw.get(), matrix.operator(), preconditioned.raw.get()) })
     }
 
-    /// Krylov method by PETSc's name, such as `cg`; its norm is that of the residual itself.
+    /// Sets the Krylov method by PETSc's name, such as `cg`; it tests the norm of the unpreconditioned residual.
     pub fn set_method(&mut self, name: &str) -> Result<()> {
         let name = c_string(name)?;
         // SAFETY: live object; PETSc copies the name.
@@ -121,7 +121,7 @@ impl Ksp {
         }
     }
 
-    /// Preconditioner by PETSc's name, with the package that factors if it is a factorisation.
+    /// Sets the preconditioner by PETSc's name; for a factorisation, with the package that computes it.
     pub fn set_preconditioner(&mut self, name: &str, package: Option<&str>) -> Result<()> {
         let (name, pc) = (c_string(name)?, self.preconditioner()?);
         // SAFETY: live object; PETSc copies the names.
@@ -185,12 +185,13 @@ impl Ksp {
         Ok(outcome)
     }
 
-    /// Counts applications of the preconditioner from here on.
+    /// Restarts the count of applications of the preconditioner.
     pub fn restart_applications(&mut self) {
         self.applications = 0;
     }
 
-    /// Applications of the preconditioner in all solves since then, as CG and GMRES make them: one in each iteration and one at first.
+    /// Applications of the preconditioner since [`Ksp::restart_applications`], for CG and GMRES: one for each iteration and one at the
+    /// start of each solve.
     pub fn applications(&self) -> u64 {
         self.applications
     }

@@ -1,5 +1,5 @@
-//! The levels of PETSc's multigrid multiply with copies of their matrices in single precision: smoothers and interpolations need
-//! no more, and are bound by the memory that they read.
+//! Copies in single precision of the matrices of PETSc's multigrid: the speed of smoothers and interpolations is bounded by memory
+//! bandwidth, and single precision is accurate enough for them.
 
 use super::{
     block_product::BlockProduct, block_transfer::BlockTransfer, check, reference::Reference, shell::Shell,
@@ -16,13 +16,13 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Bytes of this rank that a product of the smoother and one way between levels move, as far as they are not PETSc's own.
+    /// Bytes that a product of the smoother and a restriction or interpolation move on this rank; `None` for matrices of PETSc's own.
     pub fn bytes(&self) -> [Option<u64>; 2] {
         [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
     }
 }
 
-/// Whether a preconditioner is algebraic multigrid of PETSc's that is set up or is to be.
+/// Whether a preconditioner is PETSc's algebraic multigrid.
 fn is_multigrid(pc: sys::PC) -> Result<bool> {
     let mut kind = ptr::null();
     // SAFETY: live object, which owns its name.
@@ -32,8 +32,8 @@ fn is_multigrid(pc: sys::PC) -> Result<bool> {
     }
 }
 
-/// Gives each level of a preconditioner that was set up such copies; nothing for other preconditioners than algebraic multigrid.
-/// The preconditioner must not be applied once the levels are dropped. Collective.
+/// Replaces the matrices of each level of a preconditioner that is set up by copies; an empty list for preconditioners other than
+/// algebraic multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
 pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     let mut levels = Vec::new();
     if !is_multigrid(pc)? {
@@ -66,7 +66,7 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     Ok(levels)
 }
 
-/// Gives PETSc its own interpolations back, from which it makes coarse matrices.
+/// Restores PETSc's own interpolations, from which PETSc computes coarse matrices.
 pub(super) fn give_back(pc: sys::PC, levels: &[Level]) -> Result<()> {
     for (level, number) in levels.iter().zip(1..) {
         if let Some((_, original)) = &level.transfer {

@@ -15,7 +15,7 @@ thread_local! {
     static STARTED: RefCell<Weak<Started>> = const { RefCell::new(Weak::new()) };
 }
 
-/// PETSc, started on this thread; the last one who holds it finalises it, before the MPI universe, which it keeps up.
+/// PETSc, started on this thread. Dropping the last reference finalises PETSc, then MPI.
 pub(super) struct Started {
     _universe: Rc<Universe>,
 }

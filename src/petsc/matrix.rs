@@ -9,7 +9,7 @@ use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
 #[derive(Debug)]
 pub struct Matrix {
     pub(super) raw: Reference<sys::_p_Mat>,
-    /// What multiplies faster.
+    /// A copy with faster products.
     blocks: Option<Rc<Shell>>,
     /// Bytes of this rank that a product moves at the least.
     bytes: u64,
@@ -70,14 +70,14 @@ impl Matrix {
         }
     }
 
-    /// Makes products faster from now on, for as much memory again as half the matrix takes. Collective.
+    /// Makes later products faster with a copy of half the size of the matrix. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
         self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
         self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
         Ok(())
     }
 
-    /// What multiplies with this matrix.
+    /// The matrix that products use.
     pub(super) fn operator(&self) -> sys::Mat {
         self.blocks.as_ref().map_or(self.raw.get(), |shell| shell.raw.get())
     }
@@ -89,22 +89,22 @@ impl Matrix {
         check(unsafe { sys::MatMult(self.operator(), x.raw.get(), result.raw.get()) })
     }
 
-    /// Counts products from here on.
+    /// Restarts the count of products.
     pub fn restart_products(&self) {
         self.products.set(0);
     }
 
-    /// Bytes that [`Matrix::multiply`] moved on this rank since then, at the least.
+    /// Least number of bytes that [`Matrix::multiply`] moved on this rank since [`Matrix::restart_products`].
     pub fn product_bytes(&self) -> u64 {
         self.products.get() * self.bytes
     }
 
-    /// The same for one product.
+    /// Least number of bytes that one product moves on this rank.
     pub fn bytes_of_a_product(&self) -> u64 {
         self.bytes
     }
 
-    /// The largest sum of a row's entries without signs, over all ranks. Collective.
+    /// The largest sum of the absolute values of a row's entries, over all ranks. Collective.
     pub fn norm(&self) -> Result<f64> {
         let mut norm = 0.0;
         // SAFETY: live matrix and a live number.

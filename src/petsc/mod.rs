@@ -103,7 +103,7 @@ pub const HAS_HYPRE: bool = cfg!(petsc_hypre);
 /// Whether PETSc was built with MUMPS.
 pub const HAS_MUMPS: bool = cfg!(petsc_mumps);
 
-/// Refuses what needs a part that PETSc was built without.
+/// Refuses `what` if PETSc was built without the `part` that it needs.
 pub fn require(there: bool, what: &str, part: &str, remedy: &str) -> Result<()> {
     let words =
         || Error::Refused(format!("{what} needs {part}, which this PETSc was built without: {remedy}"));

@@ -14,11 +14,11 @@ use std::ptr;
 
 /// A Krylov solver on a subspace that changes from solve to solve, preconditioned by a constant matrix.
 ///
-/// To PETSc the operator is a shell matrix whose null space is the complement of the subspace: it projects every result
-/// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] takes the preconditioner of the constant
-/// matrix, or one made for its own subspace if that lacks 16 directions or more. From then on it is made anew only
-/// when a solve has not converged in as many iterations as that is worth ([`ProjectedKsp::set_refresh_threshold`]), and the solve
-/// goes on from where it was.
+/// PETSc sees the operator as a shell matrix whose null space is the complement of the subspace, and so projects every result
+/// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] uses the preconditioner of the constant
+/// matrix or, if the dimension of the complement is [`MISSING_DIRECTIONS`] or more, one made for the subspace. In later solves the
+/// preconditioner is made again only if a solve has not converged within the iterations that this is worth
+/// ([`ProjectedKsp::set_refresh_threshold`]); the solve then continues from its last iterate.
 #[derive(Debug)]
 pub struct ProjectedKsp {
     ksp: Ksp,
@@ -46,8 +46,8 @@ const INDEFINITE: [i32; 2] = [-8, -10];
 /// PETSc's reason for a solve that has used up its iterations.
 const TOO_MANY: i32 = -3;
 
-/// Directions that a subspace lacks, from which on a preconditioner is made for it alone: below, that of the whole space needs as
-/// many more iterations at most.
+/// Dimension of the complement of a subspace from which on a preconditioner is made for the subspace. With a smaller complement the
+/// preconditioner of the whole space needs at most as many more iterations as the complement has dimensions.
 pub const MISSING_DIRECTIONS: f64 = 16.0;
 
 /// A solve of no iterations.
@@ -81,20 +81,20 @@ impl ProjectedKsp {
         &mut self.ksp
     }
 
-    /// Counts applications of the preconditioner from here on.
+    /// Restarts the count of applications of the preconditioner.
     pub fn restart_applications(&mut self) {
         self.ksp.restart_applications();
         self.fallback.iter_mut().for_each(Ksp::restart_applications);
     }
 
-    /// Those of all solves since then, by both methods.
+    /// Applications of the preconditioner since then, by CG and by GMRES.
     pub fn applications(&self) -> u64 {
         self.ksp.applications() + self.fallback.as_ref().map_or(0, Ksp::applications)
     }
 
-    /// Stops at `relative * |r|` or at `absolute`, whichever is larger, or after this many iterations. `r` is the
-    /// smallest right-hand side of all solves from here on: what Newton's method gained is not put at risk when the
-    /// residual grows for a while.
+    /// Stops at a residual norm of `relative * |r|` or `absolute`, whichever is larger, or after this many iterations. `r` is the
+    /// smallest right-hand side of all solves from here on, so that the accuracy which Newton's method has reached is kept
+    /// when its residual grows temporarily.
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         self.tolerances = (relative, absolute, iterations);
         self.smallest = f64::INFINITY;
@@ -102,7 +102,7 @@ impl ProjectedKsp {
         Ok(())
     }
 
-    /// Iterations with the preconditioner of another subspace after which it is made for the subspace in use.
+    /// Sets the number of iterations with the preconditioner of another subspace after which one is made for the current subspace.
     pub fn set_refresh_threshold(&mut self, iterations: usize) {
         self.refresh_threshold = iterations;
     }
@@ -117,7 +117,7 @@ impl ProjectedKsp {
         self.precondition_with(constant.raw.get())
     }
 
-    /// Takes the operator's own preconditioner from now on.
+    /// Uses the operator's own preconditioner in later solves.
     pub fn precondition_by_operator(&mut self) -> Result<()> {
         self.ksp.set_preconditioner("shell", None)?;
         self.own = self.ksp.preconditioner()?;
@@ -139,7 +139,7 @@ impl ProjectedKsp {
         self.ksp.set_up()
     }
 
-    /// Takes in the subspace in use; says whether the preconditioner is that of another, and whether it was made anew for
+    /// Reads the current subspace; returns whether the preconditioner belongs to another subspace, and whether it was made again for
     /// this one. Collective.
     fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<[bool; 2]> {
         let Some(constant) = &self.constant else { return Ok([false; 2]) };
@@ -182,7 +182,7 @@ impl ProjectedKsp {
         })
     }
 
-    /// The same with a `P B` that is not symmetric, by GMRES.
+    /// As [`ProjectedKsp::solve`] for a `P B` that is not symmetric, by GMRES.
     pub fn solve_unsymmetric(
         &mut self,
         operator: &mut dyn ProjectedOperator,
@@ -194,7 +194,8 @@ impl ProjectedKsp {
         })
     }
 
-    /// The same with a symmetric and positive definite `P B`, down to the absolute tolerance, with the preconditioner in use.
+    /// As [`ProjectedKsp::solve`] for a symmetric positive definite `P B`, to the absolute tolerance and with the present
+    /// preconditioner.
     pub fn solve_accurately(
         &mut self,
         operator: &mut dyn ProjectedOperator,
@@ -208,7 +209,7 @@ impl ProjectedKsp {
         })
     }
 
-    /// Runs a solve on a subspace that is looked at first; the solve is told whether the preconditioner is that of another.
+    /// Reads the subspace, then runs a solve, which is told whether the preconditioner belongs to another subspace.
     fn looking_at(
         &mut self,
         operator: &mut dyn ProjectedOperator,
@@ -220,7 +221,7 @@ impl ProjectedKsp {
         Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }
 
-    /// Runs a solve with this operator behind the shell matrix.
+    /// Runs a solve with this operator as the context of the shell matrix.
     fn attached<T>(
         &mut self,
         operator: &mut dyn ProjectedOperator,

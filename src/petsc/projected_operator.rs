@@ -15,7 +15,7 @@ pub trait ProjectedOperator {
     /// `x = P x`: the orthogonal projection on the subspace, node by node.
     fn project(&mut self, x: &mut DistributedVector) -> Result<()>;
 
-    /// Whether the subspace may be less than the whole space.
+    /// Whether the subspace may be a proper one.
     fn may_project(&self) -> bool {
         true
     }

@@ -7,8 +7,8 @@ use std::{
 
 /// `P K P + k (I - P)`: a constant matrix on a subspace, with a number of its own size on the complement.
 ///
-/// `P` acts on each node by itself. The stored entries are those of `K`, so that what was set up for the one (an
-/// ordering, an interpolation) serves the other.
+/// `P` acts on each node separately. The pattern of stored entries is that of `K`, so that an ordering or an interpolation that was
+/// set up for one matrix serves the other.
 #[derive(Debug)]
 pub(super) struct ReducedMatrix {
     pub raw: Reference<sys::_p_Mat>,
@@ -59,7 +59,7 @@ impl ReducedMatrix {
         Ok(Self { raw, block, ghosts, columns, directions: directions.round(), made_for })
     }
 
-    /// Takes in the projection in use; says whether the matrix was made for another. Collective.
+    /// Reads the current projection; returns whether the matrix was made for another one. Collective.
     pub fn look(&mut self, mut project: impl FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut changed = false;
         for (i, column) in self.columns.iter_mut().enumerate() {
@@ -70,7 +70,7 @@ impl ReducedMatrix {
         Ok(changed)
     }
 
-    /// Takes the matrix to be made for no projection.
+    /// Forgets the projection that the matrix was made for.
     pub fn forget(&mut self) -> Result<()> {
         for (i, made) in self.made_for.iter_mut().enumerate() {
             write_unit(made, i, self.block)?;
@@ -78,7 +78,7 @@ impl ReducedMatrix {
         Ok(())
     }
 
-    /// How many directions the projection that was last looked at removes. Collective.
+    /// Dimension of the complement of the projection that was last read. Collective.
     pub fn removed(&self) -> Result<f64> {
         let mut left = 0.0;
         for column in &self.columns {
@@ -87,7 +87,7 @@ impl ReducedMatrix {
         Ok((self.directions - left).round())
     }
 
-    /// Makes the matrix for the projection that was last looked at. Collective.
+    /// Makes the matrix for the projection that was last read. Collective.
     pub fn make(&mut self, constant: &Matrix) -> Result<()> {
         for (made, column) in self.made_for.iter_mut().zip(&self.columns) {
             made.copy_from(column)?;
@@ -145,7 +145,7 @@ impl ReducedMatrix {
         }
     }
 
-    /// Puts a block at a place where one is stored.
+    /// Overwrites a stored block.
     fn insert(&self, row: usize, column: usize, values: &[f64]) -> Result<()> {
         let scalars = |node: usize| -> Result<Vec<sys::PetscInt>> {
             (0..self.block).map(|i| index(node * self.block + i, "global unknown")).collect()

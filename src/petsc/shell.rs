@@ -4,7 +4,7 @@ use super::{
 use crate::error::{Error, Result};
 use std::{ffi::c_void, fmt, ptr};
 
-/// What stands behind a shell matrix.
+/// The products of a shell matrix.
 pub(super) trait Action {
     /// `y = A x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
@@ -18,7 +18,7 @@ pub(super) trait Action {
     fn bytes(&self) -> u64;
 }
 
-/// A matrix of PETSc's that is known by its products.
+/// A shell matrix of PETSc's, which is given by its products.
 pub(super) struct Shell {
     pub raw: Reference<sys::_p_Mat>,
     action: Box<Box<dyn Action>>,

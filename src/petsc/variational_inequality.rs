@@ -9,7 +9,7 @@ use super::{
 use crate::error::Result;
 use std::{ffi::c_void, ptr};
 
-/// An entry without a bound, with the sign of the side that is open: PETSc knows infinity by this number alone.
+/// PETSc's infinity: the upper bound of an entry without one; its negative is the lower bound.
 pub const UNBOUNDED: f64 = f64::MAX / 4.0;
 
 /// PETSc's reduced-space active set method (`vinewtonrsls`) for a symmetric linear system with bounds:
@@ -91,7 +91,7 @@ impl BoundedSnes {
         NonlinearOutcome::of(raw)
     }
 
-    /// `K x - b` at the end of the last solve: what the bounds bear.
+    /// `K x - b` at the end of the last solve: the reactions of the bounds.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
     }
@@ -112,7 +112,7 @@ unsafe extern "C" fn residual(
     }
 }
 
-/// The matrix is what it is.
+/// The Jacobian is constant.
 unsafe extern "C" fn constant(
     _: sys::SNES,
     _: sys::Vec,

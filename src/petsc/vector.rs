@@ -163,7 +163,7 @@ pub type LocalRead<'v> = Local<'v, false>;
 /// Values of a vector on this rank, borrowed for writing.
 pub type LocalWrite<'v> = Local<'v, true>;
 
-/// Values of a vector on this rank, given back on drop.
+/// Values of a vector on this rank; dropping the guard returns them to PETSc.
 #[derive(Debug)]
 pub struct Local<'v, const WRITABLE: bool> {
     raw: sys::Vec,

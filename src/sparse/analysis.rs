@@ -36,17 +36,17 @@ impl<'a> Supernodes<'a> {
         self.columns[node] as usize..self.columns[node + 1] as usize
     }
 
-    /// The rows of a supernode, its own columns first.
+    /// The rows of a supernode; the first ones are those of its own columns.
     pub fn rows(self, node: usize) -> &'a [sys::PetscInt] {
         &self.rows[self.rows_at[node] as usize..self.rows_at[node + 1] as usize]
     }
 
-    /// Where its numbers are, column after column, each with all of the rows.
+    /// Positions of the values of a supernode: column after column, each with all rows of the supernode.
     pub fn panel(self, node: usize) -> Range<usize> {
         self.values_at[node] as usize..self.values_at[node + 1] as usize
     }
 
-    /// Entries of the factor, without those above the diagonal in the panels, and rows of all supernodes.
+    /// Number of entries of the factor, without those above the diagonal in the panels, and sum of the rows of all supernodes.
     pub fn counts(self) -> [u64; 2] {
         let mut counts = [0; 2];
         for node in 0..self.len() {
@@ -58,18 +58,18 @@ impl<'a> Supernodes<'a> {
     }
 }
 
-/// Whether each of these is below `size` and there once.
+/// Whether these unknowns are distinct and below `size`.
 fn is_choice(mut unknowns: impl Iterator<Item = usize>, size: usize) -> bool {
     let mut seen = vec![false; size];
     unknowns.all(|unknown| unknown < size && !std::mem::replace(&mut seen[unknown], true))
 }
 
-/// Nodes from which on nested dissection leaves less to factor than minimum degree.
+/// Number of nodes from which on nested dissection gives less fill than minimum degree.
 const DISSECTED: usize = 2_000;
 
 impl Analysis {
-    /// Analyses the matrix of these block rows, given by its lower half, in a known order or in one with these unknowns last.
-    /// `None` where they can't be: the rest does not tie them together.
+    /// Analyses the matrix of these block rows, given by its lower half, in a known order of elimination or in one with these
+    /// unknowns last. `None` where CHOLMOD moves them: the other unknowns do not couple them.
     pub fn new(
         block: usize,
         rows: &BlockRows,
@@ -124,7 +124,7 @@ impl Analysis {
         Ok(tail.iter().all(|&unknown| is_last[unknown as usize]).then_some(analysis))
     }
 
-    /// Nodes in an order that leaves little to factor.
+    /// The nodes in an order that reduces fill.
     fn node_order(&mut self, block: usize, rows: &BlockRows) -> Result<Vec<sys::PetscInt>> {
         let nodes = rows.offsets.len() - 1;
         let (mut starts, mut indices) = (vec![0], Vec::new());

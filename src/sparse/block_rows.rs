@@ -30,8 +30,8 @@ pub struct BlockRows {
 }
 
 impl BlockRows {
-    /// Fails unless these are rows of a matrix of so many block columns that PETSc can count. Ranks have to agree on the outcome
-    /// before they make a matrix.
+    /// Fails unless these are rows of a matrix with this number of block columns, and of a size that PETSc's indices can count. Ranks
+    /// have to agree on the outcome before they make a matrix.
     pub fn check(&self, block: usize, block_columns: usize) -> Result<()> {
         index(block_columns * block, "unknowns")?;
         index(self.columns.len() * block * block, "matrix entries of a rank")?;

@@ -5,10 +5,11 @@ use super::{
 use crate::error::{Error, Result};
 
 /// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last: by CHOLMOD, or
-/// in single precision on its analysis.
+/// in single precision after CHOLMOD's symbolic analysis.
 ///
-/// A solve comes in two halves, [`forward`](Self::forward) and [`backward`](Self::backward); in between stands what is left
-/// for the last unknowns, and may be replaced. PETSc's own interface to CHOLMOD knows neither halves nor orders.
+/// A solve is a [`forward`](Self::forward) and a [`backward`](Self::backward) substitution; between them the part of the vector that
+/// belongs to the last unknowns can be read and replaced. PETSc's own interface to CHOLMOD offers neither separate substitutions
+/// nor a given order of elimination.
 #[derive(Debug)]
 pub struct Cholesky {
     analysis: Analysis,
@@ -22,7 +23,7 @@ enum Numbers {
     Single(SingleFactor),
 }
 
-/// The numbers of a factor.
+/// Precision of the entries of a factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// Of 32 bits.
@@ -42,8 +43,9 @@ impl Precision {
 }
 
 impl Cholesky {
-    /// Factors the whole matrix of these block rows, in a known order or in one with these unknowns last; in double precision
-    /// also where it is not positive definite in single. `None` where they can't be last: the rest does not tie them together.
+    /// Factors the whole matrix of these block rows, in a known order of elimination or in one with these unknowns last. Where the
+    /// matrix is not positive definite in single precision the factor is in double precision. `None` where the unknowns can't all be
+    /// last: the other unknowns do not couple them.
     pub fn new(
         block: usize,
         rows: &BlockRows,
@@ -74,7 +76,7 @@ impl Cholesky {
         }
     }
 
-    /// Takes a right-hand side half through: `L y = b`.
+    /// Forward substitution: solves `L y = b`.
     pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
         self.fits(right_hand_side)?;
         match &mut self.numbers {
@@ -105,7 +107,7 @@ impl Cholesky {
         &self.order()[self.order().len() - self.last..]
     }
 
-    /// Takes `y` the other half of the way: `L^T x = y`.
+    /// Backward substitution: solves `L^T x = y`.
     pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
         self.fits(solution)?;
         match &mut self.numbers {
@@ -124,7 +126,7 @@ impl Cholesky {
         Err(Error::Internal(format!("{} values for a factor of {} rows", values.len(), self.order().len())))
     }
 
-    /// Bytes that half a solve reads at the least: the entries of the factor, and the rows of each of its supernodes once.
+    /// Least number of bytes that one substitution reads: the entries of the factor, and the row indices of each supernode once.
     pub fn bytes(&self) -> u64 {
         let [entries, rows] = self.analysis.supernodes().counts();
         let number = match self.precision() {
@@ -134,8 +136,8 @@ impl Cholesky {
         number as u64 * entries + size_of::<super::sys::PetscInt>() as u64 * rows
     }
 
-    /// The block of `L` of the last unknowns, whose product with its transpose is their Schur complement: column after
-    /// column, each from its diagonal down.
+    /// The diagonal block `L_c` of the last unknowns, whose product `L_c L_c^T` is their Schur complement: column after column, each
+    /// from the diagonal down.
     pub fn last_factor(&self) -> Vec<f64> {
         let (size, last) = (self.order().len(), self.last);
         let first = size - last;

@@ -2,7 +2,7 @@ use super::{analysis::Analysis, cholmod, large_pages, sys};
 use crate::error::{Error, Result};
 use std::{ffi::c_int, ptr};
 
-/// The vectors of solves with CHOLMOD's own factor, in double precision.
+/// The vectors of a solve with CHOLMOD's own factor, in double precision.
 #[derive(Debug)]
 pub(super) struct DoubleFactor {
     given: *mut sys::cholmod_dense,
@@ -37,7 +37,7 @@ impl DoubleFactor {
         Ok(Self { given, halfway: ptr::null_mut(), work: [ptr::null_mut(); 2] })
     }
 
-    /// The numbers of the factor.
+    /// The values of the factor.
     pub fn values(analysis: &Analysis) -> &[f64] {
         // SAFETY: CHOLMOD has allocated so many numbers there.
         unsafe {
@@ -55,7 +55,7 @@ impl DoubleFactor {
         self.half(analysis, sys::CHOLMOD_L as c_int, true)
     }
 
-    /// The numbers from this place on that a solve has half through.
+    /// The result of the forward substitution from position `first` on.
     pub fn tail_mut(&mut self, analysis: &Analysis, first: usize) -> &mut [f64] {
         if self.halfway.is_null() {
             return &mut [];
@@ -97,7 +97,7 @@ impl DoubleFactor {
         analysis.check()
     }
 
-    /// Gives the vectors back.
+    /// Frees the vectors.
     pub fn free(&mut self, common: &mut sys::cholmod_common) {
         for dense in self.work.iter_mut().chain([&mut self.given, &mut self.halfway]) {
             // SAFETY: the handle owns it; CHOLMOD takes null pointers and leaves one.

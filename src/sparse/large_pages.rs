@@ -1,4 +1,5 @@
-//! Large pages for factors: a solve reads all of a factor, and with pages of 4 KiB a good part of its time goes into finding them.
+//! Large pages for factors: a solve reads the whole factor, and with pages of 4 KiB much of its time is spent on address
+//! translation.
 
 use super::sys;
 use std::ffi::c_int;
@@ -8,7 +9,7 @@ const PAGE: usize = 1 << 21;
 /// Linux 6.1's advice to make large pages now; older headers don't have it.
 const MADV_COLLAPSE: c_int = 25;
 
-/// Puts these numbers on large pages, where the system has any to give.
+/// Advises the system to put these values on large pages.
 pub(super) fn put<T>(values: &[T]) {
     let range = values.as_ptr_range();
     let first = range.start.addr().next_multiple_of(PAGE);

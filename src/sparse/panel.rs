@@ -4,11 +4,11 @@
 
 use multiversion::multiversion;
 
-/// Numbers that are added up side by side.
+/// Number of partial sums.
 const LANES: usize = 16;
 
-/// Solves with the triangle: `values` holds the right-hand side of its rows, and takes the solution; from the others it takes
-/// the product of the rectangle with the solution off.
+/// Solves with the triangle: the first entries of `values` hold the right-hand side and receive the solution; the product of the
+/// rectangle with the solution is subtracted from the others.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn forward(panel: &[f32], columns: usize, values: &mut [f32]) {
     let rows = values.len();
@@ -20,8 +20,7 @@ pub(super) fn forward(panel: &[f32], columns: usize, values: &mut [f32]) {
     }
 }
 
-/// Solves with the transpose of the triangle, after the product of the rectangle's transpose with the values of its rows was
-/// taken off.
+/// Subtracts the product of the transposed rectangle with the values of its rows, then solves with the transpose of the triangle.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn backward(panel: &[f32], columns: usize, values: &mut [f32]) {
     let rows = values.len();

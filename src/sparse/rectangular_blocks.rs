@@ -15,7 +15,7 @@ pub(crate) trait Transfer {
     fn bytes(&self) -> u64;
 }
 
-/// The matrix of these rows in blocks of so many rows and columns; `None` for sizes that have no code.
+/// The matrix of these rows in blocks of this many rows and columns; `None` for sizes that products are not compiled for.
 pub(crate) fn transfer(blocks: [usize; 2], rows: ScalarRows<'_>) -> Option<Box<dyn Transfer>> {
     if !(rows.starts.len() - 1).is_multiple_of(blocks[0].max(1)) {
         return None;

@@ -3,7 +3,7 @@
 use super::sys;
 use std::ffi::{c_char, c_int};
 
-/// Replaces a panel of so many columns by its factor; `None` where its triangle is not positive definite.
+/// Replaces a panel of this many columns by its factor; `None` where its triangle is not positive definite.
 pub(super) fn factor(panel: &mut [f32], columns: usize) -> Option<()> {
     let rows = panel.len() / columns;
     assert!(panel.len() == rows * columns && columns <= rows);

@@ -5,21 +5,21 @@ use super::{
     panel, single_blas, sys,
 };
 
-/// A supernodal factor in single precision: half the memory, and half of it to read in a solve.
+/// A supernodal factor in single precision, with half the memory and half the traffic of one in double precision.
 ///
 /// The matrix is scaled to a diagonal near one, by powers of two: `L` here is that of `s K s`.
 #[derive(Debug)]
 pub(super) struct SingleFactor {
-    /// Panel after panel, as CHOLMOD lays them out.
+    /// The panels one after the other, in CHOLMOD's layout.
     pub values: Vec<f32>,
-    /// `s` of the unknown at each place.
+    /// The scale `s` of the unknown at each position of the order of elimination.
     pub scales: Vec<f64>,
     /// Right-hand side, half a solution or solution, over `size`, place by place.
     vector: Vec<f32>,
     size: f64,
     /// Values in the rows of a supernode.
     values_there: Vec<f32>,
-    /// The last unknowns half through, as they are without scales.
+    /// The result of the forward substitution for the last unknowns, unscaled.
     pub last: Vec<f64>,
 }
 
@@ -136,12 +136,12 @@ impl Columns {
     }
 }
 
-/// Supernodes in lists: each waits for the next one that it changes.
+/// Linked lists of supernodes: each is in the list of the next supernode that it updates.
 struct Waiting {
-    /// The first one that waits for each supernode, and the next one after each.
+    /// Head of each supernode's list, and the successor of each supernode in its list.
     first: Vec<u32>,
     next: Vec<u32>,
-    /// The first of its rows that has not had its turn.
+    /// For each supernode the first of its rows that has not been used for an update.
     row: Vec<usize>,
     /// The supernode of each column.
     of_column: Vec<u32>,
@@ -155,7 +155,7 @@ impl Waiting {
         Self { first: none.clone(), next: none, row: vec![0; nodes.len()], of_column }
     }
 
-    /// Lets a supernode wait for that of this row.
+    /// Puts a supernode into the list of the one that owns this row.
     fn put(&mut self, node: usize, rows: &[sys::PetscInt], row: usize) {
         self.row[node] = row;
         if let Some(&at) = rows.get(row) {
@@ -165,7 +165,7 @@ impl Waiting {
         }
     }
 
-    /// Takes one that waits for this supernode.
+    /// Removes and returns the first of a supernode's list.
     fn take(&mut self, target: usize) -> Option<usize> {
         let node = self.first[target];
         (node != NONE).then(|| {
@@ -175,8 +175,8 @@ impl Waiting {
     }
 }
 
-/// The left-looking supernodal factorisation (Ng and Peyton 1993): each supernode takes what earlier ones change in it, and
-/// is then factored as a dense matrix.
+/// The left-looking supernodal factorisation (Ng and Peyton 1993): each supernode receives the updates of earlier ones, and is then
+/// factored as a dense matrix.
 fn factor(nodes: Supernodes<'_>, columns: &Columns, values: &mut [f32]) -> Option<()> {
     let mut waiting = Waiting::new(nodes);
     let mut line = vec![0u32; waiting.of_column.len()];

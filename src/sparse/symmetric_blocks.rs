@@ -1,11 +1,11 @@
-//! Symmetric matrices of small dense blocks, of which the lower half is kept: a product reads half the numbers, and one column
-//! number for a whole block.
+//! Symmetric matrices of small dense blocks whose lower half is stored: a product reads half the entries, and one column index for
+//! each block.
 
 use super::sys;
 use crate::tensor::larger;
 use std::array;
 
-/// How a number is stored; products are summed in double precision.
+/// The type in which entries are stored; products are summed in double precision.
 pub(crate) trait Stored: Copy + Default + Into<f64> + 'static {
     fn round(value: f64) -> Self;
 }
@@ -49,8 +49,8 @@ pub(crate) trait Product {
     fn bytes(&self) -> u64;
 }
 
-/// The matrix whose lower half these rows have, in blocks of this size, numbers stored as `T`. `None` for blocks of a size that
-/// has no code, and for rows that are no whole number of blocks.
+/// The symmetric matrix of these rows in blocks of this size, with entries stored as `T`. `None` for sizes that products are not
+/// compiled for, and where the number of rows is no multiple of the size.
 pub(crate) fn product<T: Stored>(block: usize, rows: ScalarRows<'_>) -> Option<Box<dyn Product>> {
     if !(rows.starts.len() - 1).is_multiple_of(block.max(1)) {
         return None;
@@ -70,7 +70,7 @@ struct SymmetricBlocks<const B: usize, T> {
     columns: Vec<u32>,
     /// Column after column.
     blocks: Vec<[[T; B]; B]>,
-    /// What the stored numbers are multiples of.
+    /// The unit of the stored entries.
     unit: f64,
 }
 

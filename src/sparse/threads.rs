@@ -1,5 +1,5 @@
-//! Threads of OpenBLAS. Its products are small here: two threads spend more on waiting for each other than they gain, and ranks
-//! that share a machine would fight for its cores.
+//! Threads of OpenBLAS. Dense products are small here, so that threads cost more in synchronisation than they gain, and ranks on
+//! one machine would compete for its cores.
 
 use super::sys;
 use std::{
@@ -17,7 +17,7 @@ pub(crate) fn one_unless_chosen() {
     }
 }
 
-/// Where the BLAS in use is OpenBLAS.
+/// Sets the number of threads if the BLAS is OpenBLAS.
 fn set(threads: c_int) {
     if let Some(function) = find(c"openblas_set_num_threads") {
         // SAFETY: OpenBLAS has this function of one integer.
