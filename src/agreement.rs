@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// Time that a rank with a fault of a library gives the others to come to the agreement that ends the run.
+/// Time for which a rank with a fault of a library waits until the other ranks reach the agreement that ends the run.
 const GRACE: Duration = Duration::from_secs(10);
 
 /// A failure that all ranks share: the same kind, rank and words on each of them, so that what a run does next may depend on it.
@@ -33,8 +33,7 @@ impl Agreed {
         self.rank
     }
 
-    /// Whether the run failed at what it was doing, so that another way may succeed; not so where the job is refused or a library has
-    /// a fault.
+    /// Whether the computation failed, so that another method may succeed; false where the job is refused or a library has a fault.
     pub fn is_failure(&self) -> bool {
         self.exit == Exit::Failed
     }

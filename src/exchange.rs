@@ -1,4 +1,4 @@
-//! Messages between ranks whose sizes only the sender knows.
+//! Messages between ranks whose lengths only the sender knows.
 
 use crate::{
     agreement::{Agreed, agree},
@@ -55,7 +55,7 @@ pub fn gather<T: Equivalence + Copy + Default>(
     Ok(all)
 }
 
-/// Gathers lists whose lengths stay the same, again and again.
+/// Repeated gathering of lists of constant length.
 #[derive(Debug)]
 pub struct Gathering {
     counts: Vec<Count>,
@@ -63,7 +63,7 @@ pub struct Gathering {
 }
 
 impl Gathering {
-    /// For so many numbers from this rank. Collective, with the same outcome on all ranks.
+    /// Prepares gathering of this many numbers from this rank. Collective, with the same outcome on all ranks.
     pub fn new(communicator: &SimpleCommunicator, count: usize) -> Result<Self, Agreed> {
         let mut counts = vec![0_u64; communicator.size() as usize];
         communicator.all_gather_into(&(count as u64), &mut counts[..]);
@@ -72,7 +72,7 @@ impl Gathering {
         Ok(Self { counts, starts })
     }
 
-    /// How many numbers all ranks have.
+    /// Number of values of all ranks.
     pub fn total(&self) -> usize {
         self.counts.iter().map(|&count| count as usize).sum()
     }

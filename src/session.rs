@@ -20,14 +20,14 @@ use std::{
     },
 };
 
-/// MPI, initialised; finalised once this and everything of PETSc are dropped.
+/// MPI, initialised. It is finalised when this value and all handles of PETSc are dropped.
 pub struct Mpi {
     universe: Rc<Universe>,
 }
 
 impl Mpi {
-    /// Initialises MPI and makes a panic on any rank end the whole run with exit code 4, so that no rank waits for
-    /// one that is gone.
+    /// Initialises MPI, and installs a panic hook that ends the run on all ranks with exit code 4, so that no rank waits for one that
+    /// has ended.
     pub fn start() -> Result<Self> {
         let (universe, _) = mpi::initialize_with_threading(Threading::Funneled)
             .ok_or_else(|| Error::Internal("MPI is already initialised in this process".into()))?;
@@ -48,7 +48,7 @@ impl Mpi {
     }
 }
 
-/// What every parallel part of the solver is given.
+/// The parallel environment: communicator, PETSc and signals.
 pub struct Session {
     world: SimpleCommunicator,
     petsc: Petsc,
@@ -61,7 +61,7 @@ impl Session {
         &self.world
     }
 
-    /// This process's number, from 0.
+    /// Rank of this process, from 0.
     pub fn rank(&self) -> usize {
         usize::try_from(self.world.rank()).unwrap_or(0)
     }
@@ -71,7 +71,7 @@ impl Session {
         usize::try_from(self.world.size()).unwrap_or(1)
     }
 
-    /// Whether this is the process that talks to the user.
+    /// Whether this is rank 0, which writes to the terminal.
     pub fn is_first(&self) -> bool {
         self.world.rank() == 0
     }
@@ -81,8 +81,8 @@ impl Session {
         &self.petsc
     }
 
-    /// Makes a failure on any rank the same failure on all. Collective; stands at the end of every phase in which ranks can fail,
-    /// alone or alike, and before everything that depends on whether they did.
+    /// Turns a failure on any rank into the same failure on all ranks. Collective; to be called at the end of each phase in which a rank
+    /// can fail, and before anything that depends on the outcome.
     pub fn agree<T, E: Into<Error>>(&self, result: Result<T, E>) -> Result<T, Agreed> {
         agree(&self.world, result)
     }
@@ -132,19 +132,19 @@ impl Session {
     }
 }
 
-/// An integer that is the larger the larger the number is, largest for NaN.
+/// An integer that increases with the number; NaN gives the largest.
 fn ordered(number: f64) -> i64 {
     let number = if number.is_nan() { f64::NAN.copysign(1.0) } else { number };
     flipped(number.to_bits().cast_signed())
 }
 
-/// The number that this integer stands for.
+/// The inverse of `ordered`.
 fn number(ordered: i64) -> f64 {
     f64::from_bits(flipped(ordered).cast_unsigned())
 }
 
-/// Bits of negative numbers, sign aside, turned over: integers grow with their bits, floating-point numbers below zero
-/// fall. Its own inverse.
+/// Inverts the bits of negative numbers except for the sign, so that the order of the integers is that of the floating-point numbers.
+/// The map is its own inverse.
 fn flipped(bits: i64) -> i64 {
     if bits < 0 { bits ^ i64::MAX } else { bits }
 }

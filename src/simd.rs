@@ -1,10 +1,10 @@
-//! Cells side by side, so that one instruction works on several of them.
+//! Packs of cells for vector instructions: the same component of all cells of a pack is contiguous in memory.
 //!
 //! Functions whose loops run over lanes are compiled three times (`#[multiversion]`): for any processor of the architecture, for
 //! those with vectors of 256 bits and for those with 512, which is decided at run time. All do the same operations in the same
 //! order: no bit differs.
 
-/// Cells of a pack.
+/// Number of cells in a pack.
 pub const LANES: usize = 16;
 
 /// `N` numbers of each of [`LANES`] cells, number by number.
@@ -15,7 +15,7 @@ pub struct Pack<const N: usize>(pub [[f64; LANES]; N]);
 impl<const N: usize> Pack<N> {
     /// All zero.
     pub const ZERO: Self = Self([[0.0; LANES]; N]);
-    /// No numbers: what nobody asked for.
+    /// An empty pack, for quantities that are not needed.
     pub const ABSENT: Self = Self([[f64::NAN; LANES]; N]);
 
     /// Whether these are no numbers.

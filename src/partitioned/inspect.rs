@@ -1,4 +1,4 @@
-//! What is in a mesh file with parts, in words; in one process, without MPI.
+//! Description of a partitioned mesh file; in one process, without MPI.
 
 use super::{Header, MESH};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// Describes the file: its parts, cells, nodes, regions and boundaries. One that is not whole is refused with the reason.
+/// Describes the file: its parts, cells, nodes, regions and boundaries. A damaged file is refused with the reason.
 pub fn inspect(path: &Path) -> Result<String> {
     seal::verify_alone(path, MESH)?;
     let bytes = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?.len();

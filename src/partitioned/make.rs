@@ -1,4 +1,4 @@
-//! From a mesh to its file with parts.
+//! Makes a partitioned mesh file from a mesh.
 
 use super::{Header, PartitionedFile, is_meant, write};
 use crate::{
@@ -35,7 +35,7 @@ fn whole(source: &Path) -> Result<AnyMesh> {
     }
 }
 
-/// Cuts in two again and again, so that a rank that gets several consecutive parts has a compact one.
+/// Recursive bisection, so that several consecutive parts together are compact.
 fn split<const D: usize>(mesh: &GlobalMesh<D>, parts: usize, target: &Path) -> Result<Header> {
     let partition = divide(mesh, parts, Method::Recursive)?;
     write(target, &SimpleCommunicator::self_comm(), mesh, &partition, parts)

@@ -46,12 +46,12 @@ const MESH: Kind = Kind {
 /// Tables of a part that `counts` counts, in its order.
 const TABLES: [&str; 4] = ["nodes", "cells", "facets", "named"];
 
-/// What a file says about itself.
+/// The header of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// 2 or 3.
     pub dimension: usize,
-    /// How many parts it has.
+    /// Number of parts.
     pub parts: usize,
     /// Nodes of the mesh.
     pub nodes: usize,
@@ -67,7 +67,7 @@ pub struct Header {
     pub boundary_facets: Vec<usize>,
     /// Facets between parts.
     pub edge_cut: usize,
-    /// Cells of the fullest part over the average.
+    /// Largest number of cells in a part over the mean.
     pub imbalance: f64,
     /// Digest of the mesh, in hexadecimal digits.
     pub digest: String,
@@ -79,14 +79,14 @@ impl Header {
     }
 }
 
-/// Whether a file is, or by its name or its first bytes is meant to be, a mesh in parts rather than one of Gmsh.
+/// Whether a file is a partitioned mesh, or its name or first bytes say that it was meant to be one, rather than a mesh of Gmsh.
 pub fn is_meant(path: &Path) -> bool {
     let known = |extension: &std::ffi::OsStr| extension == "h5" || extension == "hdf5";
     let named = path.extension().is_some_and(known);
     named || is_one(path) || seal::is_hdf5(path) || seal::is_sealed(path, seal::CHECKPOINT)
 }
 
-/// Whether a file starts like a mesh in parts.
+/// Whether a file begins with the seal of a partitioned mesh.
 pub fn is_one(path: &Path) -> bool {
     seal::is_sealed(path, MESH)
 }

@@ -1,4 +1,4 @@
-//! Reads parts of a mesh, each rank its own.
+//! Reads a partitioned mesh; each rank reads its own parts.
 
 use super::{Header, MESH, TABLES};
 use crate::{
@@ -15,11 +15,11 @@ use crate::{
 use mpi::{topology::SimpleCommunicator, traits::Communicator};
 use std::{ops::Range, path::Path};
 
-/// A mesh in parts that was found whole and is open for reading.
+/// A partitioned mesh file whose seal was verified, open for reading.
 pub struct PartitionedFile {
     file: ParallelFile,
     communicator: SimpleCommunicator,
-    /// What it says about itself.
+    /// Its header.
     pub header: Header,
     /// Rows of each of the tables, of each part.
     counts: Vec<[u64; 4]>,
@@ -46,7 +46,7 @@ impl PartitionedFile {
         Ok(Self { file, communicator, header, counts })
     }
 
-    /// This rank's part: the parts of the file are shared out in runs. Collective, with the same outcome on all ranks.
+    /// This rank's part: each rank gets consecutive parts of the file. Collective, with the same outcome on all ranks.
     pub fn mesh<const D: usize>(&self, session: &Session) -> Result<Mesh<D>, Agreed> {
         let (parts, rank, ranks) = (self.header.parts, session.rank(), session.ranks());
         if parts < ranks {

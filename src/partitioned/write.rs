@@ -92,7 +92,7 @@ fn write_tables<const D: usize>(file: &ParallelFile, header: &Header, pieces: &[
     Ok(table(file, "named", 2, pieces, |piece| piece.named.as_flattened().into())?)
 }
 
-/// A table with rows of all pieces, one after the other.
+/// Writes a table with the rows of all pieces, one after the other.
 fn table<'a, T: Element, const D: usize>(
     file: &ParallelFile,
     name: &str,
