@@ -39,6 +39,8 @@ pub(super) struct StepSolver {
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
+    /// Whether a set-up failed, so that the linear solver in use can't be.
+    is_broken: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
     /// What keeps factors of bodies that contact alone holds from being singular.
@@ -64,6 +66,7 @@ impl StepSolver {
             between: None,
             matrix_norm: 0.0,
             solver,
+            is_broken: false,
             cache: None,
             springs: Springs::default(),
         })
@@ -111,11 +114,15 @@ impl StepSolver {
             let kept = self.cache.as_mut().and_then(|cache| cache.take(length));
             is_new = kept.is_none();
             let (matrix, krylov) = kept.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
-            self.keep_matrix_in_use(session, body, krylov, like)?;
+            self.exchange_matrix_in_use(session, body, krylov, like)?;
             let matrix = match matrix {
                 Some(matrix) => matrix,
-                None => self.set_up(session, body, length, like)?,
+                None => {
+                    self.is_broken = true;
+                    self.set_up(session, body, length, like)?
+                }
             };
+            self.is_broken = false;
             self.cached = Some((length, matrix));
         }
         if lengths.matrix != length {
@@ -135,17 +142,23 @@ impl StepSolver {
         if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
     }
 
-    /// Moves the matrix in use with its preconditioner to those that are kept, and brings another linear solver into use: `next`, or
-    /// one that is not set up. Does nothing without a matrix. Collective.
-    fn keep_matrix_in_use<const D: usize, const S: usize>(
+    /// Brings another linear solver into use: `next`, or one that is not set up. The matrix in use, if there is one, goes with its
+    /// preconditioner to those that are kept; what a failed set-up left is dropped. Collective.
+    fn exchange_matrix_in_use<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
         next: Option<Krylov>,
         like: &DistributedVector,
     ) -> Result<()> {
-        let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
         let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
+        let mut krylov = match next {
+            Some(krylov) => krylov,
+            None if self.cached.is_none() && !self.is_broken => return Ok(()),
+            None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+        };
+        krylov.exchange(&mut self.solver);
+        let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
         let cache = match &mut self.cache {
             Some(cache) => cache,
             none => {
@@ -154,11 +167,6 @@ impl StepSolver {
                 none.insert(FactorCache::new(kept - 1))
             }
         };
-        let mut krylov = match next {
-            Some(krylov) => krylov,
-            None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
-        };
-        krylov.exchange(&mut self.solver);
         cache.put(Cached { length, matrix, krylov });
         Ok(())
     }

@@ -98,6 +98,7 @@ fn scenario() {
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
         "taken_back" => taken_back::in_the_plane(&session),
+        "failed_set_up" => taken_back::after_failures(&session),
         "softening" => softening::all(&session),
         "branches" => branches::passed(&session),
         "unloading" => unloading::all(&session),

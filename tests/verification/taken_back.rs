@@ -4,6 +4,7 @@ use crate::orders::{Acting, EFFECTS, END, SCHEMES};
 use crate::run_on;
 use crate::scenes::simulation;
 use clarke::{
+    agreement::fail_at,
     effect::Step,
     mesh::generate::{Diagonal, rectangle},
     run::Simulation,
@@ -57,4 +58,50 @@ pub fn in_the_plane(session: &Session) {
 #[test]
 fn steps_taken_back_leave_no_trace_in_any_effect_under_any_scheme() {
     run_on(&[1, 2], "taken_back");
+}
+
+/// The set-up for steps of another length fails at each of its agreements in turn; steps of the length before it are what they are
+/// without any failure.
+fn failing_and_straight(session: &Session, effect: &Acting, under: &str) {
+    let text = effect.job::<2>(under, END / STEPS);
+    let mesh = || rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh");
+    let [mut straight, mut failing] = [(); 2].map(|()| simulation::<2, 4>(session, &text, &mesh()));
+    let (mut shorter, mut failures) = (END / STEPS, 0);
+    for _ in 0..4 {
+        shorter *= 0.5;
+        for number in 0.. {
+            let Simulation { body, state, scheme, .. } = &mut failing;
+            let mut attempt = |length: f64, fails: bool| {
+                fail_at(Some(number).filter(|_| fails && session.rank() + 1 == session.ranks()));
+                let step = Step { time: state.time + length, length, previous_length: state.step_length };
+                let ended = session.agree(scheme.attempt(session, body, state, step));
+                fail_at(None);
+                ended
+            };
+            let ended = attempt(shorter, true);
+            attempt(END / STEPS, false).unwrap_or_else(|e| panic!("{under}, after operation {number}: {e}"));
+            match ended {
+                Ok(_) => break,
+                Err(error) => assert!(error.is_failure(), "operation {number}: {error}"),
+            }
+            failures += 1;
+        }
+        let [one, other] = [&mut straight, &mut failing].map(|run| run.advance(session).expect("a step"));
+        assert!(one.is_some() && other.is_some());
+        for ((name, straight), (_, failing)) in all(&straight).into_iter().zip(all(&failing)) {
+            assert!(straight == failing, "{}, {under}: {name} differs", effect.name);
+        }
+    }
+    assert!(failures > 12, "{under}: {failures} failures");
+}
+
+pub fn after_failures(session: &Session) {
+    for effect in [&EFFECTS[0], &EFFECTS[6]] {
+        SCHEMES.iter().for_each(|(scheme, _)| failing_and_straight(session, effect, scheme));
+    }
+}
+
+#[test]
+fn a_set_up_that_fails_leaves_matrices_of_other_lengths_usable() {
+    run_on(&[1, 2], "failed_set_up");
 }
