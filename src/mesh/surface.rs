@@ -5,7 +5,7 @@ use super::shape::facet_of;
 use crate::error::{Error, Result};
 
 /// In place of a neighbour: the facet is on the outer surface.
-pub(super) const OUTSIDE: u32 = u32::MAX;
+pub const OUTSIDE: u32 = u32::MAX;
 
 /// The cells behind each facet of each cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
