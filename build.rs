@@ -1,4 +1,4 @@
-//! Finds the system's PETSc through pkg-config, with the CHOLMOD and the BLAS that it uses, and generates the raw bindings of what `src/petsc` and `src/sparse` call.
+//! Finds the system's PETSc through pkg-config, with the CHOLMOD and the BLAS that it uses, and generates the raw bindings of what `src/linear_algebra/petsc` and `src/linear_algebra/sparse` call.
 
 use bindgen::callbacks::{IntKind, ParseCallbacks};
 use std::{
@@ -61,7 +61,7 @@ impl ParseCallbacks for Counts {
 }
 
 fn main() {
-    println!("cargo::rerun-if-changed=src/petsc/wrapper.h");
+    println!("cargo::rerun-if-changed=src/linear_algebra/petsc/wrapper.h");
     println!("cargo::rerun-if-changed=build.rs");
     for name in ["PETSC_DIR", "PETSC_ARCH", "PKG_CONFIG_PATH"] {
         println!("cargo::rerun-if-env-changed={name}");
@@ -77,7 +77,7 @@ fn main() {
         .unwrap_or_else(|e| panic!("no MPI found (Debian: apt-get install libopenmpi-dev): {e:?}"));
     let includes = petsc.include_paths.iter().chain(&mpi.include_paths);
     bindgen::builder()
-        .header("src/petsc/wrapper.h")
+        .header("src/linear_algebra/petsc/wrapper.h")
         .parse_callbacks(Box::new(Counts))
         .clang_args(includes.map(|d| format!("-I{}", d.display())))
         .rust_edition(bindgen::RustEdition::Edition2024)

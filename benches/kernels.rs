@@ -8,16 +8,18 @@ mod table;
 mod triad;
 
 use clarke::{
-    body::Body,
-    effect::{Form, Step},
+    fem::{
+        body::Body,
+        effect::{Form, Step},
+        space::Simplex,
+    },
     job::Job,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
+    parallel::session::{Mpi, Session},
     run::Simulation,
-    session::{Mpi, Session},
-    space::Simplex,
 };
 use criterion::{Criterion, Throughput};
 use std::{fmt::Write, hint::black_box, mem::size_of, path::Path, time::Duration};

@@ -13,7 +13,7 @@ mod table;
 mod triad;
 
 use clarke::{
-    output::{
+    io::output::{
         checkpoint_file::{self, RowSet, Table},
         checksum::table_checksum,
         fields::{Field, FieldFile, FieldMesh, Place, Shape},
@@ -21,7 +21,7 @@ use clarke::{
         redistribution::are_whole,
         seal,
     },
-    session::{Mpi, Session},
+    parallel::session::{Mpi, Session},
 };
 use std::{
     fs::{File, OpenOptions},

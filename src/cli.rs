@@ -1,16 +1,19 @@
 //! The command line: arguments to exit codes.
 
 use crate::{
-    agreement::Agreed,
     error::{Error, Exit, Result},
+    io::{
+        output::{inspect::inspect, parallel_file::given_up},
+        partitioned,
+    },
     job::{self, Job, Loaded},
-    nearest::nearest,
-    output::{inspect::inspect, parallel_file::given_up},
-    partitioned,
-    report::report,
+    laws::nearest::nearest,
+    parallel::{
+        agreement::Agreed,
+        session::{Mpi, Session},
+    },
+    postprocessing::{report::report, study},
     run::{self, Clock, Start},
-    session::{Mpi, Session},
-    study,
 };
 use clap::{Args, Parser, Subcommand};
 use mpi::traits::CommunicatorCollectives;

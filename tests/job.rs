@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clarke::job::{
     Job, Loaded, Mesh, MeshNames, Quadrature, Scheme, describe, describe_json, differing_keys,
 };
-use clarke::material::Metric;
+use clarke::laws::material::Metric;
 use proptest::prelude::*;
 
 const SQUARE: &str = include_str!("../jobs/papers/wang_cheng_2022.toml");

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use clarke::{
     job::{Expected, Job},
-    tensor::larger,
+    linear_algebra::tensor::larger,
 };
 
 /// All jobs of the repository; studies are no jobs.

@@ -9,11 +9,11 @@ use std::{
 
 /// Where `unsafe` may stand; folders end with a slash.
 const UNSAFE: [&str; 6] = [
-    "src/sparse/",
-    "src/petsc/",
-    "src/output/hyperslab.rs",
-    "src/output/identifier.rs",
-    "src/output/stacked_view.rs",
+    "src/linear_algebra/sparse/",
+    "src/linear_algebra/petsc/",
+    "src/io/output/hyperslab.rs",
+    "src/io/output/identifier.rs",
+    "src/io/output/stacked_view.rs",
     "build.rs",
 ];
 

@@ -3,8 +3,8 @@
 use clarke::{
     error::{Error, Exit},
     job::Job,
+    parallel::session::Mpi,
     run,
-    session::Mpi,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;

@@ -2,14 +2,11 @@
 //! checksums they were written with.
 #![no_main]
 
-use clarke::{
-    error::Result,
-    output::{
+use clarke::{error::Result, io::output::{
         checkpoint::Header,
         checkpoint_file::Checkpoint,
         seal::{self, SEAL_BYTES},
-    },
-};
+    }};
 use libfuzzer_sys::fuzz_target;
 use mpi::{environment::Universe, topology::SimpleCommunicator};
 use std::{

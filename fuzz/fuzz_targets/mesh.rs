@@ -1,13 +1,10 @@
 //! Any bytes as a Gmsh file: refused in words, or a mesh whose numbers fit together.
 #![no_main]
 
-use clarke::{
-    error::Exit,
-    mesh::{
+use clarke::{error::Exit, mesh::{
         GlobalMesh,
         gmsh::{AnyMesh, parse},
-    },
-};
+    }};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| match parse(bytes) {

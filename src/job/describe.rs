@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
-use crate::nearest::nearest;
+use crate::laws::nearest::nearest;
 
 const WIDTH: usize = 100;
 

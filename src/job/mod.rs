@@ -15,7 +15,7 @@ mod set;
 mod source;
 mod validate;
 
-pub use crate::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
+pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
 pub(crate) use describe::describe_kind;
 pub use describe::{describe, describe_json};
 pub use document::*;

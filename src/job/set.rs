@@ -4,7 +4,7 @@ use toml_edit::Key;
 
 use super::report::{Fault, Place};
 use super::source::{Node, Value, parse_value};
-use crate::expression::Expression;
+use crate::laws::expression::Expression;
 
 /// Writes the override `text`, which is file `file`, over the document.
 pub fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Fault> {

@@ -6,7 +6,7 @@ use super::describe;
 use super::report::{Fault, Place};
 use super::schema::{Kind, Schema};
 use super::source::{Node, Value};
-use crate::{expression::Expression, nearest::nearest};
+use crate::laws::{expression::Expression, nearest::nearest};
 
 /// What is wrong with the document by itself, before keys are held against each other.
 pub fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {

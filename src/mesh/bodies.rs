@@ -6,10 +6,12 @@ use super::{
 };
 use crate::mesh::shape::facet_of;
 use crate::{
-    agreement::Agreed,
     error::Result,
-    exchange::{exchange, gather},
-    session::Session,
+    parallel::{
+        agreement::Agreed,
+        exchange::{exchange, gather},
+        session::Session,
+    },
 };
 
 impl<const D: usize> Mesh<D> {

@@ -7,8 +7,8 @@ use super::surface::Topology;
 use super::tags::{Tags, place};
 use super::{GlobalMesh, Mesh};
 use crate::error::{Error, Result};
-use crate::session::Session;
-use crate::tensor::{Vector, add_scaled, dot, norm};
+use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
+use crate::parallel::session::Session;
 
 /// Cells whose [quality](super::shape::quality) is below this are called poor: they spoil accuracy and conditioning.
 pub const POOR_QUALITY: f64 = 0.05;

@@ -7,11 +7,13 @@ use super::{
     surface::Topology,
 };
 use crate::{
-    agreement::Agreed,
     error::{Error, Result},
-    exchange::{exchange, gather},
-    session::Session,
-    tensor::Vector,
+    linear_algebra::tensor::Vector,
+    parallel::{
+        agreement::Agreed,
+        exchange::{exchange, gather},
+        session::Session,
+    },
 };
 use mpi::{
     point_to_point::{Destination, Source},

@@ -1,6 +1,6 @@
 //! A whole mesh, as read or generated.
 
-use crate::tensor::Vector;
+use crate::linear_algebra::tensor::Vector;
 
 /// Triangles in the plane (`D = 2`) or tetrahedra in space (`D = 3`), whole, as read or generated on rank 0.
 ///

@@ -5,7 +5,7 @@ use super::shape::longest_edge;
 use super::tags::{Tags, place};
 use super::tree::BoxTree;
 use crate::error::{Error, Result};
-use crate::tensor::{Vector, add_scaled, dot, norm};
+use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 
 /// How near to a facet, as a share of its longest edge, a node lies on it.
 const TOUCHING: f64 = 1e-8;

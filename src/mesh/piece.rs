@@ -3,7 +3,7 @@
 use super::{Boundary, GlobalMesh, Names, partition::Partition};
 use crate::{
     error::{Error, Result},
-    tensor::Vector,
+    linear_algebra::tensor::Vector,
 };
 
 /// In place of a position: a node or facet that is not in the piece.

@@ -1,7 +1,7 @@
 //! Rigid motions that the supports leave free.
 
 use super::tags::place;
-use crate::tensor::{Vector, add_scaled, cross, dot, norm};
+use crate::linear_algebra::tensor::{Vector, add_scaled, cross, dot, norm};
 
 /// A rigid motion: translation, then rotation about x, y, z through the body's centre, lengths in units of its radius.
 pub(super) type Motion = [f64; 6];

@@ -1,7 +1,7 @@
 //! Measures of simplices and facets.
 
 use super::GlobalMesh;
-use crate::tensor::{Vector, add_scaled, norm};
+use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
 
 /// The facet of a positively oriented cell opposite to its node `opposite`, its normal pointing outward.
 #[inline]
@@ -157,7 +157,7 @@ mod tests {
         for opposite in 0..=D {
             let facet = facet_of::<D>(&ids, opposite).map(|i| corners[i as usize]);
             let away = add_scaled(&centroid(&facet), -1.0, &corners[opposite]);
-            let product = crate::tensor::dot(&facet_normal(&facet), &away);
+            let product = crate::linear_algebra::tensor::dot(&facet_normal(&facet), &away);
             assert!((product - D as f64 * signed_measure(corners)).abs() < 1e-14);
         }
     }

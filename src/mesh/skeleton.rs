@@ -7,11 +7,13 @@ use super::{
     surface::Bodies,
 };
 use crate::{
-    agreement::Agreed,
     error::Result,
-    exchange::{exchange_lists, gather},
-    session::Session,
-    tensor::{Vector, add_scaled, norm},
+    linear_algebra::tensor::{Vector, add_scaled, norm},
+    parallel::{
+        agreement::Agreed,
+        exchange::{exchange_lists, gather},
+        session::Session,
+    },
 };
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! A tree of axis-aligned boxes that finds the ones around a point.
 
-use crate::tensor::Vector;
+use crate::linear_algebra::tensor::Vector;
 
 /// Boxes in a binary tree, split at medians; building is `O(n log n)`.
 #[derive(Debug, Clone)]

@@ -2,21 +2,26 @@
 
 use super::steps;
 use crate::{
-    body::Body,
-    contact::{Gap, NormalResponse},
-    effect::{
-        self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia, Load,
-        Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns, fixed_components,
-    },
     error::{Error, Result},
+    fem::{
+        body::Body,
+        effect::{
+            self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia, Load,
+            Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
+            fixed_components,
+        },
+        space::{Geometry, surface_points},
+        state::State,
+    },
     job::{self, Fix, Job, Material, Named},
-    material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
+    laws::{
+        contact::{Gap, NormalResponse},
+        material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
+    },
+    linear_algebra::tensor::Vector,
     mesh::Mesh,
-    session::Session,
-    space::{Geometry, surface_points},
-    state::State,
-    stepping::{SolverSettings, evaluation},
-    tensor::Vector,
+    parallel::session::Session,
+    solver::stepping::{SolverSettings, evaluation},
 };
 
 /// Builds the body of a job on this rank's mesh. Collective.

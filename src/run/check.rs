@@ -10,15 +10,12 @@ use super::{
     summary::PartitionQuality,
 };
 use crate::{
-    agreement::Agreed,
-    body::Body,
-    certificate::Certificates,
     error::{Error, Result},
+    fem::{body::Body, state::State},
     job::{Job, Loaded},
     mesh::{Mesh, check::Quality},
-    session::Session,
-    state::State,
-    stepping::ProblemSize,
+    parallel::{agreement::Agreed, session::Session},
+    solver::{certificate::Certificates, stepping::ProblemSize},
 };
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! When a run has to stop before its end time: its limit of wall time, and the end of the Slurm job it runs in.
 
 use super::Clock;
-use crate::{job::Job, output::log::Log, session::Session};
+use crate::{io::output::log::Log, job::Job, parallel::session::Session};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Environment variable of Slurm with the end of the job, in seconds since 1970.

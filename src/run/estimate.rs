@@ -7,9 +7,9 @@
 
 use super::Inventory;
 use crate::{
-    body::Body,
-    session::Session,
-    stepping::{Preconditioner, ProblemSize},
+    fem::body::Body,
+    parallel::session::Session,
+    solver::stepping::{Preconditioner, ProblemSize},
 };
 use serde::Serialize;
 

@@ -3,8 +3,8 @@
 use super::{Start, summary::SUMMARY};
 use crate::{
     error::{Error, Result},
+    io::output::{checkpoint_folder::list, log::Log},
     job::{Job, differing_keys},
-    output::{checkpoint_folder::list, log::Log},
 };
 use rustix::fs::{Access, access};
 use std::{io::ErrorKind, path::Path};

@@ -3,9 +3,9 @@
 use super::{Summary, setup::Setup};
 use crate::{
     error::Result,
+    io::output::{field_list::FIELDS, log::Log, output_field::Figures},
     job::{Loaded, Method},
-    output::{field_list::FIELDS, log::Log, output_field::Figures},
-    session::Session,
+    parallel::session::Session,
 };
 use std::path::Path;
 

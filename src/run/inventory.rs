@@ -1,6 +1,6 @@
 //! What a run allocated for its effects, so that tests can compare it with the job.
 
-use crate::{body::Body, session::Session, stepping::Stepper};
+use crate::{fem::body::Body, parallel::session::Session, solver::stepping::Stepper};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

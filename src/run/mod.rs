@@ -30,11 +30,10 @@ pub use start::{Clock, Start, VERSION};
 pub use summary::Summary;
 
 use crate::{
-    agreement::Agreed,
     error::{Exit, Result},
     job::Loaded,
-    material::Hypothesis,
-    session::Session,
+    laws::material::Hypothesis,
+    parallel::{agreement::Agreed, session::Session},
 };
 /// Calls a function of a submodule on a job's mesh, for its dimension and hypothesis.
 macro_rules! on_the_mesh {

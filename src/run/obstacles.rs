@@ -1,13 +1,12 @@
 //! Warnings about the initial position of a body relative to its obstacles.
 
 use crate::{
-    body::Body,
-    contact::Gap,
     error::Result,
+    fem::{body::Body, state::State},
     job::Job,
-    session::Session,
-    state::State,
-    tensor::{Vector, larger},
+    laws::contact::Gap,
+    linear_algebra::tensor::{Vector, larger},
+    parallel::session::Session,
 };
 
 /// Initial penetration, as a share of the body's size, above which a warning is given.

@@ -1,11 +1,9 @@
 //! All files of a run, opened for a new start or to continue.
 
 use crate::{
-    agreement::Agreed,
-    body::Body,
     error::Result,
-    job::{Every, Job},
-    output::{
+    fem::{body::Body, state::State},
+    io::output::{
         checkpoint::{self, Header, Identity},
         checkpoint_folder::{checkpoint_path, prune},
         field_output::FieldOutput,
@@ -16,9 +14,9 @@ use crate::{
         profiles::Profiles,
         whole_file::write_whole,
     },
-    session::Session,
-    state::State,
-    stepping::StepOutcome,
+    job::{Every, Job},
+    parallel::{agreement::Agreed, session::Session},
+    solver::stepping::StepOutcome,
 };
 use std::{
     collections::BTreeMap,

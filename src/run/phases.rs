@@ -2,8 +2,8 @@
 
 use super::Clock;
 use crate::{
-    session::Session,
-    stepping::{StepClock, StepTraffic},
+    parallel::session::Session,
+    solver::stepping::{StepClock, StepTraffic},
 };
 use serde_json::{Map, Value};
 use std::time::Duration;

@@ -2,16 +2,14 @@
 
 use super::Start;
 use crate::{
-    agreement::Agreed,
-    body::Body,
     error::{Error, Exit, Result},
-    output::{
+    fem::{body::Body, state::State},
+    io::output::{
         checkpoint::{self, Identity},
         checkpoint_folder::{checkpoint_path, list},
         history::Totals,
     },
-    session::Session,
-    state::State,
+    parallel::{agreement::Agreed, session::Session},
 };
 use mpi::traits::{Communicator, Root};
 use std::path::{Path, PathBuf};

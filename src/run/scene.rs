@@ -2,8 +2,8 @@
 
 use super::validate::validate;
 use crate::{
-    agreement::Agreed,
     error::{Error, Result},
+    io::partitioned::{self, PartitionedFile},
     job::{self, Loaded, Partition},
     mesh::{
         GlobalMesh, Mesh, distribute,
@@ -11,8 +11,7 @@ use crate::{
         gmsh::{self, AnyMesh},
         partition::{Method, divide},
     },
-    partitioned::{self, PartitionedFile},
-    session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 use mpi::{topology::Communicator, traits::Root};
 use std::path::Path;

@@ -2,17 +2,17 @@
 
 use super::{build, obstacles, steps, validate::refuse_free_bodies};
 use crate::{
-    body::Body,
-    certificate::{Accepted, Certificates, Verdict},
     error::{Exit, Result},
+    fem::{body::Body, state::State},
+    io::output::probes::Probes,
     job::{Accept, Job, Loaded},
+    linear_algebra::{petsc::set_option, tensor::Vector},
     mesh::Mesh,
-    output::probes::Probes,
-    petsc::set_option,
-    session::Session,
-    state::State,
-    stepping::Stepper,
-    tensor::Vector,
+    parallel::session::Session,
+    solver::{
+        certificate::{Accepted, Certificates, Verdict},
+        stepping::Stepper,
+    },
 };
 
 /// All that is needed for the first step.

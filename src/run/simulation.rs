@@ -7,16 +7,18 @@ use super::{
     validate::validate,
 };
 use crate::{
-    body::Body,
-    effect::{Energy, Step},
     error::Result,
+    fem::{
+        body::Body,
+        effect::{Energy, Step},
+        state::State,
+    },
+    io::output::history::Totals,
     job::{Loaded, Time},
+    linear_algebra::tensor::larger,
     mesh::{GlobalMesh, Mesh},
-    output::history::Totals,
-    session::Session,
-    state::State,
-    stepping::{Adaptive, Landings, Pace, StepOutcome, Stepper, next_step},
-    tensor::larger,
+    parallel::session::Session,
+    solver::stepping::{Adaptive, Landings, Pace, StepOutcome, Stepper, next_step},
 };
 
 /// A body with its state and scheme, for programs that look at fields after each step.

@@ -1,6 +1,6 @@
 //! The line of the log after a step.
 
-use crate::stepping::StepOutcome;
+use crate::solver::stepping::StepOutcome;
 use std::fmt::{self, Display, Formatter};
 
 /// Formats itself without allocating: runs log many steps.

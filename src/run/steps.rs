@@ -2,7 +2,7 @@
 
 use crate::{
     job::{Every, Job},
-    stepping::{Adaptive, AdaptiveSettings, Landings},
+    solver::stepping::{Adaptive, AdaptiveSettings, Landings},
 };
 
 /// The step size control of a job with adaptive steps.

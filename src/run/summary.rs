@@ -2,10 +2,10 @@
 
 use super::Inventory;
 use crate::{
-    certificate::Certificates,
-    effect::Peaks,
     error::{Error, Result},
-    output::whole_file::write_whole,
+    fem::effect::Peaks,
+    io::output::whole_file::write_whole,
+    solver::certificate::Certificates,
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};

@@ -15,18 +15,20 @@ use super::{
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
-    agreement::Agreed,
-    body::Body,
-    certificate::Certificates,
     error::{Error, Exit, Result},
+    fem::{body::Body, state::State},
+    io::output::{checkpoint::Identity, history::Totals, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
+    linear_algebra::{
+        petsc::Precision,
+        tensor::{larger, von_mises},
+    },
     mesh::Mesh,
-    output::{checkpoint::Identity, history::Totals, log::Log, output_field::Converged},
-    petsc::Precision,
-    session::Session,
-    state::State,
-    stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
-    tensor::{larger, von_mises},
+    parallel::{agreement::Agreed, session::Session},
+    solver::{
+        certificate::Certificates,
+        stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
+    },
 };
 use std::{
     fmt::Write,

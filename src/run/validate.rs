@@ -1,13 +1,11 @@
 //! Checks of a mesh against its job, by all ranks together.
 
 use crate::{
-    agreement::Agreed,
-    body::Body,
-    effect::Contact,
     error::Result,
+    fem::{body::Body, effect::Contact},
     job::{Job, Loaded, Material, MeshNames},
     mesh::{Mesh, free_motions},
-    session::Session,
+    parallel::{agreement::Agreed, session::Session},
 };
 
 /// Refuses a mesh that lacks names of the job or contradicts it; warns about badly shaped cells. Collective.

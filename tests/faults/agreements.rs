@@ -2,13 +2,15 @@
 
 use crate::{case::Case, mpirun, trials};
 use clarke::{
-    agreement::{Agreed, fail_at},
     error::Exit,
-    exchange::gather,
+    io::output::parallel_file::given_up,
     job::Job,
-    output::parallel_file::given_up,
+    parallel::{
+        agreement::{Agreed, fail_at},
+        exchange::gather,
+        session::{Mpi, Session},
+    },
     run::{self, Clock, Start},
-    session::{Mpi, Session},
 };
 use mpi::traits::CommunicatorCollectives;
 use std::{

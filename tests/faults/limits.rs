@@ -18,7 +18,7 @@ fn now() -> u64 {
 
 /// The step of the newest checkpoint and when it was written.
 fn newest_checkpoint(results: &Results) -> (u64, u64) {
-    let found = clarke::output::checkpoint_folder::list(&results.path("")).expect("list");
+    let found = clarke::io::output::checkpoint_folder::list(&results.path("")).expect("list");
     let (step, file) = &found[0];
     let written = std::fs::metadata(file).and_then(|file| file.modified()).expect("a time");
     (*step, written.duration_since(UNIX_EPOCH).expect("a time").as_secs())

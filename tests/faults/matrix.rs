@@ -4,9 +4,9 @@ use crate::{Random, case::Case, hdf5_file::NumberFile, mpirun, results::Results,
 use clarke::{
     error::Exit,
     job::Job,
+    linear_algebra::tensor::larger,
+    parallel::session::{Mpi, Session},
     run::{self, Clock, Start},
-    session::{Mpi, Session},
-    tensor::larger,
 };
 use std::{
     path::{Path, PathBuf},

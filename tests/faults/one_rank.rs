@@ -3,15 +3,19 @@
 
 use crate::mpirun;
 use clarke::{
-    agreement::Agreed,
-    effect::{Effect, Evaluation, Outcome, Phases, Step, Term},
     error::Exit,
+    fem::{
+        effect::{Effect, Evaluation, Outcome, Phases, Step, Term},
+        space::{Batch, Needs},
+    },
     job::Job,
-    material::ByMaterial,
+    laws::material::ByMaterial,
     mesh::generate::{Diagonal, rectangle},
+    parallel::{
+        agreement::Agreed,
+        session::{Mpi, Session},
+    },
     run::Simulation,
-    session::{Mpi, Session},
-    space::{Batch, Needs},
 };
 use std::path::Path;
 

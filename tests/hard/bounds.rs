@@ -1,7 +1,7 @@
 //! Steps around the bound of the explicit scheme, and far beyond it under the implicit ones.
 
 use crate::{case::Case, family};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 const STEPS: f64 = 200.0;
 

@@ -1,7 +1,7 @@
 //! Viscoplastic flow near its limits: no viscosity, no yield stress, one that is never reached, high powers.
 
 use crate::{assert_close, case::Case, family};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 const PLANE: &str = "hard/nearly_perfect_plasticity";
 const SPACE: &str = "hard/nearly_perfect_plasticity_in_space";

@@ -1,7 +1,7 @@
 //! Impacts at any speed: thrown back as the equations scale, never through the wall, without energy out of nothing.
 
 use crate::{case::Case, family, results::Results};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 /// Energy less the work of loads, of every step.
 fn energies(results: &Results) -> Vec<f64> {

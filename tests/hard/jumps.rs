@@ -1,7 +1,7 @@
 //! Jumps and kinks for very many steps.
 
 use crate::{case::Case, results::Results, thorough};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 /// Largest of some numbers, without signs.
 fn largest(numbers: &[f64]) -> f64 {

@@ -2,8 +2,8 @@
 
 use crate::{assert_close, case::Case, results::Results, thorough};
 use clarke::{
-    effect::{Energy, Role},
-    tensor::larger,
+    fem::effect::{Energy, Role},
+    linear_algebra::tensor::larger,
 };
 
 /// A million steps, or a sample.

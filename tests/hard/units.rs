@@ -1,7 +1,7 @@
 //! The same physics in other units has the same digits.
 
 use crate::{case::Case, family, results::Results};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 use toml::Value;
 
 /// Numbers of one unit of stress, length and time in the units of a job.

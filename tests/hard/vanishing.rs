@@ -1,7 +1,7 @@
 //! Effects that vanish: the answer tends to that without them, or the job is refused.
 
 use crate::{case::Case, family};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 /// Displacements of the tip.
 fn path(case: &Case) -> Vec<f64> {

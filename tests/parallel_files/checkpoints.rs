@@ -3,9 +3,9 @@
 use crate::mpirun::{self, scramble};
 use crate::owner;
 use clarke::error::Result;
-use clarke::output::checkpoint_file::{self, Checkpoint, RowSet, Table};
-use clarke::output::inspect::inspect;
-use clarke::output::seal;
+use clarke::io::output::checkpoint_file::{self, Checkpoint, RowSet, Table};
+use clarke::io::output::inspect::inspect;
+use clarke::io::output::seal;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::path::Path;
 

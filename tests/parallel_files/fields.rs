@@ -1,8 +1,8 @@
 //! Field files, read back serially the way other programs do.
 
 use crate::{mpirun, owner};
-use clarke::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
-use clarke::output::inspect::inspect;
+use clarke::io::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};
+use clarke::io::output::inspect::inspect;
 use hdf5::{Location, types::FixedAscii};
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use std::f64::consts::SQRT_2;

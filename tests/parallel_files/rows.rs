@@ -1,7 +1,7 @@
 //! Tables of which each rank has a slab.
 
 use crate::mpirun;
-use clarke::output::parallel_file::{Element, ParallelFile};
+use clarke::io::output::parallel_file::{Element, ParallelFile};
 use mpi::traits::Communicator;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Vertical parts of contact graphs: rest in a jump, rigid obstacles; and foundations that store energy.
 
 use crate::{case::Case, results::assert_same_answer};
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 #[test]
 fn contact_laws_give_the_same_answer_on_any_number_of_ranks() {

@@ -7,7 +7,7 @@ use crate::{
     report::report,
     results::Results,
 };
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 const HISTORY: &str = "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual,\
 kinetic_energy,elastic_energy,viscous_dissipation,viscoplastic_dissipation,contact_dissipation,external_work,\

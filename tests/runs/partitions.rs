@@ -219,7 +219,7 @@ fn a_mesh_in_parts_that_was_changed_and_sealed_again_is_not_the_one_its_header_t
     }
 }
 
-/// Makes the seal true again, as `output/seal.rs` describes it.
+/// Makes the seal true again, as `io/output/seal.rs` describes it.
 fn reseal(path: &Path) {
     let mut bytes = std::fs::read(path).expect("read");
     let (seal, content) = bytes.split_at_mut(512);

@@ -4,7 +4,7 @@ use crate::{
     case::Case,
     results::{Results, assert_same_answer},
 };
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 
 /// Partition and rounding change the iterates, not the answer.
 const SHARE: f64 = 1e-8;

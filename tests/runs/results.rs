@@ -1,6 +1,6 @@
 //! What a run left, read the way a user's script would.
 
-use clarke::tensor::larger;
+use clarke::linear_algebra::tensor::larger;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -43,7 +43,7 @@ impl Results {
 
     /// Steps of all checkpoints, the newest first.
     pub fn checkpoints(&self) -> Vec<u64> {
-        let found = clarke::output::checkpoint_folder::list(&self.folder).expect("list");
+        let found = clarke::io::output::checkpoint_folder::list(&self.folder).expect("list");
         found.into_iter().map(|(step, _)| step).collect()
     }
 }

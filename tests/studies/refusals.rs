@@ -1,7 +1,7 @@
 //! Studies that are refused before anything runs.
 
 use crate::scene::{SOLUTION, SQUARE, Scene};
-use clarke::{error::Exit, study::Plan};
+use clarke::{error::Exit, postprocessing::study::Plan};
 
 /// What a study says that is refused.
 fn refused(study: &str) -> String {

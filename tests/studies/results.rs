@@ -1,7 +1,7 @@
 //! What studies find.
 
 use crate::scene::{SOLUTION, SQUARE, Scene, number};
-use clarke::study::{Plan, describe};
+use clarke::postprocessing::study::{Plan, describe};
 use std::path::Path;
 
 const NORMS: &str = r#"

@@ -3,13 +3,13 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
-    effect::Step,
+    fem::effect::Step,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
 };
 
 fn square(cells: usize) -> GlobalMesh<2> {

@@ -4,14 +4,14 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation, sum};
 use clarke::{
-    certificate::Certificates,
+    linear_algebra::tensor::larger,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::larger,
+    solver::certificate::Certificates,
 };
 
 /// Bonds of a unit of area; `length` cuts the stretch.

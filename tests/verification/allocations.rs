@@ -6,10 +6,10 @@
 use allocation_counter::measure;
 use clarke::{
     job::{Job, Loaded},
-    material::Hypothesis,
+    laws::material::Hypothesis,
     mesh::Mesh,
+    parallel::session::Session,
     run::{Clock, Scene, Simulation, Start, run},
-    session::Session,
 };
 use std::{
     path::{Path, PathBuf},

@@ -3,16 +3,17 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};
 use clarke::{
-    body::Body,
-    effect::{Effect, Held, Inertia, ViscousStress},
-    material::{ByMaterial, Isotropic},
+    fem::{
+        body::Body,
+        effect::{Effect, Held, Inertia, ViscousStress},
+    },
+    laws::material::{ByMaterial, Isotropic},
+    linear_algebra::{petsc::Matrix, tensor::larger},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
-    petsc::Matrix,
-    session::Session,
-    tensor::larger,
+    parallel::session::Session,
 };
 
 const VISCOSITY: Isotropic = Isotropic { volumetric: 2.5, shear: 7.0 };

@@ -3,12 +3,11 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
-    effect::Step,
+    fem::{effect::Step, space::surface_points},
+    linear_algebra::tensor::{cross, dot, larger, norm},
     mesh::{GlobalMesh, generate::box_mesh},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    space::surface_points,
-    tensor::{cross, dot, larger, norm},
 };
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];

@@ -2,7 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, simulation};
-use clarke::{run::Simulation, session::Session};
+use clarke::{parallel::session::Session, run::Simulation};
 
 /// A block that falls with `v = g t` beside a law whose slope changes at 0.25 m/s: all its feet change in the step that passes that
 /// velocity and in no other, also where the solution is what the step was started from.

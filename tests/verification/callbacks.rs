@@ -4,8 +4,10 @@ use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, v
 use crate::{mpirun, run_on};
 use clarke::{
     error::{Error, Exit, Result},
-    petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, Snes},
-    session::Session,
+    linear_algebra::petsc::{
+        DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator, Snes,
+    },
+    parallel::session::Session,
 };
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
-    session::Session,
+    parallel::session::Session,
 };
 
 /// A free body that falls feels nothing but its weight: `v = g t`.

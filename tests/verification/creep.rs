@@ -8,7 +8,7 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
-    session::Session,
+    parallel::session::Session,
 };
 
 const PULL: f64 = 3.0;

@@ -3,7 +3,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
-use clarke::{mesh::GlobalMesh, run::Simulation, session::Session, tensor::larger};
+use clarke::{linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation};
 
 const MODULUS: f64 = 100.0;
 const RATIO: f64 = 0.25;

@@ -3,16 +3,18 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
-    effect::{
-        Damage, Effect, ElasticLaw, Elasticity, Energy, Evaluation, Inertia, Outcome, Phases, Step, Term,
-        ViscoplasticFlow, ViscousStress,
+    fem::{
+        effect::{
+            Damage, Effect, ElasticLaw, Elasticity, Energy, Evaluation, Inertia, Outcome, Phases, Step, Term,
+            ViscoplasticFlow, ViscousStress,
+        },
+        space::{Batch, Geometry},
     },
     job::Job,
-    material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
+    laws::material::{self, ByMaterial, Elastic, FlowLaw, Isotropic, Metric, Perzyna},
+    linear_algebra::simd::LANES,
+    parallel::session::Session,
     run::{Inventory, Simulation},
-    session::Session,
-    simd::LANES,
-    space::{Batch, Geometry},
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
 

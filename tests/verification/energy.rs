@@ -2,7 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
-use clarke::{mesh::GlobalMesh, output::history::Totals, session::Session};
+use clarke::{io::output::history::Totals, mesh::GlobalMesh, parallel::session::Session};
 
 const JOBS: u64 = 60;
 /// Random jobs under each implicit scheme.

@@ -3,11 +3,11 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, noise, set_nodal, simulation};
 use clarke::{
-    certificate::Certificates,
     error::Error,
     mesh::generate::{Diagonal, rectangle},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
+    solver::certificate::Certificates,
 };
 
 /// A bar whose rate of creep is a fifth power, under four times its yield stress.

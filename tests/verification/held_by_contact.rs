@@ -10,8 +10,8 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
 };
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{any_mesh, noise, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
-    session::Session,
+    parallel::session::Session,
 };
 
 /// The distance to the graphs, with the same forces left open, of the same step solved in several ways.

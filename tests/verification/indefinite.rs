@@ -8,7 +8,7 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
-    session::Session,
+    parallel::session::Session,
 };
 
 const STEP: f64 = 0.1;

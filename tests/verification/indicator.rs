@@ -5,14 +5,14 @@ use crate::manufactured::{self, VISCOSITY, elasticity, motion, rule};
 use crate::run_on;
 use crate::scenes::{brick, crossed, noise, simulation, stir};
 use clarke::{
+    io::output::error_indicator::{ErrorIndicator, Indicated},
+    linear_algebra::tensor::{Mandel, symmetric_part},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
-    output::error_indicator::{ErrorIndicator, Indicated},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::{Mandel, symmetric_part},
 };
 
 const MODULUS: f64 = 1000.0;
@@ -168,7 +168,7 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
     let found = indicated(session, &run, &stress);
 
     let (field, elastic) = (motion::<2>(), elasticity("plane_stress"));
-    let compliance = run.body.tensor(clarke::effect::Form::Elasticity, 0).expect("elasticity");
+    let compliance = run.body.tensor(clarke::fem::effect::Form::Elasticity, 0).expect("elasticity");
     let exact = |x: &[f64; 2]| -> Mandel<3> {
         let gradient: [[f64; 2]; 2] =
             std::array::from_fn(|i| std::array::from_fn(|j| field.value(i, &[j], x)));

@@ -3,17 +3,19 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{
-        Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph, NormalLaw,
-        NormalResponse, Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
-    },
-    effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
+    fem::effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
     job::{Expression, Scalar},
-    material::{ByMaterial, Isotropic},
+    laws::{
+        contact::{
+            Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph,
+            NormalLaw, NormalResponse, Plane, SlipWeakening, Symmetry, Tresca, Unilateral,
+        },
+        material::{ByMaterial, Isotropic},
+    },
+    linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
     mesh::GlobalMesh,
-    petsc::{Matrix, NonlinearProblem, ProjectedKsp},
-    session::Session,
-    stepping::{ContactEquations, Effort, Scratch},
+    parallel::session::Session,
+    solver::stepping::{ContactEquations, Effort, Scratch},
 };
 
 fn laws() -> Vec<NormalResponse> {

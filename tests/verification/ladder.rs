@@ -6,7 +6,7 @@ use crate::run_on;
 use crate::scenes::stir;
 use clarke::{
     mesh::generate::{Diagonal, box_mesh, rectangle},
-    session::Session,
+    parallel::session::Session,
 };
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];

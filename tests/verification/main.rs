@@ -45,7 +45,7 @@ mod unloading;
 mod uniqueness;
 mod wave;
 
-use clarke::session::Mpi;
+use clarke::parallel::session::Mpi;
 use std::path::PathBuf;
 
 /// The side of the tests that runs under `mpirun`.

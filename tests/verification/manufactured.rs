@@ -9,8 +9,8 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
 };
 use std::f64::consts::FRAC_PI_2;
 

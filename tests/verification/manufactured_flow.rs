@@ -10,7 +10,7 @@ use clarke::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
-    session::Session,
+    parallel::session::Session,
 };
 use std::f64::consts::PI;
 

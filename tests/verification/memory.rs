@@ -3,7 +3,8 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
-    certificate::Certificates, job::Job, mesh::GlobalMesh, run::Simulation, session::Session, tensor::larger,
+    job::Job, linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation,
+    solver::certificate::Certificates,
 };
 use std::path::Path;
 

@@ -4,13 +4,13 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
 use clarke::{
+    linear_algebra::tensor::larger,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::larger,
 };
 
 /// All but time, solver and contact.

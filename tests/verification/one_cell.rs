@@ -3,13 +3,13 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, part};
 use clarke::{
-    contact::{Gap, NormalResponse, Polyline},
-    effect::{Contact, Quadrature, choose_unknowns},
+    fem::effect::{Contact, Quadrature, choose_unknowns},
     job::Job,
+    laws::contact::{Gap, NormalResponse, Polyline},
+    linear_algebra::tensor::{Vector, larger},
     mesh::{Boundary, GlobalMesh},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::{Vector, larger},
 };
 use std::path::Path;
 

@@ -6,12 +6,12 @@ use crate::run_on;
 use crate::scenes::simulation;
 use crate::schemes::observed;
 use clarke::{
+    io::output::history::Totals,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
-    output::history::Totals,
-    session::Session,
+    parallel::session::Session,
 };
 
 pub const END: f64 = 0.4;

@@ -2,7 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation, stir};
-use clarke::{mesh::GlobalMesh, run::Simulation, session::Session, tensor::larger};
+use clarke::{linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation};
 
 const LOAD: f64 = 3.0;
 const VOLUMETRIC: f64 = 2.0;

@@ -3,8 +3,10 @@
 use crate::run_on;
 use clarke::{
     error::Exit,
-    petsc::{BlockRows, DistributedVector, Ksp, Matrix, Stage, has_option, set_default_option, set_option},
-    session::{Mpi, Session},
+    linear_algebra::petsc::{
+        BlockRows, DistributedVector, Ksp, Matrix, Stage, has_option, set_default_option, set_option,
+    },
+    parallel::session::{Mpi, Session},
 };
 use mpi::environment::is_finalized;
 

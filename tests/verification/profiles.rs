@@ -3,13 +3,15 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    contact::{Bound, Gap, NormalResponse, Unilateral},
-    effect::{Contact, Effect, Held, Inertia, Quadrature},
-    material::ByMaterial,
+    fem::effect::{Contact, Effect, Held, Inertia, Quadrature},
+    io::output::profiles::Profiles,
+    laws::{
+        contact::{Bound, Gap, NormalResponse, Unilateral},
+        material::ByMaterial,
+    },
+    linear_algebra::tensor::{Mandel, cross, dot, larger, norm},
     mesh::GlobalMesh,
-    output::profiles::Profiles,
-    session::Session,
-    tensor::{Mandel, cross, dot, larger, norm},
+    parallel::session::Session,
 };
 use std::{f64::consts::SQRT_2, path::Path};
 

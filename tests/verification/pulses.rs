@@ -4,8 +4,8 @@ use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
 };
 
 /// What a block of density 4 on rollers is pushed or hit by in a second.

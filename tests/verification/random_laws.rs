@@ -5,7 +5,7 @@ use crate::run_on;
 use crate::scenes::{noise, simulation};
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
-    session::Session,
+    parallel::session::Session,
 };
 
 /// Laws in an ordinary run, and the variable that asks for another number.

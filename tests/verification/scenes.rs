@@ -2,18 +2,20 @@
 
 use crate::mpirun::scramble;
 use clarke::{
-    body::Body,
-    effect::{Effect, Evaluation, Held, Support, fixed_components},
+    fem::{
+        body::Body,
+        effect::{Effect, Evaluation, Held, Support, fixed_components},
+        space::Geometry,
+        state::State,
+    },
     job::Job,
     mesh::{
         GlobalMesh, Mesh, distribute,
         generate::{Diagonal, box_mesh, rectangle},
         partition::{Method, divide},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    space::Geometry,
-    state::State,
 };
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 use std::path::Path;
@@ -107,7 +109,7 @@ pub fn sum(session: &Session, mine: &[f64]) -> Vec<f64> {
 /// Writes the values of a field given by the original id and the place of each node, ghosts included.
 pub fn set_nodal<const D: usize>(
     mesh: &Mesh<D>,
-    vector: &mut clarke::petsc::DistributedVector,
+    vector: &mut clarke::linear_algebra::petsc::DistributedVector,
     value: impl Fn(usize, &[f64; D]) -> [f64; D],
 ) {
     {

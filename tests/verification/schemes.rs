@@ -4,16 +4,16 @@ use crate::manufactured::job;
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
-    effect::{Form, Step},
+    fem::effect::{Form, Step},
     job::Job,
-    material::{Elasticity, Hypothesis, Metric, Parameters, Perzyna},
+    laws::material::{Elasticity, Hypothesis, Metric, Parameters, Perzyna},
+    linear_algebra::tensor::{larger, von_mises},
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
     },
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::{larger, von_mises},
 };
 use std::path::Path;
 

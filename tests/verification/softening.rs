@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, simulation};
 use crate::unloading::tangent;
-use clarke::{output::history::Totals, run::Simulation, session::Session};
+use clarke::{io::output::history::Totals, parallel::session::Session, run::Simulation};
 
 /// What softens: its tables, what tells that it acted, and whether derivatives must have been met that are not symmetric.
 struct Softening {
@@ -117,7 +117,7 @@ fn long_steps(session: &Session, scheme: &str) {
         let mut run = simulation::<2, 4>(session, &job(steps), &crossed([2, 2]));
         while run.advance(session).unwrap_or_else(|e| panic!("{scheme}, {steps}: {e}")).is_some() {}
         let found = values(&run, "damage");
-        found.iter().map(|d| (d - exact).abs()).fold(0.0, clarke::tensor::larger)
+        found.iter().map(|d| (d - exact).abs()).fold(0.0, clarke::linear_algebra::tensor::larger)
     });
     println!("{scheme}: damage {exact}, off by {errors:?} with 20 and 40 steps");
     let share = if scheme == "bdf2" { 0.35 } else { 0.6 };

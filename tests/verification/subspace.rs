@@ -3,12 +3,12 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    effect::{Effect, Held, Inertia, ViscousStress},
     error::Result,
-    material::{ByMaterial, Isotropic},
+    fem::effect::{Effect, Held, Inertia, ViscousStress},
+    laws::material::{ByMaterial, Isotropic},
+    linear_algebra::petsc::{DistributedVector, Matrix, ProjectedKsp, ProjectedOperator, set_default_option},
     mesh::GlobalMesh,
-    petsc::{DistributedVector, Matrix, ProjectedKsp, ProjectedOperator, set_default_option},
-    session::Session,
+    parallel::session::Session,
 };
 
 /// A matrix without the motion of some nodes along a direction.

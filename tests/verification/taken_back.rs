@@ -4,11 +4,10 @@ use crate::orders::{Acting, EFFECTS, END, SCHEMES};
 use crate::run_on;
 use crate::scenes::simulation;
 use clarke::{
-    agreement::fail_at,
-    effect::Step,
+    fem::effect::Step,
     mesh::generate::{Diagonal, rectangle},
+    parallel::{agreement::fail_at, session::Session},
     run::Simulation,
-    session::Session,
 };
 
 const STEPS: f64 = 16.0;

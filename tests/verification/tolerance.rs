@@ -4,10 +4,10 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
+    linear_algebra::tensor::von_mises,
     mesh::generate::{Diagonal, rectangle},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
-    tensor::von_mises,
 };
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];

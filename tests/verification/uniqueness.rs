@@ -4,14 +4,14 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
 use clarke::{
-    certificate::Certificates,
-    contact::Gap,
-    effect::{Contact, Form, Quadrature, choose_unknowns},
+    fem::effect::{Contact, Form, Quadrature, choose_unknowns},
     job::Job,
+    laws::contact::Gap,
+    linear_algebra::petsc::DistributedVector,
     mesh::{GlobalMesh, generate::box_mesh},
-    petsc::DistributedVector,
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
+    solver::certificate::Certificates,
 };
 use std::path::Path;
 

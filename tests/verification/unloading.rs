@@ -3,11 +3,11 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};
 use clarke::{
-    effect::Tangents,
+    fem::effect::Tangents,
     job::Job,
     mesh::generate::{Diagonal, rectangle},
+    parallel::session::Session,
     run::Simulation,
-    session::Session,
 };
 use std::path::Path;
 

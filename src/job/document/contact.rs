@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Adhesion, FrictionLaw, Gap, Memory, NormalLaw, Quadrature};
+use crate::laws::contact::{Adhesion, FrictionLaw, Gap, Memory, NormalLaw, Quadrature};
 
 /// Boundaries that touch an obstacle, and the laws there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
+use crate::laws::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
 
 /// A material; each effect is there only if its table or key is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

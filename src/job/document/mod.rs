@@ -11,7 +11,7 @@ mod mesh;
 mod output;
 mod time;
 
-pub use crate::contact::Quadrature;
+pub use crate::laws::contact::Quadrature;
 pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
 pub use contact::Contact;
 pub use material::{Material, Region};

@@ -1,10 +1,10 @@
 //! Boundaries: their names, and what several tables may say about the same one. Vectors: their components.
 
 use super::findings::{Findings, MeshNames, items};
-use crate::expression::{Scalar, Variable};
 use crate::job::document::{Axis, Fix, Named};
 use crate::job::source::{Node, Value};
-use crate::nearest::nearest;
+use crate::laws::expression::{Scalar, Variable};
+use crate::laws::nearest::nearest;
 
 /// Tables with a list `on`.
 const TABLES: [&str; 3] = ["support", "traction", "contact"];

@@ -2,10 +2,10 @@
 
 use super::boundary::{check_flat, check_vector};
 use super::findings::{Findings, MeshNames, items};
-use crate::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
-use crate::expression::Scalar;
 use crate::job::document::Method;
 use crate::job::source::Node;
+use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
+use crate::laws::expression::Scalar;
 
 /// Whatever the mesh.
 pub fn check(findings: &mut Findings<'_>) {

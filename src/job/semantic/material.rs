@@ -2,7 +2,7 @@
 
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
-use crate::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
+use crate::laws::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
 
 /// Poisson's ratio above which P1 elements lock.
 const LOCKING: f64 = 0.45;

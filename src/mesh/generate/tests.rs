@@ -1,7 +1,7 @@
 use super::*;
+use crate::linear_algebra::tensor::{add_scaled, dot, norm};
 use crate::mesh::GlobalMesh;
 use crate::mesh::shape::{centroid, facet_normal};
-use crate::tensor::{add_scaled, dot, norm};
 use std::collections::HashSet;
 
 const DIAGONALS: [Diagonal; 4] = [Diagonal::Right, Diagonal::Left, Diagonal::Alternating, Diagonal::Crossed];

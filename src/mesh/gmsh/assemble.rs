@@ -2,10 +2,10 @@
 
 use super::document::{Block, Document};
 use crate::error::{Error, Result};
+use crate::linear_algebra::tensor::Vector;
 use crate::mesh::surface::{Topology, sorted};
 use crate::mesh::tags::{Tags, place};
 use crate::mesh::{Boundary, GlobalMesh, check, shape};
-use crate::tensor::Vector;
 use std::collections::BTreeMap;
 
 /// In place of an id: a node without a cell.

@@ -2,10 +2,10 @@
 
 use super::samples::{SQUARE, Sample, TENT};
 use super::*;
+use crate::linear_algebra::tensor::{add_scaled, norm};
 use crate::mesh::shape::facet_normal;
 use crate::mesh::surface::Topology;
 use crate::mesh::{Tags, check};
-use crate::tensor::{add_scaled, norm};
 use proptest::prelude::*;
 use std::path::PathBuf;
 

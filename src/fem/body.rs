@@ -1,0 +1,428 @@
+//! A body: mesh, geometry, effects, contacts and loads, which a run advances in time.
+
+mod implicit;
+mod traffic;
+
+pub use implicit::Cells;
+pub use traffic::PassBytes;
+
+use crate::{
+    error::Result,
+    fem::{
+        effect::{
+            Contact, Curvature, Effect, Energy, Evaluation, FlowProperties, Form, History, HistoryStore,
+            Load, Outcome, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect, SurfaceState, Term,
+        },
+        space::{Batch, Geometry, Needs, Nodal, assemble},
+        state::State,
+    },
+    laws::material::Isotropic,
+    linear_algebra::{
+        petsc::{BlockRows, DistributedVector},
+        simd::Pack,
+        tensor::{Mandel, larger},
+    },
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
+};
+
+/// A body of `D` dimensions whose stresses have `S` components.
+pub struct Body<const D: usize, const S: usize> {
+    /// This rank's part of the mesh.
+    pub mesh: Mesh<D>,
+    /// Geometry of its cells.
+    pub geometry: Geometry<D>,
+    /// Effects of the interior.
+    pub effects: Vec<Box<dyn Effect<D, S>>>,
+    /// Contacts of the surface.
+    pub contacts: Vec<Contact<D>>,
+    /// Other effects on the surface.
+    pub surface_effects: Vec<Box<dyn SurfaceEffect<D>>>,
+    /// Tractions and body forces.
+    pub load: Load,
+    /// One flag a local component: held by a support.
+    pub fixed: Vec<bool>,
+    /// The state at which laws are evaluated, converged or at the end of the step being taken.
+    evaluation: Evaluation,
+    /// The step being taken, if laws are evaluated at its end.
+    step: Step,
+    /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
+    fastest_flow: f64,
+}
+
+impl<const D: usize, const S: usize> Body<D, S> {
+    /// A body with these effects, without contact and loads, whose laws are evaluated at the converged state or at the end of steps;
+    /// `fixed` has one flag a local component.
+    pub fn new(
+        mesh: Mesh<D>,
+        geometry: Geometry<D>,
+        effects: Vec<Box<dyn Effect<D, S>>>,
+        fixed: Vec<bool>,
+        evaluation: Evaluation,
+    ) -> Self {
+        Self {
+            mesh,
+            geometry,
+            effects,
+            contacts: Vec::new(),
+            surface_effects: Vec::new(),
+            load: Load::default(),
+            fixed,
+            evaluation,
+            step: Step::default(),
+            fastest_flow: 0.0,
+        }
+    }
+
+    /// Whether laws are evaluated at the converged state.
+    fn is_explicit(&self) -> bool {
+        self.evaluation == Evaluation::Converged
+    }
+
+    /// The constant matrix of a step in which velocity and displacement change by `length` in s times their rates. Collective.
+    pub fn matrix(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
+        let terms: Vec<_> = self
+            .terms()
+            .filter(|term| !(self.is_explicit() && term.form() == Some(Form::Elasticity)))
+            .collect();
+        let mut runs = self.geometry.runs.iter().copied().peekable();
+        assemble(session, &self.mesh, &self.geometry, &self.fixed, |cell, geometry, matrix| {
+            while runs.next_if(|run| run.first + run.count <= cell).is_some() {}
+            let Some(material) = runs.peek().map(|run| run.material) else { return };
+            terms.iter().for_each(|term| term.add_matrix(material, geometry, length, matrix));
+        })
+    }
+
+    /// Adds explicit forces at the start of a step to `forces` (with ghosts); effects write their trial histories.
+    pub fn add_explicit_forces(&mut self, state: &State, step: Step, forces: &mut [f64]) -> Result<Energy> {
+        let (mut outcome, evaluation) = (Outcome::default(), Evaluation::Converged);
+        if !self.surface_effects.is_empty() {
+            let displacement = state.displacement.local()?;
+            for effect in &mut self.surface_effects {
+                effect.evaluate(evaluation, step, &displacement, forces, &mut outcome);
+            }
+        }
+        let Some(needs) = self.needs(|p| p.start) else { return Ok(outcome.energy) };
+        // Those that weaken before the others.
+        let called = [true, false].map(|weakens| self.called(|p| p.start.is_some() && p.weakens == weakens));
+        let (mesh, effects) = (&self.mesh, &mut self.effects);
+        with_nodal(state, |nodal| {
+            Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
+                if needs.elastic_stress {
+                    effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+                }
+                for called in called {
+                    let effects = called.among_mut(effects);
+                    effects.for_each(|effect| effect.evaluate(evaluation, step, batch, &mut outcome));
+                }
+                batch.scatter(mesh, forces);
+            });
+        })?;
+        self.fastest_flow = self.fastest_flow.max(outcome.fastest_flow);
+        Ok(outcome.energy)
+    }
+
+    /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
+    pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
+        let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
+        {
+            let displacement = state.displacement.local()?;
+            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
+            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
+        }
+        if !self.surface_effects.is_empty() {
+            with_surface(state, |nodal| {
+                let effects = self.surface_effects.iter();
+                effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
+            })?;
+        }
+        let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
+        let weakening = self.called(|p| p.weakens);
+        let with_energy = self.called(|p| p.energy.is_some());
+        let with_stress = self.called(|p| p.stress.is_some());
+        let strained = self.needs(|p| p.stress).is_some();
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
+                with_energy
+                    .among(&self.effects)
+                    .for_each(|effect| effect.add_energy(self.evaluation, step, batch, &mut energy));
+                with_stress
+                    .among(&self.effects)
+                    .for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+                if strained {
+                    squares.take_in(batch.count, &batch.strain, &batch.stress);
+                }
+            });
+        })?;
+        Ok((energy, squares.peaks()))
+    }
+
+    /// What the effects are in the linearised equation of motion.
+    fn terms(&self) -> impl Iterator<Item = Term<'_>> {
+        self.effects.iter().map(|effect| effect.term())
+    }
+
+    /// Whether an effect has this form.
+    pub fn has_form(&self, form: Form) -> bool {
+        let on_the_surface = form == Form::Elasticity && !self.surface_effects.is_empty();
+        on_the_surface || self.terms().any(|term| term.form() == Some(form))
+    }
+
+    /// Whether an effect has this form in every material of the body.
+    pub fn has_form_everywhere(&self, form: Form) -> bool {
+        self.terms().any(|term| term.form() == Some(form) && term.is_everywhere())
+    }
+
+    /// The tensor of a material in a form, if it has one.
+    pub fn tensor(&self, form: Form, material: usize) -> Option<Isotropic> {
+        self.terms().filter(|term| term.form() == Some(form)).find_map(|term| term.tensor(material))
+    }
+
+    /// The density of a material in kg/m^d, if it has inertia.
+    pub fn density(&self, material: usize) -> Option<f64> {
+        self.terms().find_map(|term| match term {
+            Term::Mass(density) => density.get(material).copied(),
+            _ => None,
+        })
+    }
+
+    /// Adds `F x` with the matrix `F` of a form to `forces`; both have ghosts, and held components are not yet zero.
+    pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
+        let needs =
+            Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
+        if form == Form::Elasticity {
+            self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
+        }
+        Batch::for_all(&self.mesh, &self.geometry, Nodal::all(x), needs, |batch: &mut Batch<D, S>| {
+            if form == Form::Strain {
+                batch.stress = Pack::from_lanes(|lane| batch.strain_rate.lane(lane).map(|rate| -rate));
+            }
+            self.terms().filter(|term| term.form() == Some(form)).for_each(|term| term.add_force(batch));
+            batch.scatter(&self.mesh, forces);
+        });
+    }
+
+    /// The smallest eigenvalue of the viscosity in Pa s, if there is viscosity; 0 where it is not everywhere.
+    pub fn smallest_viscosity(&self) -> Option<f64> {
+        let modulus = |term: Term<'_>| {
+            let Term::Viscosity(tensor) = term else { return None };
+            let smallest = tensor.laws().map(Isotropic::smallest_modulus::<S>).reduce(f64::min);
+            if tensor.is_everywhere() { smallest } else { smallest.map(|modulus| modulus.min(0.0)) }
+        };
+        self.terms().filter_map(modulus).reduce(f64::min)
+    }
+
+    /// Properties of each effect that is viscoplastic flow.
+    pub fn flow_properties(&self) -> impl Iterator<Item = FlowProperties> {
+        self.terms()
+            .filter_map(|term| if let Term::Flow(properties) = term { Some(properties) } else { None })
+    }
+
+    /// The step in s beyond which explicit flow by power laws is unstable at the stresses on this rank for which explicit forces were
+    /// added since the last call; `None` if there are no such laws, on all ranks alike.
+    pub fn take_flow_step_bound(&mut self) -> Option<f64> {
+        let has_bound = self.is_explicit() && self.flow_properties().any(|flow| flow.has_power_law);
+        has_bound.then(|| 2.0 / std::mem::take(&mut self.fastest_flow))
+    }
+
+    /// The largest contact pressure in Pa on this rank in the step just solved, where friction weakens under a pressure that no
+    /// law bounds; `None` if it nowhere does.
+    pub fn slip_pressure(&self, state: &State) -> Result<Option<f64>> {
+        let mut weakening =
+            self.contacts.iter().filter(|contact| contact.unknown_fall().is_some()).peekable();
+        if weakening.peek().is_none() {
+            return Ok(None);
+        }
+        let velocity = state.velocity.local()?;
+        Ok(weakening.map(|contact| contact.largest_pressure(&velocity)).reduce(larger))
+    }
+
+    /// Keeps the histories before the last step from now on, as far as [`Body::stress_error`] or laws at the end of steps need them.
+    pub fn keep_earlier(&mut self) {
+        let evaluation = self.evaluation;
+        self.visit_histories(&mut |history| history.keep_earlier(evaluation));
+    }
+
+    /// The stress without viscosity at the end of a step that was solved and not yet committed, and the error that trial histories
+    /// make in it, of this rank, given the displacement at the end.
+    pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
+        let mut error = StressError::default();
+        self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, displacement, &mut error));
+        let Some(needs) = self.needs(|p| p.error) else { return error };
+        // Those that weaken before the others.
+        let called = [true, false].map(|weakens| self.called(|p| p.error.is_some() && p.weakens == weakens));
+        let nodal = Nodal::all(displacement);
+        Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if needs.elastic_stress {
+                self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+            }
+            for called in called {
+                called.among(&self.effects).for_each(|e| e.add_error(curvature, batch, &mut error));
+            }
+        });
+        error
+    }
+
+    /// Total stress in Pa after a committed step, one a cell.
+    pub fn stress(&self, state: &State) -> Result<Vec<Mandel<S>>> {
+        let mut out = vec![[0.0; S]; self.mesh.cell_count()];
+        let Some(needs) = self.needs(|p| p.stress) else { return Ok(out) };
+        let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        let [weakening, called] = [self.called(|p| p.weakens), self.called(|p| p.stress.is_some())];
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
+                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
+                let effects = called.among(&self.effects);
+                effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
+                for (lane, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
+                    *out = batch.stress.lane(lane);
+                }
+            });
+        })?;
+        Ok(out)
+    }
+
+    /// Writes the nodal forces of the loads at `time`. Collective, also where a rank fails.
+    pub fn write_loads(&self, time: f64, forces: &mut DistributedVector) -> Result<()> {
+        let result = {
+            let mut values = forces.local_mut()?;
+            values.fill(0.0);
+            self.load.add(&self.mesh, &self.geometry, time, &mut values)
+        };
+        forces.add_ghosts_to_owners()?;
+        result
+    }
+
+    /// Makes all trial histories the converged ones.
+    pub fn commit(&mut self) {
+        self.visit_histories(&mut |history| history.commit());
+    }
+
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        self.effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
+        self.surface_effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
+    }
+
+    /// The converged histories of cells.
+    pub fn cell_histories(&self) -> impl Iterator<Item = History<'_>> {
+        self.effects.iter().flat_map(|effect| effect.histories()).map(|store| store.history())
+    }
+
+    /// The converged histories of nodes.
+    pub fn node_histories(&self) -> impl Iterator<Item = History<'_>> {
+        self.surface_effects.iter().flat_map(|effect| effect.histories()).map(|store| store.history())
+    }
+
+    /// The histories of cells: the converged ones and, where they are kept, those before the last step.
+    pub fn all_cell_histories(&self) -> impl Iterator<Item = History<'_>> {
+        self.effects.iter().flat_map(|effect| all_of(effect.histories()))
+    }
+
+    /// The histories of nodes, likewise.
+    pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
+        self.surface_effects.iter().flat_map(|effect| all_of(effect.histories()))
+    }
+
+    /// Restores the saved values of the history of this name.
+    pub fn restore_history(&mut self, name: &str, values: &[f64]) {
+        self.visit_histories(&mut |history| history.restore(name, values));
+    }
+
+    /// Velocity components that no support holds, over all ranks. Collective.
+    pub fn unknowns(&self, session: &Session) -> usize {
+        session.total(self.fixed[..self.mesh.owned * D].iter().filter(|fixed| !**fixed).count())
+    }
+
+    /// Names of all effects, loads and contact.
+    pub fn effect_names(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> = self.effects.iter().map(|e| e.name()).collect();
+        if !self.load.tractions.is_empty() {
+            names.push("traction");
+        }
+        if !self.load.body_forces.is_empty() {
+            names.push("body_force");
+        }
+        if !self.contacts.is_empty() {
+            names.push("contact");
+        }
+        if self.contacts.iter().any(|contact| contact.friction().is_some()) {
+            names.push("friction");
+        }
+        names.extend(self.surface_effects.iter().map(|e| e.name()));
+        names
+    }
+
+    /// The effects for whose phases this holds, determined once a pass.
+    fn called(&self, holds: impl Fn(Phases) -> bool) -> Called {
+        Called::of(&self.effects, self.evaluation, holds)
+    }
+
+    /// The needs of energies at the end of a step and, where there is stress, of the largest stress and strain.
+    fn needs_of_energy(&self) -> Option<Needs> {
+        let strained = self.needs(|p| p.stress).map(|needs| Needs { strain: true, ..needs });
+        self.needs(|p| p.energy).into_iter().chain(strained).reduce(Needs::or)
+    }
+
+    fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
+        self.effects.iter().filter_map(|e| phase(e.phases(self.evaluation))).reduce(Needs::or)
+    }
+}
+
+/// A set of effects, by their positions: one bit each.
+#[derive(Clone, Copy)]
+struct Called(u64);
+
+impl Called {
+    /// The effects for whose phases this holds.
+    fn of<const D: usize, const S: usize>(
+        effects: &[Box<dyn Effect<D, S>>],
+        evaluation: Evaluation,
+        holds: impl Fn(Phases) -> bool,
+    ) -> Self {
+        let effects = effects.iter().enumerate();
+        Self(effects.map(|(at, effect)| u64::from(holds(effect.phases(evaluation))) << at).sum())
+    }
+
+    fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    fn among<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
+        all.iter().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
+    }
+
+    fn among_mut<T>(self, all: &mut [T]) -> impl Iterator<Item = &mut T> {
+        all.iter_mut().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
+    }
+
+    fn has(self, at: usize) -> bool {
+        self.0 >> at & 1 == 1
+    }
+}
+
+/// Histories in the order in which checkpoints hold them: the converged ones, then those before the last step.
+fn all_of<'a>(stores: Vec<&'a dyn HistoryStore>) -> impl Iterator<Item = History<'a>> {
+    let earlier: Vec<_> = stores.iter().filter_map(|store| store.earlier_history()).collect();
+    stores.into_iter().map(|store| store.history()).chain(earlier)
+}
+
+fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
+    let displacement = state.displacement.local()?;
+    let velocity = state.velocity.local()?;
+    let previous_velocity = state.previous_velocity.local()?;
+    body(Nodal {
+        displacement: &displacement,
+        previous_displacement: &displacement,
+        velocity: &velocity,
+        previous_velocity: &previous_velocity,
+    });
+    Ok(())
+}
+
+fn with_surface(state: &State, body: impl FnOnce(SurfaceState<'_>)) -> Result<()> {
+    let displacement = state.displacement.local()?;
+    let velocity = state.velocity.local()?;
+    body(SurfaceState { displacement: &displacement, velocity: &velocity });
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! A body in steps that are implicit in every stress.
+
+use super::{Body, Called};
+use crate::{
+    fem::{
+        effect::{
+            Blend, Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, SurfaceStep,
+            Tangents, Term,
+        },
+        space::{Batch, Geometry, Needs, Nodal},
+    },
+    linear_algebra::{
+        simd::Pack,
+        tensor::{Mandel, add_scaled, component, dot, symmetric_part},
+    },
+    mesh::Mesh,
+};
+
+/// The cells of a body with their effects, and the effects at its surface beside contact.
+pub struct Cells<'a, const D: usize, const S: usize> {
+    mesh: &'a Mesh<D>,
+    geometry: &'a Geometry<D>,
+    effects: &'a mut [Box<dyn Effect<D, S>>],
+    surface_effects: &'a mut [Box<dyn SurfaceEffect<D>>],
+    /// One flag a local component: held by a support.
+    pub fixed: &'a [bool],
+    evaluation: Evaluation,
+    step: Step,
+}
+
+impl<const D: usize, const S: usize> Body<D, S> {
+    /// Cells and contacts, borrowed at the same time.
+    pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
+        let Self { mesh, geometry, effects, surface_effects, fixed, contacts, .. } = self;
+        let (evaluation, step) = (self.evaluation, self.step);
+        (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step }, contacts)
+    }
+
+    /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
+    pub fn flows(&self) -> bool {
+        !self.is_explicit() && (!self.surface_effects.is_empty() || !self.called(|p| p.end).is_empty())
+    }
+
+    /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.
+    pub fn softening(&self) -> impl Iterator<Item = &'static str> {
+        let cells = self.called(|p| p.end && p.weakens).among(&self.effects).map(|e| e.name());
+        let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
+        cells.chain(surface.map(|e| e.name()))
+    }
+
+    /// Adds the forces of the state that a step starts from to `forces` (with ghosts): `nodal` has the blended displacement, and the
+    /// converged displacement as the previous one. Gives the sum of the squares of the forces of each effect on cells: no residual can be
+    /// less than their rounding, also where large forces cancel.
+    pub fn add_start_forces(
+        &mut self,
+        blend: Blend,
+        nodal: Nodal<'_>,
+        step: Step,
+        forces: &mut [f64],
+    ) -> f64 {
+        (self.evaluation, self.step) = (Evaluation::End(blend), step);
+        let (start, mut outcome) = (Evaluation::Start(blend), Outcome::default());
+        for effect in &mut self.surface_effects {
+            effect.evaluate(start, step, nodal.previous_displacement, forces, &mut outcome);
+        }
+        let Some(needs) = self.needs(|p| p.start) else { return 0.0 };
+        let called = self.called(|p| p.start.is_some());
+        let (mesh, effects) = (&self.mesh, &mut self.effects);
+        let mut squares = 0.0;
+        Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            for effect in called.among_mut(effects) {
+                let before = batch.stress;
+                effect.evaluate(start, step, batch, &mut outcome);
+                for lane in 0..batch.count {
+                    let cell = batch.cells.simplex(lane);
+                    let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
+                    let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
+                    squares += cell.volume * cell.volume * gradients * dot(&added, &added);
+                }
+            }
+            batch.scatter(mesh, forces);
+        });
+        squares
+    }
+
+    /// Energies of a solved step that is not yet committed; writes trial histories.
+    pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
+        let Nodal { displacement: after, previous_displacement: before, velocity, .. } = nodal;
+        let evaluation = self.evaluation;
+        for effect in &mut self.surface_effects {
+            effect.add_step_energy(evaluation, step, SurfaceStep { before, after, velocity }, energy);
+        }
+        let (mut cells, _) = self.cells_and_contacts();
+        let (called, needs) = cells.flowing();
+        let needs = Needs { strain_before: true, strain_rate: true, ..needs };
+        let mut outcome = Outcome::default();
+        Batch::for_all(cells.mesh, cells.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if needs.elastic_stress {
+                std::mem::swap(&mut batch.strain, &mut batch.strain_before);
+                cells.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+                std::mem::swap(&mut batch.strain, &mut batch.strain_before);
+                batch.elastic_stress_before = std::mem::replace(&mut batch.elastic_stress, Pack::ZERO);
+            }
+            cells.evaluate(called, needs, batch, &mut outcome);
+            let effects = cells.effects.iter();
+            effects.for_each(|effect| effect.add_step_energy(evaluation, step, batch, energy));
+        });
+    }
+}
+
+impl<const D: usize, const S: usize> Cells<'_, D, S> {
+    /// Whether the derivative of the flow is symmetric in all cells.
+    pub fn has_symmetric_tangent(&self) -> bool {
+        let is_skew = |term| matches!(term, Term::Flow(flow) if !flow.has_symmetric_tangent);
+        !self.effects.iter().any(|effect| is_skew(effect.term()))
+    }
+
+    /// The effects that are evaluated at the end of a step, and their needs.
+    fn flowing(&self) -> (Called, Needs) {
+        let called = |holds: fn(Phases) -> bool| Called::of(&*self.effects, self.evaluation, holds);
+        let elastic_stress = !called(|p| p.end && p.weakens).is_empty();
+        (called(|p| p.end), Needs { strain: true, elastic_stress, ..Needs::default() })
+    }
+
+    /// Lets the cells of a batch flow and be damaged at the end of a step.
+    fn evaluate(
+        &mut self,
+        called: Called,
+        needs: Needs,
+        batch: &mut Batch<'_, D, S>,
+        outcome: &mut Outcome<'_>,
+    ) {
+        if needs.elastic_stress {
+            self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+        }
+        outcome.has_flowed = false;
+        for effect in called.among_mut(self.effects) {
+            effect.evaluate(self.evaluation, self.step, batch, outcome);
+        }
+    }
+
+    /// Adds the forces of what flow and damage take from the stress at this displacement, and minus the forces at the surface, to
+    /// `forces` (both with ghosts); writes trial histories and, where they are wanted, the derivatives in place of those before.
+    pub fn add_flow(
+        &mut self,
+        displacement: &[f64],
+        mut tangents: Option<&mut Tangents>,
+        forces: &mut [f64],
+    ) {
+        if let Some(tangents) = &mut tangents {
+            tangents.restart::<S>(self.mesh.cell_count());
+        }
+        let mut outcome = Outcome { tangents, ..Outcome::default() };
+        for effect in self.surface_effects.iter_mut() {
+            effect.evaluate(self.evaluation, self.step, displacement, forces, &mut outcome);
+        }
+        let (called, needs) = self.flowing();
+        if called.is_empty() {
+            return;
+        }
+        let (mesh, nodal) = (self.mesh, Nodal::all(displacement));
+        Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            self.evaluate(called, needs, batch, &mut outcome);
+            if outcome.has_flowed {
+                batch.scatter(mesh, forces);
+            }
+        });
+    }
+
+    /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
+    pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
+        tangents.add_nodal::<D>(velocity, forces);
+        for (number, tangent) in tangents.iter::<S>() {
+            let (cell, nodes) = (self.geometry.cell(number), self.mesh.cell(number));
+            let mut values = [[0.0; D]; 4];
+            for (value, &node) in values.iter_mut().zip(nodes) {
+                value.copy_from_slice(&velocity[node as usize * D..][..D]);
+            }
+            let rate: Mandel<S> = symmetric_part(&cell.field_gradient(&values[..=D]));
+            let mut stress = [[0.0; D]; D];
+            for (c, row) in tangent.chunks_exact(S).enumerate() {
+                let (i, j, factor) = component::<S>(c);
+                if i < D && j < D {
+                    let value: f64 = row.iter().zip(&rate).map(|(t, e)| t * e).sum();
+                    stress[i][j] = cell.volume * value / factor;
+                    stress[j][i] = stress[i][j];
+                }
+            }
+            for (a, &node) in nodes.iter().enumerate() {
+                let gradient = cell.gradient(a);
+                for i in 0..D {
+                    forces[node as usize * D + i] += dot(&stress[i], &gradient);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,274 @@
+use super::{
+    Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, SurfaceState,
+    SurfaceStep, Tangents, evolution::Evolution, node_history::NodeHistory,
+};
+use crate::{
+    fem::space::SurfacePoint,
+    laws::contact,
+    linear_algebra::tensor::{Vector, add_scaled, dot},
+};
+
+/// Adhesion on contact boundaries, with one bonding `b` for each node.
+///
+/// With laws evaluated at the converged state the force at a point of weight `w` is `w b_n^2 t(u_{n-1})`, with `b_n` from `b_{n-1}` and
+/// `u_{n-1}`. With the potential `F` of the law the work against it is exactly
+///
+/// ```text
+/// -w b_n^2 t(u_{n-1}) . (u_n - u_{n-1}) = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) F(u_{n-1}) - numerical
+/// numerical = w b_n^2 (F(u_n) - F(u_{n-1}) + t(u_{n-1}) . (u_n - u_{n-1})).
+/// ```
+///
+/// In an implicit step the force is `w b_n^2 t(u_n)` with `b_n` from `u_n`, and
+///
+/// ```text
+/// -k w b_n^2 t(u_n) . v_n = d(w b^2 F(u)) + w (b_{n-1}^2 - b_n^2) (F(u_{n-1}) + F(u_n)) / 2 - numerical
+/// numerical = w (b_{n-1}^2 + b_n^2) / 2 (F(u_n) - F(u_{n-1})) + k w b_n^2 t(u_n) . v_n.
+/// ```
+///
+/// Faces of the body that meet at a node share its bonding, which follows from the sums over them.
+#[derive(Debug)]
+pub struct Adhesion<const D: usize> {
+    laws: Vec<contact::Adhesion>,
+    /// Points with the position of their law, those of a node together.
+    points: Vec<(usize, SurfacePoint<D>)>,
+    /// Points of each node that is bonded.
+    counts: Vec<usize>,
+    bonding: NodeHistory,
+    /// Derivatives of the bonding by the drives of nodes at the end of an implicit step, in 1/J.
+    slopes: Vec<f64>,
+}
+
+/// A law and the points where it holds.
+#[derive(Debug)]
+pub struct Bonded<const D: usize> {
+    /// The law.
+    pub law: contact::Adhesion,
+    /// Points at nodes owned here.
+    pub points: Vec<SurfacePoint<D>>,
+}
+
+impl<const D: usize> Adhesion<D> {
+    /// Whole bonds at the points; the rank owns so many nodes.
+    pub fn new(bonded: Vec<Bonded<D>>, owned: usize) -> Self {
+        let (mut laws, mut points) = (Vec::new(), Vec::new());
+        for Bonded { law, points: own } in bonded {
+            points.extend(own.into_iter().map(|point| (laws.len(), point)));
+            laws.push(law);
+        }
+        points.sort_by_key(|(_, point)| point.node);
+        let groups = || points.chunk_by(|(_, a), (_, b)| a.node == b.node);
+        let nodes = groups().map(|group| group[0].1.node).collect();
+        let counts = groups().map(<[_]>::len).collect();
+        Self {
+            laws,
+            counts,
+            points,
+            bonding: NodeHistory::new(["bonding", "previous_bonding"], nodes, owned, 1.0),
+            slopes: Vec::new(),
+        }
+    }
+
+    /// Sums over the points of a node: driving force and threshold of debonding in J, and viscosity in J s.
+    fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> [f64; 3] {
+        let [mut drive, mut energy, mut viscosity] = [0.0; 3];
+        for (law, point) in group {
+            let law = &self.laws[*law];
+            drive += point.weight * law.drive(&value_at(displacement, point), &point.normal);
+            energy += point.weight * law.energy;
+            viscosity += point.weight * law.viscosity;
+        }
+        [drive, energy, viscosity]
+    }
+
+    /// Energy in J that intact bonds at the points of a node store.
+    fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
+        let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
+            point.weight * self.laws[*law].potential(&value_at(displacement, point), &point.normal)
+        };
+        group.iter().map(of_point).sum()
+    }
+
+    /// The points of each node in turn.
+    fn groups(&self) -> impl Iterator<Item = &[(usize, SurfacePoint<D>)]> {
+        let mut rest = &self.points[..];
+        self.counts.iter().map(move |&count| {
+            let (group, behind) = rest.split_at(count);
+            rest = behind;
+            group
+        })
+    }
+
+    /// Advances the bonding with the converged displacement and adds the forces of the bonds.
+    fn add_explicit(&mut self, step: Step, displacement: &[f64], forces: &mut [f64], energy: &mut Energy) {
+        let mut trial = std::mem::take(&mut self.bonding.trial);
+        for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
+            let [drive, threshold, viscosity] = self.drive(group, displacement);
+            [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
+            energy.debonding += (before * before - *after * *after) * self.potential(group, displacement);
+            for (law, point) in group {
+                let traction = self.laws[*law].traction(&value_at(displacement, point), &point.normal);
+                push(point, point.weight * *after * *after, &traction, forces);
+            }
+        }
+        self.bonding.trial = trial;
+    }
+
+    /// Advances the bonding with the displacement at the end of a step.
+    fn advance(&mut self, evolution: Evolution, displacement: &[f64]) {
+        let mut trial = std::mem::take(&mut self.bonding.trial);
+        let mut slopes = std::mem::take(&mut self.slopes);
+        slopes.clear();
+        for (node, (group, after)) in self.groups().zip(&mut trial).enumerate() {
+            let [drive, threshold, viscosity] = self.drive(group, displacement);
+            let relax = |start, length| contact::Adhesion::relax(start, drive, threshold, viscosity, length);
+            let (before, last) = (self.bonding.converged[node], self.bonding.last_change(node));
+            let slope;
+            [*after, slope] = evolution.advance(before, last, relax);
+            slopes.push(slope);
+        }
+        (self.bonding.trial, self.slopes) = (trial, slopes);
+    }
+
+    /// Adds minus the forces at the end of a step in which the displacement changes by `length` in s times its rate, for the
+    /// displacement that the bonding was last advanced to.
+    fn add_forces(
+        &self,
+        length: f64,
+        displacement: &[f64],
+        mut tangents: Option<&mut Tangents>,
+        forces: &mut [f64],
+    ) {
+        for ((group, bonding), slope) in self.groups().zip(&self.bonding.trial).zip(&self.slopes) {
+            let square = bonding * bonding;
+            let (mut pull, mut gradient, mut tangent) = ([0.0; D], [0.0; D], [[0.0; D]; D]);
+            let mut truncated = false;
+            for (law, point) in group {
+                let (law, normal) = (&self.laws[*law], &point.normal);
+                let displacement = value_at(displacement, point);
+                pull = add_scaled(&pull, point.weight, &law.traction(&displacement, normal));
+                if tangents.is_some() {
+                    let own = law.tangent(&displacement, normal);
+                    tangent =
+                        std::array::from_fn(|i| add_scaled(&tangent[i], point.weight * square, &own[i]));
+                    gradient =
+                        add_scaled(&gradient, point.weight, &law.drive_gradient(&displacement, normal));
+                    truncated |= law.length.is_some();
+                }
+            }
+            let Some((_, point)) = group.first() else { continue };
+            let target = &mut forces[point.node as usize * D..][..D];
+            target.iter_mut().zip(&pull).for_each(|(force, pull)| *force -= square * pull);
+            if let Some(tangents) = &mut tangents {
+                // The bonding depends on the displacement. Traction and gradient of the drive are parallel unless a length is truncated.
+                let tangent = std::array::from_fn(|i| {
+                    add_scaled(&tangent[i], -2.0 * bonding * slope * pull[i], &gradient).map(|t| length * t)
+                });
+                tangents.push_node(point.node, &tangent, !truncated || *slope == 0.0);
+            }
+        }
+    }
+}
+
+fn value_at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
+    std::array::from_fn(|i| nodal[point.node as usize * D + i])
+}
+
+fn push<const D: usize>(point: &SurfacePoint<D>, factor: f64, value: &Vector<D>, forces: &mut [f64]) {
+    let target = &mut forces[point.node as usize * D..][..D];
+    target.iter_mut().zip(value).for_each(|(force, value)| *force += factor * value);
+}
+
+impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
+    fn name(&self) -> &'static str {
+        "adhesion"
+    }
+
+    fn softens(&self) -> bool {
+        true
+    }
+
+    fn evaluate(
+        &mut self,
+        at: Evaluation,
+        step: Step,
+        displacement: &[f64],
+        forces: &mut [f64],
+        outcome: &mut Outcome,
+    ) {
+        match at {
+            Evaluation::Converged => self.add_explicit(step, displacement, forces, &mut outcome.energy),
+            Evaluation::Start(_) => {}
+            Evaluation::End(blend) => {
+                self.advance(Evolution { blend, length: step.length }, displacement);
+                self.add_forces(blend.length, displacement, outcome.tangents.as_deref_mut(), forces);
+            }
+        }
+    }
+
+    fn add_energy(&self, at: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+        for (group, bonding) in self.groups().zip(&self.bonding.converged) {
+            for (law, point) in group {
+                let (law, normal) = (&self.laws[*law], &point.normal);
+                let displacement = value_at(state.displacement, point);
+                let share = point.weight * bonding * bonding;
+                let potential = law.potential(&displacement, normal);
+                energy.stored_in_bonds += share * potential;
+                if at == Evaluation::Converged {
+                    let change = value_at(state.velocity, point).map(|v| step.length * v);
+                    let before = std::array::from_fn(|i| displacement[i] - change[i]);
+                    let gain = potential - law.potential(&before, normal);
+                    energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
+                }
+            }
+        }
+    }
+
+    fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy) {
+        let Evaluation::End(blend) = at else { return };
+        self.advance(Evolution { blend, length: step.length }, ends.after);
+        let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
+        for (group, (before, after)) in self.groups().zip(bondings) {
+            let (before, after) = (before * before, after * after);
+            let potentials =
+                [ends.before, ends.after].map(|displacement| self.potential(group, displacement));
+            energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
+            energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
+            for (law, point) in group {
+                let traction = self.laws[*law].traction(&value_at(ends.after, point), &point.normal);
+                energy.numerical +=
+                    step.length * point.weight * after * dot(&traction, &value_at(ends.velocity, point));
+            }
+        }
+    }
+
+    /// Bonds count as springs: an error `e` of `b^2` is one of `e` times the force of whole bonds.
+    fn add_error(&self, curvature: Curvature, displacement: &[f64], error: &mut StressError) {
+        for (group, bonding) in self.groups().zip(self.bonding.last_three()) {
+            let off = curvature.error(bonding.map(|b| b * b));
+            for (law, point) in group {
+                let potential = self.laws[*law].potential(&value_at(displacement, point), &point.normal);
+                let twice = 2.0 * point.weight * potential;
+                error.error += off * off * twice;
+                error.size += bonding[0] * bonding[0] * twice;
+            }
+        }
+    }
+
+    fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
+        for (law, point) in &self.points {
+            let (law, x) = (&self.laws[*law], value_at(x, point));
+            let along = dot(&x, &point.normal);
+            let more = law.stiffness - law.tangential_stiffness();
+            push(point, point.weight * law.tangential_stiffness(), &x, forces);
+            push(point, point.weight * more * along, &point.normal, forces);
+        }
+    }
+
+    fn histories(&self) -> Vec<&dyn HistoryStore> {
+        vec![&self.bonding]
+    }
+
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.bonding);
+    }
+}

@@ -1,0 +1,201 @@
+use super::{Evaluation, History, HistoryStore};
+use crate::{fem::space::CellRun, linear_algebra::simd::Pack};
+use std::borrow::Cow;
+
+/// Converged and trial values of the cells of some materials, `W` a cell, in the packs of the geometry. Other cells take no
+/// storage.
+#[derive(Debug)]
+pub(super) struct CellHistory<const W: usize> {
+    name: &'static str,
+    earlier_name: &'static str,
+    /// Whether the values before the last step are needed only by laws evaluated at the end of steps.
+    is_earlier_for_end: bool,
+    runs: Vec<CellRun>,
+    /// The position of the pack of each run, if its material keeps any.
+    places: Vec<Option<u32>>,
+    converged: Vec<Pack<W>>,
+    trial: Vec<Pack<W>>,
+    /// Values before the last step.
+    earlier: Option<Vec<Pack<W>>>,
+}
+
+impl<const W: usize> CellHistory<W> {
+    /// Zeros for the cells of the materials for which `keeps` holds. The names are those of the converged values and of the values
+    /// before the last step.
+    pub(super) fn new(
+        [name, earlier_name]: [&'static str; 2],
+        runs: &[CellRun],
+        keeps: impl Fn(usize) -> bool,
+    ) -> Self {
+        let mut kept = 0;
+        let place = |run: &CellRun| {
+            let place = keeps(run.material).then_some(kept);
+            kept += u32::from(place.is_some());
+            place
+        };
+        let places = runs.iter().map(place).collect();
+        let zeros = vec![Pack::ZERO; kept as usize];
+        Self {
+            name,
+            earlier_name,
+            is_earlier_for_end: false,
+            runs: runs.to_vec(),
+            places,
+            converged: zeros.clone(),
+            trial: zeros,
+            earlier: None,
+        }
+    }
+
+    /// The same history, which makes no error in the stress: only laws evaluated at the end of steps need its values before the last
+    /// step.
+    pub(super) fn without_error(self) -> Self {
+        Self { is_earlier_for_end: true, ..self }
+    }
+
+    /// The change of the values of a cell in the last step; zeros where earlier values are not kept.
+    #[inline]
+    pub(super) fn last_change(&self, run: usize, lane: usize) -> [f64; W] {
+        let (Some(place), Some(earlier)) = (self.place(run), &self.earlier) else { return [0.0; W] };
+        std::array::from_fn(|i| self.converged[place].0[i][lane] - earlier[place].0[i][lane])
+    }
+
+    /// Writes the trial values of a cell, if its run keeps any.
+    #[inline]
+    pub(super) fn set_trial(&mut self, run: usize, lane: usize, values: [f64; W]) {
+        if let Some(place) = self.place(run) {
+            self.trial[place].set(lane, values);
+        }
+    }
+
+    /// Converged values of a run of cells, if it keeps any; prefetches those of the next run.
+    #[inline]
+    pub(super) fn converged(&self, run: usize) -> Option<&Pack<W>> {
+        if let Some(next) = self.place(run + 1) {
+            self.converged[next].prefetch();
+        }
+        self.place(run).map(|place| &self.converged[place])
+    }
+
+    /// Converged and trial values of a run of cells, if it keeps any; prefetches those of the next run.
+    #[inline]
+    pub(super) fn both(&self, run: usize) -> Option<[&Pack<W>; 2]> {
+        self.prefetch(run + 1);
+        self.place(run).map(|place| [&self.converged[place], &self.trial[place]])
+    }
+
+    /// The same, with trial values that may be written.
+    #[inline]
+    pub(super) fn both_mut(&mut self, run: usize) -> Option<(&Pack<W>, &mut Pack<W>)> {
+        self.prefetch(run + 1);
+        self.place(run).map(|place| (&self.converged[place], &mut self.trial[place]))
+    }
+
+    #[inline]
+    fn prefetch(&self, run: usize) {
+        if let Some(place) = self.place(run) {
+            self.converged[place].prefetch();
+            self.trial[place].prefetch();
+        }
+    }
+
+    /// Trial and converged values of a run of cells and those before the last step, if all are kept.
+    #[inline]
+    pub(super) fn last_three(&self, run: usize) -> Option<[&Pack<W>; 3]> {
+        let (place, earlier) = (self.place(run)?, self.earlier.as_ref()?);
+        Some([&self.trial[place], &self.converged[place], &earlier[place]])
+    }
+
+    #[inline]
+    fn place(&self, run: usize) -> Option<usize> {
+        self.places.get(run).copied().flatten().map(|place| place as usize)
+    }
+
+    fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
+        let cells = self.runs.last().map_or(0, |run| run.first + run.count);
+        let mut all = vec![[0.0; W]; cells];
+        for (run, values) in self.kept(values) {
+            for (lane, all) in all[run.first..][..run.count].iter_mut().enumerate() {
+                *all = values.lane(lane);
+            }
+        }
+        let kept: usize = self.kept(values).map(|(run, _)| run.count).sum();
+        let bytes = copies * kept * size_of::<[f64; W]>();
+        History { name, width: W, values: Cow::Owned(all.into_flattened()), bytes }
+    }
+
+    /// The runs that keep values, with their packs.
+    fn kept<'a>(&'a self, values: &'a [Pack<W>]) -> impl Iterator<Item = (&'a CellRun, &'a Pack<W>)> {
+        let runs = self.runs.iter().zip(&self.places);
+        runs.filter_map(|(run, place)| Some((run, &values[(*place)? as usize])))
+    }
+}
+
+impl<const W: usize> HistoryStore for CellHistory<W> {
+    fn history(&self) -> History<'_> {
+        self.written(self.name, &self.converged, 2)
+    }
+
+    fn earlier_history(&self) -> Option<History<'_>> {
+        self.earlier.as_ref().map(|values| self.written(self.earlier_name, values, 1))
+    }
+
+    fn keep_earlier(&mut self, at: Evaluation) {
+        if !(self.is_earlier_for_end && at == Evaluation::Converged) {
+            self.earlier.get_or_insert_with(|| self.converged.clone());
+        }
+    }
+
+    fn commit(&mut self) {
+        if let Some(earlier) = &mut self.earlier {
+            std::mem::swap(earlier, &mut self.converged);
+        }
+        std::mem::swap(&mut self.converged, &mut self.trial);
+    }
+
+    fn restore(&mut self, name: &str, values: &[f64]) {
+        let target = match &mut self.earlier {
+            _ if name == self.name => &mut self.converged,
+            Some(earlier) if name == self.earlier_name => earlier,
+            _ => return,
+        };
+        let (values, _) = values.as_chunks::<W>();
+        for (run, place) in self.runs.iter().zip(&self.places) {
+            let Some(place) = *place else { continue };
+            for (lane, values) in values[run.first..][..run.count].iter().enumerate() {
+                target[place as usize].set(lane, *values);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_kept_where_needed_and_written_for_all_cells() {
+        let run = |first, count, material| CellRun { first, count, material };
+        let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
+        let mut history = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
+        assert_eq!(history.converged(1), None);
+        history.both_mut(2).expect("values").1.set(1, [7.0, 8.0]);
+        history.set_trial(1, 0, [9.0, 9.0]);
+        history.commit();
+        let written = history.history();
+        assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
+        assert_eq!(written.bytes, 2 * 4 * 2 * 8);
+        let values = written.values.into_owned();
+        let mut other = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
+        other.restore("another", &values);
+        assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
+        other.restore("h", &values);
+        assert_eq!(other.converged(2).expect("values").lane(1), [7.0, 8.0]);
+        assert_eq!(other.last_change(2, 1), [0.0; 2], "not kept");
+        other.keep_earlier(Evaluation::Converged);
+        other.both_mut(2).expect("values").1.set(1, [7.5, 6.0]);
+        other.commit();
+        assert_eq!(other.last_change(2, 1), [0.5, -2.0]);
+        assert_eq!(other.last_change(1, 0), [0.0; 2], "no such cell");
+    }
+}

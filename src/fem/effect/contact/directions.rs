@@ -1,0 +1,74 @@
+//! The motions of nodes on which contact laws act.
+
+use super::{
+    Contact,
+    point::{Point, Unknown},
+    tangential_point::span_without,
+};
+use crate::linear_algebra::tensor::Vector;
+use std::collections::BTreeMap;
+
+/// A node of contact boundaries with the directions in which their laws act.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactNode<const D: usize> {
+    /// Its number on this rank.
+    pub node: usize,
+    /// Orthonormal directions; laws act along the first `seen` of them.
+    pub frame: [Vector<D>; D],
+    /// Directions along which laws act: none where supports hold the node.
+    pub seen: usize,
+}
+
+/// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag a local component.
+pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) -> Vec<ContactNode<D>> {
+    let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
+    for contact in contacts {
+        for point in &contact.points {
+            let seen = match point.unknown {
+                Unknown::Parameter => Some(point.direction),
+                Unknown::Velocity => None,
+                Unknown::Held => Some([0.0; D]),
+            };
+            nodes.entry(point.node()).or_default().push(seen);
+        }
+        let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
+        tangential.for_each(|point| nodes.entry(point.node()).or_default().push(None));
+    }
+    let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+    let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
+    let frame = |(node, seen): (usize, Vec<Option<Vector<D>>>)| match seen[..] {
+        [Some(direction)] if direction == [0.0; D] => {
+            ContactNode { node, frame: std::array::from_fn(axis), seen: 0 }
+        }
+        [Some(direction)] => {
+            let rest = span_without(&axes, &[direction]).0;
+            let frame = std::array::from_fn(|i| if i == 0 { direction } else { rest[i - 1] });
+            ContactNode { node, frame, seen: 1 }
+        }
+        _ => {
+            let free = |i: &usize| !fixed[node * D + i];
+            let order: Vec<usize> = (0..D).filter(free).chain((0..D).filter(|i| !free(i))).collect();
+            let frame = std::array::from_fn(|i| axis(order[i]));
+            ContactNode { node, frame, seen: (0..D).filter(free).count() }
+        }
+    };
+    nodes.into_iter().map(frame).collect()
+}
+
+impl<const D: usize> Contact<D> {
+    /// Nodes of this rank with directions along which the contact can hold a body at rest: the normal, unless the law never
+    /// presses or falls, and the tangents of friction.
+    pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
+        let presses = !self.law.is_zero() && self.law.monotonicity_constant() == 0.0;
+        let normal = |point: &Point<D>| {
+            let normal = point.normal;
+            point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()
+        };
+        let points = self.points.iter().filter(|_| presses).flat_map(normal);
+        let rubs = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
+        let tangents = rubs
+            .flat_map(|friction| &friction.points)
+            .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)));
+        points.chain(tangents).collect()
+    }
+}

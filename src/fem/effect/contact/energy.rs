@@ -1,0 +1,67 @@
+//! Energies that a contact stores, dissipates and takes from its obstacle, and its penetration.
+
+use super::{
+    Contact,
+    point::{Point, Vectors::Body},
+};
+use crate::{error::Result, linear_algebra::tensor::larger};
+
+impl<const D: usize> Contact<D> {
+    /// Energy in J that a step of this length dissipated, the scheme's own term, and the work of the obstacle on the body, from
+    /// velocities at its end (with ghosts).
+    ///
+    /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
+    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme. Friction `q` on an obstacle
+    /// of the velocity `w` takes `k q . v = k q . (v - w) + k q . w`: dissipated, given to the obstacle.
+    pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for point in &self.points {
+            let v = point.normal_component(Body, velocity);
+            let pressure = point.pressure_at(&self.law, Body, velocity);
+            let work = length * pressure * v;
+            let change = point.context.step_length * v;
+            let after = point.context.penetration + change;
+            let beside = length * v - change - point.shift;
+            let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
+            let stored = self.law.energy(after).zip(self.law.energy(before)).map(|(e, before)| e - before);
+            let numerical = match stored {
+                None => 0.0,
+                Some(stored) if pressure == 0.0 => stored,
+                Some(stored) => stored - pressure * (after - before) - pressure * beside,
+            };
+            let stored = stored.unwrap_or(0.0);
+            let given = if pressure == 0.0 { 0.0 } else { pressure * point.growth };
+            sums[0] += point.weight * (work - stored + numerical - given);
+            sums[1] += point.weight * numerical;
+            sums[2] -= point.weight * given;
+        }
+        if let Some(friction) = &self.friction {
+            sums[0] += length * friction.power(velocity);
+            sums[2] += length * friction.driving_power();
+        }
+        sums
+    }
+
+    /// How deep in m points here lie in the obstacle at `time`, at the most; minus infinity where none can touch it. A gap that
+    /// is not a number does not count: the first step refuses it.
+    pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
+        let depth = |point: &Point<D>| {
+            let gap = self.gap.at(time, &point.place, &point.normal);
+            gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(Body, displacement) - gap)
+        };
+        self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
+    }
+
+    /// Energy in J stored at `time`, from displacements with ghosts.
+    pub fn stored_energy(&self, time: f64, displacement: &[f64]) -> Result<f64> {
+        if self.law.energy(0.0).is_none() {
+            return Ok(0.0);
+        }
+        let energy = |point: &Point<D>| {
+            let gap = self.gap.at(time, &point.place, &point.normal)?;
+            let stored = self.law.energy(point.normal_component(Body, displacement) - gap);
+            Ok(point.weight * stored.unwrap_or(0.0))
+        };
+        self.points.iter().map(energy).sum()
+    }
+}

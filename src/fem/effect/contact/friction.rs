@@ -1,0 +1,396 @@
+//! Friction at the nodal points of a contact boundary.
+//!
+//! Along the tangents of a point the unknown of a step is the parameter `s = c v + q` of the friction law's radial graph, over
+//! `c`; `v` is the sliding velocity, relative to an obstacle that moves, and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
+//!
+//! ```text
+//! v = V(|s|, p) e                      dv = (V' e e^T + V / |s| (I - e e^T)) ds + V_p e dp
+//! q = s - c v                          dq = ds - c dv
+//! ```
+//!
+//! `p` is the contact pressure, which the bound follows in Newton's method, or a pressure that the fixed-point iteration
+//! holds. In terms of `dv`, where a point slides, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; where it sticks
+//! `dv = 0`. Where the normal graph is vertical, `dp` follows from the normal equation of the node: `mu e` times that
+//! equation is taken from the tangential ones ([`Friction::reduce`]).
+
+use super::{
+    point::{
+        Point, Unknown,
+        Vectors::{self, Body, Newton},
+    },
+    reference::{ReferenceValues, worst},
+    tangential_point::{ROUNDING, Tangent, TangentialPoint, span_without},
+};
+use crate::{
+    error::{Error, Result},
+    laws::contact::FrictionLaw,
+    linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
+    mesh::Mesh,
+};
+
+/// A friction law with its points.
+#[derive(Debug)]
+pub(super) struct Friction<const D: usize> {
+    pub law: FrictionLaw,
+    /// `c` in the parameter `s = c v + q`, in Pa s/m.
+    pub scale: f64,
+    /// Whether the bound follows the pressure while a step is solved.
+    pub follows: bool,
+    pub points: Vec<TangentialPoint<D>>,
+    /// Velocity in m/s of the obstacle along the tangents of each point; empty where it does not move.
+    pub drift: Vec<Vector<D>>,
+    /// Tangents that supports hold beside free ones, with the points of the contact; empty where the obstacle does not move.
+    pub held: Vec<(usize, Vector<D>)>,
+}
+
+/// What happens at a point with friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Motion {
+    Sticks,
+    Slides,
+    /// The law's bound follows the pressure, which is zero.
+    Separated,
+}
+
+impl<const D: usize> Friction<D> {
+    /// Puts the law on the points of a contact; refuses supports that leave no clear tangent, or no pressure.
+    pub fn new(
+        law: FrictionLaw,
+        points: &[Point<D>],
+        obstacle_moves: bool,
+        mesh: &Mesh<D>,
+        fixed: &[bool],
+    ) -> Result<Self> {
+        let (mut out, mut held_tangents) = (Vec::new(), Vec::new());
+        for (at, point) in points.iter().enumerate() {
+            let node = point.node();
+            let axes = (0..D).filter(|i| !fixed[node * D + i]);
+            let free: Vec<Vector<D>> =
+                axes.map(|axis| std::array::from_fn(|i| f64::from(u8::from(i == axis)))).collect();
+            if free.is_empty() {
+                continue;
+            }
+            let (held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
+            if held && law.follows_pressure() {
+                return Err(Error::Refused(format!(
+                    "friction at {place:?} m: a support holds the normal of the contact there and carries its pressure, so \
+                     that the bound of this friction law is not known; free the normal component there, or use tresca"
+                )));
+            }
+            if !held && point.stretch < 1.0 - ROUNDING {
+                return Err(Error::Refused(format!(
+                    "friction at {place:?} m: a support holds a component that is neither along the normal of the contact \
+                     nor square to it, so that no free direction is a tangent; hold all components there, or none"
+                )));
+            }
+            let (tangents, count) = span_without(&free, &[point.direction]);
+            if obstacle_moves && count > 0 {
+                held_tangents.extend(tangents_held(point, fixed).map(|tangent| (at, tangent)));
+            }
+            out.push(TangentialPoint {
+                at,
+                numbers: [node; 2],
+                weight: point.weight,
+                tangents,
+                count,
+                pressure: 0.0,
+                traction: [0.0; D],
+                tangent: Tangent::free(),
+                change: [0.0; D],
+            });
+        }
+        let follows = law.follows_pressure();
+        Ok(Self { law, scale: 1.0, follows, points: out, drift: Vec::new(), held: held_tangents })
+    }
+
+    /// Removes points that have no tangent.
+    pub fn keep_points_with_tangents(&mut self) {
+        self.points.retain(|point| point.count > 0);
+    }
+
+    /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
+    pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
+        for point in &mut self.points {
+            point.traction = point.along(Body, traction);
+            point.pressure = points[point.at].pressure;
+        }
+    }
+
+    /// Takes the pressures of `points` as those that the bounds follow.
+    pub fn take_pressures(&mut self, points: &[Point<D>]) {
+        self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
+    }
+
+    /// Turns velocities into unknowns.
+    pub fn unmap(&self, values: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(Newton, 1.0 / self.scale, &point.traction, values));
+        self.add_drift(-1.0, values);
+    }
+
+    /// Turns unknowns into velocities, after `points` took their pressures.
+    pub fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
+        let (law, scale) = (self.law, self.scale);
+        if self.follows {
+            self.take_pressures(points);
+        }
+        for point in &mut self.points {
+            let unknown = point.along(Newton, values);
+            let length = norm(&unknown);
+            let found = law.resolve(scale * length, scale, point.pressure);
+            let shares = if found.traction == 0.0 {
+                // Without traction the velocity is the unknown, to the last bit.
+                [1.0, 0.0]
+            } else {
+                [found.speed / length, found.traction / length]
+            };
+            point.traction = unknown.map(|x| shares[1] * x);
+            // A point that sticks has no velocity, without rounding errors.
+            let back = unknown.map(|x| shares[0] * x);
+            point.set(&back, values);
+        }
+        self.add_drift(1.0, values);
+    }
+
+    /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
+    fn add_drift(&self, factor: f64, values: &mut [f64]) {
+        let pairs = self.points.iter().zip(&self.drift);
+        pairs.for_each(|(point, drift)| point.add(Newton, factor, drift, values));
+    }
+
+    /// The points with their sliding velocities.
+    fn sliding(
+        &self,
+        vectors: Vectors,
+        velocity: &[f64],
+    ) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
+        self.points.iter().enumerate().map(move |(at, point)| {
+            let along = point.along(vectors, velocity);
+            let drift = self.drift.get(at);
+            (point, drift.map_or(along, |drift| std::array::from_fn(|i| along[i] - drift[i])))
+        })
+    }
+
+    /// Takes the derivative of the law at these unknowns, after `points` took their pressures.
+    ///
+    /// A point without pressure whose normal graph is vertical is about to be pressed: it sticks, which is one of the derivatives at
+    /// rest.
+    pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
+        let (law, scale, follows) = (self.law, self.scale, self.follows);
+        for point in &mut self.points {
+            let unknown = point.along(Newton, values);
+            let length = norm(&unknown);
+            let found = law.resolve(scale * length, scale, point.pressure);
+            let at_rest = length == 0.0 || found.speed == 0.0;
+            let touches = follows && points[point.at].theta == 0.0;
+            point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
+                Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
+            } else if at_rest {
+                // Without a bound.
+                Tangent::free()
+            } else {
+                Tangent {
+                    sticks: false,
+                    toward: unknown.map(|x| x / length),
+                    theta: [scale * found.derivative, found.speed / length],
+                    slopes: [found.slope, found.traction / found.speed],
+                    coefficient: if self.follows { found.coefficient } else { 0.0 },
+                }
+            };
+        }
+    }
+
+    /// Turns a change of the unknowns into the change of the velocities, after `points` took the change of pressures.
+    pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
+        let scale = self.scale;
+        for point in &mut self.points {
+            let unknown = point.along(Newton, values);
+            let Tangent { toward, theta, coefficient, .. } = point.tangent;
+            let ahead = dot(&toward, &unknown);
+            let pressed = coefficient * points[point.at].change / scale;
+            let velocity: Vector<D> = std::array::from_fn(|i| {
+                theta[1] * (unknown[i] - ahead * toward[i]) + theta[0] * (ahead - pressed) * toward[i]
+            });
+            point.change = std::array::from_fn(|i| scale * (unknown[i] - velocity[i]));
+            point.set(&velocity, values);
+        }
+    }
+
+    /// Adds the forces of the last evaluation.
+    pub fn add_forces(&self, forces: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.traction, forces));
+    }
+
+    /// Adds the change of the forces along the last direction.
+    pub fn add_derivative(&self, forces: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.change, forces));
+    }
+
+    /// Adds the tractions to nodal values.
+    pub fn add_tractions(&self, nodal: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.traction, nodal));
+    }
+
+    /// Adds the change of the forces with the velocity where points slide, without that of the pressure of vertical graphs.
+    pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
+        for point in self.points.iter().filter(|p| !p.tangent.sticks) {
+            let normal = &points[point.at];
+            let pressed = normal.slope * normal.along(Newton, direction);
+            point.add(Newton, point.weight, &point.sliding_change(direction, pressed), forces);
+        }
+    }
+
+    /// Takes the normal equations of nodes with a vertical normal graph from the tangential ones, where the bound follows
+    /// the pressure.
+    pub fn reduce(&self, points: &[Point<D>], values: &mut [f64]) {
+        for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
+            let normal = &points[point.at];
+            if normal.theta == 0.0 {
+                let open = normal.along(Newton, values);
+                point.add(Newton, -point.tangent.coefficient * open, &point.tangent.toward, values);
+            }
+        }
+    }
+
+    /// Removes from nodal values what moves points that stick.
+    pub fn project(&self, values: &mut [f64]) {
+        self.points.iter().filter(|p| p.tangent.sticks).for_each(|point| point.set(&[0.0; D], values));
+    }
+
+    /// Removes from nodal values what moves any point along its tangents.
+    pub fn remove_motions(&self, values: &mut [f64]) {
+        self.points.iter().for_each(|point| point.set(&[0.0; D], values));
+    }
+
+    /// Turns a change of velocities into the change of the unknowns, after that was done along the normals.
+    pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
+        for point in &self.points {
+            if point.tangent.sticks {
+                let open = point.along(Newton, open);
+                point.set(&open.map(|force| force / (self.scale * point.weight)), values);
+            } else {
+                let normal = &points[point.at];
+                let pressed = normal_scale * (1.0 - normal.theta) * normal.along(Newton, values);
+                point.add(Newton, 1.0 / self.scale, &point.sliding_change(values, pressed), values);
+            }
+        }
+    }
+
+    /// Whether, at the last linearisation, some point slides under a bound that follows the pressure.
+    pub fn is_coupled(&self) -> bool {
+        self.points.iter().any(|p| p.tangent.coefficient > 0.0)
+    }
+
+    /// Numbers that differ between linearisations with different sets of branches.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
+    }
+
+    /// Largest fall of the graphs of all points in Pa s/m, at the pressures that the bounds follow.
+    pub fn steepest_fall(&self) -> f64 {
+        let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
+        self.law.steepest_fall() * most
+    }
+
+    /// What happens at each point, at velocities in a vector of Newton's method.
+    pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
+        self.sliding(Newton, velocity).map(|(point, sliding)| {
+            if self.law.follows_pressure() && point.pressure <= 0.0 {
+                return Motion::Separated;
+            }
+            let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
+            let found = self.law.resolve(norm(&parameter), self.scale, point.pressure);
+            if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }
+        })
+    }
+
+    /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
+    pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
+        // Points are ordered by node, at most one a node.
+        let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
+        found.map_or([0.0; D], |at| self.points[at].along(Body, nodal))
+    }
+
+    /// Power in W that friction dissipates at these velocities.
+    pub fn power(&self, velocity: &[f64]) -> f64 {
+        let sliding = self.sliding(Body, velocity);
+        sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
+    }
+
+    /// Power in W that the obstacle gives the body by friction.
+    pub fn driving_power(&self) -> f64 {
+        let given = self.points.iter().zip(&self.drift).map(|(p, drift)| p.weight * dot(&p.traction, drift));
+        -given.sum::<f64>()
+    }
+
+    /// Largest sliding velocity and largest traction or bound at points here, at velocities in a vector of Newton's method.
+    pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
+        // Beside the velocity of the obstacle a slower sliding is rounding.
+        let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
+        self.sliding(Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
+            let bound = self.law.bound(0.0, points[point.at].pressure);
+            [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
+        })
+    }
+
+    /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
+    /// `range`; at most by a factor of the square root of 2 too large. `residual` holds the open forces in N; both are vectors of
+    /// Newton's method.
+    pub fn inclusion_residual(
+        &self,
+        points: &[Point<D>],
+        velocity: &[f64],
+        residual: &[f64],
+        range: [f64; 2],
+        reference: ReferenceValues,
+    ) -> f64 {
+        let range = [range[0].max(range[1] / reference.resistance[1]), range[1].max(reference.traction())];
+        let [speeds, tractions] = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let distance = |(point, sliding): (&TangentialPoint<D>, Vector<D>)| {
+            let open = point.along(Newton, residual);
+            let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
+            let pressure = points[point.at].pressure;
+            let (speed, size) = (norm(&sliding), norm(&traction));
+            let beyond = (size - self.law.bound(0.0, pressure)).max(0.0);
+            let to_rest = (speed / speeds).hypot(beyond / tractions);
+            if speed == 0.0 {
+                return to_rest;
+            }
+            let bound = self.law.bound(speed, pressure) / speed;
+            let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
+            to_rest.min(norm(&off) / tractions)
+        };
+        worst(self.sliding(Newton, velocity).map(distance))
+    }
+
+    /// Adds a unit velocity along the first tangent of each point to nodal values.
+    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+        self.points.iter().for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
+    }
+
+    /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
+    pub fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
+        for point in &self.points {
+            let along = point.along(Body, x);
+            point.add(Body, factor * point.weight, &along, forces);
+        }
+    }
+
+    /// `integral of w_tau^2` over the points here.
+    pub fn square(&self, nodal: &[f64]) -> f64 {
+        let square = |point: &TangentialPoint<D>| {
+            point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
+        };
+        self.points.iter().map(square).sum()
+    }
+}
+
+/// The directions along the boundary at a point that supports hold.
+fn tangents_held<const D: usize>(point: &Point<D>, fixed: &[bool]) -> impl Iterator<Item = Vector<D>> {
+    let normal = point.normal;
+    (0..D).filter(|i| fixed[point.node() * D + i]).filter_map(move |axis| {
+        let unit: Vector<D> = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        let tangent = add_scaled(&unit, -normal[axis], &normal);
+        let size = norm(&tangent);
+        (size > ROUNDING).then(|| tangent.map(|x| x / size))
+    })
+}

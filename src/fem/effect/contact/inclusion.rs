@@ -1,0 +1,48 @@
+//! How far velocities and tractions are off the graphs of the laws. All vectors are those of Newton's method.
+
+use super::{
+    Contact,
+    point::{Point, Unknown, Vectors::Newton},
+    reference::worst,
+};
+use crate::linear_algebra::tensor::larger;
+
+/// Share of the mean pressure of all forces of a step, beside which errors of the pressure count at least.
+const FORCE_SHARE: f64 = 0.01;
+
+impl<const D: usize> Contact<D> {
+    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs. Where the
+    /// law has no pressure, the velocity is that in any direction: its rounding bounds what can be resolved along the normal.
+    pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
+        let nothing = self.law.is_zero();
+        let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
+            let moved =
+                if nothing { point.speed(velocity) } else { point.normal_component(Newton, velocity).abs() };
+            let along = larger(moved, point.context_velocity());
+            [larger(v, along), larger(p, point.pressure_at(&self.law, Newton, velocity).abs())]
+        });
+        let sliding = self.friction.as_ref().map_or([0.0; 2], |f| f.range(&self.points, velocity));
+        [normal[0], normal[1], sliding[0], sliding[1]]
+    }
+
+    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
+    /// left of the equations of motion, in N; `range` scales where the law has no range of its own or a smaller one.
+    pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
+        let sliding = [range[2], range[3]];
+        // The velocity that the pressures would change, and the pressure of the forces, count where there is no other; of the
+        // latter a share where the law has a range of its own.
+        let share = if self.law.is_zero() || self.law.depends_on_displacement() { 1.0 } else { FORCE_SHARE };
+        let reference = self.reference;
+        let range =
+            [range[0].max(range[1] / reference.resistance[0]), range[1].max(share * reference.traction())];
+        let range = range.map(|size| if size > 0.0 { size } else { 1.0 });
+        let free = self.points.iter().filter(|p| p.unknown != Unknown::Held && p.can_touch());
+        let distance = |p: &Point<D>| {
+            let pressure = p.pressure_at(&self.law, Newton, velocity) - p.open_pressure(residual);
+            self.law.distance(p.normal_component(Newton, velocity), pressure, p.context, range)
+        };
+        let normal = worst(free.map(distance));
+        let Some(friction) = &self.friction else { return normal };
+        normal.max(friction.inclusion_residual(&self.points, velocity, residual, sliding, reference))
+    }
+}

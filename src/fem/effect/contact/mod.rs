@@ -1,0 +1,158 @@
+//! Contact: a law at the quadrature points of a boundary.
+//!
+//! At nodal points the unknown `x` of a step carries, in place of the velocity along the normal, the parameter of the
+//! law's graph: `s = c v + p`, which is `c f (x . m)`, with `m` the normal without held components at length 1 and `f` the
+//! length it had. [`Contact::map`] turns unknowns into velocities: `v = x + (V(s) / f - x . m) m`. Graphs may then be
+//! vertical: constraints and sticking. With `theta = c V'(s)` between 0 and 1,
+//!
+//! ```text
+//! R(x) = K v + sum w f p m - b
+//! J dx = K dv + sum w f^2 c (1 - theta) (dx . m) m,   dv = dx + (theta - 1) (dx . m) m
+//! ```
+//!
+//! In terms of `dv` the Jacobian is symmetric: `K + sum w f^2 c (1 - theta) / theta m m^T`, and `dv . m = 0` where `theta = 0`.
+//! With friction, the unknown along the tangents of nodal points is the parameter of the friction graph in the same way; see
+//! [`friction`].
+//!
+//! Vectors hold `D` values a node of the body on this rank; those of Newton's method, in `newton.rs`, may hold the nodes of
+//! contacts alone.
+//!
+//! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
+//! unknown; their law must not have vertical parts.
+
+mod bounds;
+mod count;
+mod directions;
+mod energy;
+mod friction;
+mod inclusion;
+mod newton;
+mod point;
+mod prepare;
+mod reference;
+mod sliding;
+mod squares;
+mod starts;
+mod tangential_point;
+mod unknowns;
+
+use crate::{
+    error::Result,
+    fem::space::surface_points,
+    laws::contact::{Gap, NormalResponse},
+    mesh::Mesh,
+    parallel::session::Session,
+};
+use friction::Friction;
+use point::{Point, Vectors::Body, gauss_points};
+
+pub use crate::laws::contact::Quadrature;
+pub use count::{COUNTS, PointCount};
+pub use directions::{ContactNode, contact_nodes};
+pub use reference::ReferenceValues;
+pub use unknowns::choose_unknowns;
+
+/// A law on a contact boundary.
+#[derive(Debug)]
+pub struct Contact<const D: usize> {
+    /// The law.
+    pub law: NormalResponse,
+    /// Distance to the obstacle along the normal.
+    pub gap: Gap,
+    /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
+    pub scale: f64,
+    /// The sizes that errors of velocities and tractions are relative to where the laws have no range of their own.
+    pub reference: ReferenceValues,
+    facets: Vec<u32>,
+    points: Vec<Point<D>>,
+    friction: Option<Friction<D>>,
+    needs_ghosts: bool,
+    derivatives: Derivatives,
+}
+
+/// Which derivatives of the laws the points hold. PETSc calls what takes and what uses them, so that the order of calls is checked in
+/// debug builds.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+enum Derivatives {
+    /// Nothing yet.
+    Unknown,
+    /// Those of the last linearisation.
+    Linearised,
+    /// These, and the changes along the direction last mapped.
+    AlongDirection,
+}
+
+impl<const D: usize> Contact<D> {
+    /// Puts the law on these facets of this rank. `fixed` has one flag a local component. Collective.
+    pub fn new(
+        session: &Session,
+        mesh: &Mesh<D>,
+        facets: &[u32],
+        quadrature: Quadrature,
+        law: NormalResponse,
+        gap: Gap,
+        fixed: &[bool],
+    ) -> Result<Self> {
+        let mut points: Vec<Point<D>> = match quadrature {
+            Quadrature::Nodal => surface_points(session, mesh, facets)?
+                .into_iter()
+                .map(|p| Point::nodal(p.node, p.normal, p.weight, fixed))
+                .collect(),
+            Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, fixed)).collect(),
+        };
+        for point in &mut points {
+            let mut place = [0.0; D];
+            for (node, share) in point.nodes() {
+                for i in 0..D {
+                    place[i] += share * mesh.nodes[node][i];
+                }
+            }
+            point.place = place;
+        }
+        let scale = 2.0 * law.monotonicity_constant() + 1.0;
+        let needs_ghosts = quadrature == Quadrature::Gauss;
+        let reference = ReferenceValues::default();
+        Ok(Self {
+            law,
+            gap,
+            scale,
+            reference,
+            facets: facets.to_vec(),
+            points,
+            friction: None,
+            needs_ghosts,
+            derivatives: Derivatives::Unknown,
+        })
+    }
+
+    /// Whether velocities of ghost nodes are read and forces on them written.
+    pub fn needs_ghosts(&self) -> bool {
+        self.needs_ghosts
+    }
+
+    /// Quadrature points on this rank.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Facets of this rank, local numbers.
+    pub fn facets(&self) -> &[u32] {
+        &self.facets
+    }
+
+    /// Its size on this rank, in m^(D-1).
+    pub fn area(&self) -> f64 {
+        self.points.iter().map(|point| point.weight).sum()
+    }
+
+    /// Adds the tractions in Pa on the body's obstacle to nodal values of the body, given its velocities with ghosts: `-sigma_nu`
+    /// along the free normal, and `-sigma_tau`.
+    pub fn add_tractions(&self, velocity: &[f64], nodal: &mut [f64]) {
+        for point in self.points.iter().filter(|_| !self.needs_ghosts) {
+            point.add_along(Body, point.pressure_at(&self.law, Body, velocity), nodal);
+        }
+        if let Some(friction) = &self.friction {
+            friction.add_tractions(nodal);
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! A quadrature point of a contact boundary.
+//!
+//! A point finds the values of its nodes in two kinds of vectors, [`Vectors`]. It holds the numbers of its nodes in both.
+
+use crate::{
+    fem::space::facet_rule,
+    laws::contact::{NodeContext, NormalResponse, Resolved},
+    linear_algebra::tensor::{Vector, norm},
+    mesh::{Mesh, shape::facet_normal},
+};
+
+/// The unknown along the normal at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unknown {
+    /// The parameter of the law's graph, in place of the velocity along `direction`.
+    Parameter,
+    /// The velocity itself.
+    Velocity,
+    /// None: supports hold all components along the normal.
+    Held,
+}
+
+/// The vectors of nodal values that contacts read and write, `D` values a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Vectors {
+    /// All nodes of the body on this rank.
+    Body,
+    /// The nodes at which Newton's method has unknowns: all nodes, or those of the contacts alone.
+    Newton,
+}
+
+/// A point where the law holds: its velocity is a mean of nodal ones, its pressure acts on the same nodes.
+#[derive(Debug, Clone)]
+pub(super) struct Point<const D: usize> {
+    /// Numbers of its nodes in the vectors of the body and in those of Newton's method; `count` of them are used.
+    numbers: [[u32; D]; 2],
+    count: usize,
+    /// Share of each node.
+    shares: [f64; D],
+    pub normal: Vector<D>,
+    /// Quadrature weight in m^(D-1).
+    pub weight: f64,
+    /// Force on each node per pressure, without held components, in m^(D-1).
+    force: [Vector<D>; D],
+    /// At nodal points: the normal without held components, of length 1.
+    pub direction: Vector<D>,
+    /// Length that the normal has left without held components.
+    pub stretch: f64,
+    pub unknown: Unknown,
+    /// Where the point was at first, in m.
+    pub place: Vector<D>,
+    /// Penetration and length of the step.
+    pub context: NodeContext,
+    /// `u_nu - gap` in m at the start of the step, both as they were then.
+    pub penetration_before: f64,
+    /// How far the gap grew in the step, in m.
+    pub growth: f64,
+    /// What the blend of a two-step scheme adds to the penetration, in m.
+    pub shift: f64,
+    /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
+    pub pressure: f64,
+    /// Share of a change of the unknown that is a change of velocity, at the last linearisation: `c V'(s)`.
+    pub theta: f64,
+    /// Slope of the law at the last linearisation, in Pa s/m.
+    pub slope: f64,
+    /// Change of the pressure along the last direction, in Pa.
+    pub change: f64,
+}
+
+impl<const D: usize> Point<D> {
+    pub fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
+        let mut point = Self {
+            numbers: [[0; D]; 2],
+            count: nodes.len(),
+            shares: [0.0; D],
+            normal,
+            weight,
+            force: [[0.0; D]; D],
+            direction: [0.0; D],
+            stretch: 0.0,
+            unknown: Unknown::Velocity,
+            place: [0.0; D],
+            context: NodeContext::default(),
+            penetration_before: 0.0,
+            growth: 0.0,
+            shift: 0.0,
+            pressure: 0.0,
+            theta: 1.0,
+            slope: 0.0,
+            change: 0.0,
+        };
+        for (a, (&node, &share)) in nodes.iter().zip(shares).enumerate() {
+            point.numbers.iter_mut().for_each(|numbers| numbers[a] = node);
+            point.shares[a] = share;
+            for i in 0..D {
+                if !fixed[node as usize * D + i] {
+                    point.force[a][i] = weight * share * normal[i];
+                }
+            }
+        }
+        point
+    }
+
+    /// A point at a node, whose unknown is the parameter of the law.
+    pub fn nodal(node: u32, normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
+        let mut point = Self::new(&[node], &[1.0], normal, weight, fixed);
+        let free: Vector<D> =
+            std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
+        point.stretch = norm(&free);
+        // A shorter one is rounding in the normal of a face that supports hold.
+        if point.stretch > 1e-9 {
+            point.direction = free.map(|x| x / point.stretch);
+            point.unknown = Unknown::Parameter;
+        } else {
+            point.force = [[0.0; D]; D];
+            point.unknown = Unknown::Held;
+        }
+        point
+    }
+
+    /// The first of its nodes on this rank: the only one of a nodal point.
+    pub fn node(&self) -> usize {
+        self.first(Vectors::Body)
+    }
+
+    /// The number of its first node in these vectors.
+    #[inline]
+    pub fn first(&self, vectors: Vectors) -> usize {
+        self.numbers[vectors as usize][0] as usize
+    }
+
+    /// Sets the numbers of its nodes in the vectors of Newton's method, given those in the vectors of the body.
+    pub fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
+        self.numbers[Vectors::Newton as usize] =
+            self.numbers[Vectors::Body as usize].map(|node| number(node as usize) as u32);
+    }
+
+    /// Nodes of this rank and shares.
+    pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.places(Vectors::Body)
+    }
+
+    /// Numbers of the nodes in these vectors, and shares.
+    fn places(&self, vectors: Vectors) -> impl Iterator<Item = (usize, f64)> {
+        self.numbers[vectors as usize][..self.count].iter().map(|&node| node as usize).zip(self.shares)
+    }
+
+    /// The normal component of the mean of nodal values.
+    #[inline]
+    pub fn normal_component(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        let numbers = &self.numbers[vectors as usize];
+        let mut sum = 0.0;
+        for a in 0..self.count {
+            let value = &nodal[numbers[a] as usize * D..][..D];
+            for i in 0..D {
+                sum += self.shares[a] * self.normal[i] * value[i];
+            }
+        }
+        sum
+    }
+
+    /// Length of the mean of velocities in vectors of Newton's method.
+    pub fn speed(&self, nodal: &[f64]) -> f64 {
+        let mean =
+            |i: usize| self.places(Vectors::Newton).map(|(node, share)| share * nodal[node * D + i]).sum();
+        norm::<D>(&std::array::from_fn(mean))
+    }
+
+    /// The component of a nodal value along the free part of the normal.
+    #[inline]
+    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+        let value = &nodal[self.first(vectors) * D..][..D];
+        let mut sum = 0.0;
+        for i in 0..D {
+            sum += self.direction[i] * value[i];
+        }
+        sum
+    }
+
+    /// Adds to a nodal value along the free part of the normal.
+    #[inline]
+    pub fn add_along(&self, vectors: Vectors, amount: f64, nodal: &mut [f64]) {
+        let target = &mut nodal[self.first(vectors) * D..][..D];
+        for i in 0..D {
+            target[i] += amount * self.direction[i];
+        }
+    }
+
+    /// Adds the forces in N of a pressure in Pa.
+    #[inline]
+    pub fn add_force(&self, vectors: Vectors, pressure: f64, forces: &mut [f64]) {
+        let numbers = &self.numbers[vectors as usize];
+        for a in 0..self.count {
+            let target = &mut forces[numbers[a] as usize * D..][..D];
+            for i in 0..D {
+                target[i] += pressure * self.force[a][i];
+            }
+        }
+    }
+
+    /// The point of the law's graph that the unknown `along` the direction stands for.
+    #[inline]
+    pub fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
+        law.resolve(scale * self.stretch * along, scale, self.context)
+    }
+
+    /// The normal velocity in m/s that would close the gap in the step, without its sign; 0 for laws without a gap.
+    pub fn context_velocity(&self) -> f64 {
+        if self.context.step_length > 0.0 && self.can_touch() {
+            (self.context.penetration / self.context.step_length).abs()
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether there is an obstacle along the normal.
+    pub fn can_touch(&self) -> bool {
+        self.context.penetration > f64::NEG_INFINITY
+    }
+
+    /// Pressure in Pa, given nodal velocities.
+    pub fn pressure_at(&self, law: &NormalResponse, vectors: Vectors, velocity: &[f64]) -> f64 {
+        match self.unknown {
+            Unknown::Parameter => self.pressure,
+            Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
+            Unknown::Held => 0.0,
+        }
+    }
+
+    /// The normal force per area that a residual, a vector of Newton's method, leaves open here.
+    pub fn open_pressure(&self, residual: &[f64]) -> f64 {
+        let mut largest = 0.0f64;
+        for a in 0..self.count {
+            let at = self.numbers[Vectors::Newton as usize][a] as usize * D;
+            let Some(value) = residual.get(at..at + D) else { continue };
+            let share: f64 = (0..D).map(|i| self.force[a][i] * self.force[a][i]).sum::<f64>().sqrt();
+            let along: f64 = (0..D).map(|i| self.force[a][i] * value[i]).sum();
+            if share > 0.0 && (along / (share * share)).abs() > largest.abs() {
+                largest = along / (share * share);
+            }
+        }
+        largest
+    }
+}
+
+/// The Gauss points of a facet.
+pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
+    let nodes = mesh.facets[facet as usize];
+    let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+    let measure = norm(&normal);
+    let unit = normal.map(|x| x / measure);
+    let rule = facet_rule::<D>().iter();
+    rule.map(|(place, weight)| Point::new(&nodes, &place[..D], unit, measure * weight, fixed)).collect()
+}

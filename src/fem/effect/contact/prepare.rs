@@ -1,0 +1,98 @@
+//! What a step prepares at the points of a contact. Vectors are those of the body.
+
+use super::{
+    Contact,
+    point::{Point, Unknown, Vectors::Body},
+    tangential_point::ROUNDING,
+};
+use crate::{
+    error::{Error, Result},
+    fem::effect::{Blend, Step},
+    laws::contact::{NodeContext, Rate},
+    linear_algebra::tensor::{dot, norm},
+};
+
+impl<const D: usize> Contact<D> {
+    /// Evaluates the gap and the obstacle's motion for a step of this length to `time`, from the displacement at its start (with
+    /// ghosts).
+    pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
+        if !self.law.depends_on_displacement() {
+            return Ok(());
+        }
+        for point in &mut self.points {
+            let gap_at = |time| self.gap.at(time, &point.place, &point.normal);
+            let (gap, before) = (gap_at(time)?, gap_at(time - length)?);
+            let along = point.normal_component(Body, displacement);
+            point.context = NodeContext { penetration: along - gap, step_length: length };
+            point.penetration_before = along - before;
+            point.shift = 0.0;
+            // Without an obstacle at the start of the step, the gap counts as closed there: equal to the displacement.
+            point.growth = if before.is_finite() { gap - before } else { gap - along };
+        }
+        self.set_drift(Rate::euler(time, length))
+    }
+
+    /// After [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of the blend
+    /// and a nodal shift with ghosts. The obstacle's velocity follows from its places by the same formula.
+    pub fn blend(&mut self, step: Step, blend: Blend, shift: &[f64]) -> Result<()> {
+        if !self.law.depends_on_displacement() {
+            return Ok(());
+        }
+        for point in &mut self.points {
+            debug_assert!(point.shift == 0.0, "the point was prepared");
+            point.shift = point.normal_component(Body, shift);
+            point.context.penetration += point.shift;
+            point.context.step_length = blend.length;
+        }
+        let before = step.time - step.length;
+        let recent = [before, blend.recent / blend.length];
+        let earlier = [before - step.previous_length, blend.earlier / blend.length];
+        self.set_drift(Rate { time: step.time, before: [recent, earlier] })
+    }
+
+    /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
+    pub fn restore_pressures(&mut self, traction: &[f64]) {
+        for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
+            point.pressure = point.along(Body, traction);
+        }
+        if let Some(friction) = &mut self.friction {
+            friction.restore_pressures(&self.points, traction);
+        }
+    }
+
+    /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
+    pub fn may_drift(&self) -> bool {
+        self.friction.is_some() && self.gap.may_drag()
+    }
+
+    /// The sum over points here of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
+    pub fn drift_square(&self) -> f64 {
+        let drift = self.friction.iter().flat_map(|friction| &friction.drift);
+        drift.map(|drift| dot(drift, drift)).sum()
+    }
+
+    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold one tangent
+    /// of a point along this motion and leave another free: the direction of sliding depends on both, and only the free one is an
+    /// unknown. Where supports hold all tangents, the friction does not matter.
+    fn set_drift(&mut self, rate: Rate) -> Result<()> {
+        let Some(friction) = self.friction.as_mut().filter(|_| self.gap.may_drag()) else { return Ok(()) };
+        let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
+        let velocity = |point: &Point<D>| gap.velocity_along(&motion, rate.time, &point.place, &point.normal);
+        friction.drift.clear();
+        for point in &friction.points {
+            friction.drift.push(point.part(&velocity(&points[point.at])?));
+        }
+        for (at, tangent) in &friction.held {
+            let (point, velocity) = (&points[*at], velocity(&points[*at])?);
+            let along = dot(tangent, &velocity);
+            if point.can_touch() && along.abs() > ROUNDING * norm(&velocity) {
+                return Err(Error::Refused(format!(
+                    "friction at {:?} m: a support holds a direction there in which the obstacle moves, at {along} m/s at t = {} s, \
+                     and leaves another free, so that the friction along that is not known; hold all components there, or none",
+                    point.place, rate.time
+                )));
+            }
+        }
+        Ok(())
+    }
+}

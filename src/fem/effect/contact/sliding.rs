@@ -1,0 +1,86 @@
+//! The friction of a contact.
+
+use super::{Contact, friction::Friction, point::Vectors};
+use crate::{
+    error::{Error, Result},
+    laws::contact::FrictionLaw,
+    linear_algebra::tensor::{Vector, larger},
+    mesh::Mesh,
+};
+
+impl<const D: usize> Contact<D> {
+    /// Adds friction, for which `fixed` has one flag a local component; before [`choose_unknowns`](super::choose_unknowns). Refuses supports that
+    /// leave no tangent, or no pressure where the law needs one.
+    pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, fixed: &[bool]) -> Result<()> {
+        if self.needs_ghosts {
+            return Err(Error::Refused(
+                "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
+            ));
+        }
+        self.friction = Some(Friction::new(law, &self.points, self.gap.may_drag(), mesh, fixed)?);
+        Ok(())
+    }
+
+    /// The friction law, if there is friction.
+    pub fn friction(&self) -> Option<FrictionLaw> {
+        self.friction.as_ref().map(|friction| friction.law)
+    }
+
+    /// Points with friction on this rank.
+    pub fn friction_point_count(&self) -> usize {
+        self.friction.as_ref().map_or(0, |friction| friction.points.len())
+    }
+
+    /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound follows the contact
+    /// pressure while a step is solved.
+    pub fn set_friction(&mut self, scale: f64, follows: bool) {
+        if let Some(friction) = &mut self.friction {
+            friction.scale = scale;
+            friction.follows = follows && friction.law.follows_pressure();
+        }
+    }
+
+    /// `c` in the parameter of the friction graph in Pa s/m; 0 without friction.
+    pub fn friction_scale(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |friction| friction.scale)
+    }
+
+    /// Sets the pressures that friction bounds follow to those of the points.
+    pub fn take_pressures(&mut self) {
+        if let Some(friction) = &mut self.friction {
+            friction.take_pressures(&self.points);
+        }
+    }
+
+    /// Steepest fall of the friction graphs of points here in Pa s/m, at the pressures that its bounds follow.
+    pub fn steepest_friction_fall(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, Friction::steepest_fall)
+    }
+
+    /// The steepest falls in Pa s/m of the normal and of the friction graph, as far as they are known before a step: friction
+    /// that follows a pressure without bounds counts as not falling; see [`unknown_fall`](Self::unknown_fall).
+    pub fn known_falls(&self) -> [f64; 2] {
+        let friction = self.friction().map_or(0.0, |friction| friction.steepest_fall());
+        let most = self.law.greatest_pressure();
+        let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
+        [self.law.monotonicity_constant(), tangential]
+    }
+
+    /// The steepest fall of the friction coefficient in s/m, where the pressure that multiplies it has no bound.
+    pub fn unknown_fall(&self) -> Option<f64> {
+        let fall = self.friction()?.steepest_fall();
+        (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
+    }
+
+    /// The largest contact pressure in Pa at points here, at least 0, in the step just solved, at its velocities with ghosts.
+    pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
+        self.points
+            .iter()
+            .fold(0.0, |most, point| larger(most, point.pressure_at(&self.law, Vectors::Body, velocity)))
+    }
+
+    /// The friction traction `-sigma_tau` in Pa at an owned node, from the nodal tractions of the state.
+    pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
+        self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
+    }
+}

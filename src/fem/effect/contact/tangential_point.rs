@@ -1,0 +1,134 @@
+//! The tangential side of a contact point.
+
+use super::point::Vectors::{self, Body, Newton};
+use crate::linear_algebra::tensor::{Vector, dot, norm};
+
+/// A length below which a direction is rounding.
+pub(super) const ROUNDING: f64 = 1e-9;
+
+/// The tangential side of a nodal point.
+#[derive(Debug, Clone)]
+pub(super) struct TangentialPoint<const D: usize> {
+    /// Its number among the points of the contact.
+    pub at: usize,
+    /// Numbers of its node in the vectors of the body and in those of Newton's method.
+    pub numbers: [usize; 2],
+    pub weight: f64,
+    /// Orthonormal; `count` of them are used.
+    pub tangents: [Vector<D>; D],
+    pub count: usize,
+    /// The contact pressure in Pa that the bound follows.
+    pub pressure: f64,
+    /// `q` in Pa at the last evaluation.
+    pub traction: Vector<D>,
+    /// The last linearisation.
+    pub tangent: Tangent<D>,
+    /// Change of `q` along the last direction.
+    pub change: Vector<D>,
+}
+
+/// The derivative at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tangent<const D: usize> {
+    pub sticks: bool,
+    /// `e`.
+    pub toward: Vector<D>,
+    /// `c V'` and `c V / |s|`.
+    pub theta: [f64; 2],
+    /// `g'` and `g / V`.
+    pub slopes: [f64; 2],
+    /// `mu`: change of the bound with the contact pressure, if it follows that.
+    pub coefficient: f64,
+}
+
+impl<const D: usize> Tangent<D> {
+    pub fn free() -> Self {
+        Self { sticks: false, toward: [0.0; D], theta: [1.0; 2], slopes: [0.0; 2], coefficient: 0.0 }
+    }
+}
+
+impl<const D: usize> TangentialPoint<D> {
+    /// Its node on this rank.
+    pub fn node(&self) -> usize {
+        self.numbers[Body as usize]
+    }
+
+    /// Removes what is not orthogonal to this direction from the tangents.
+    pub fn remove_direction(&mut self, direction: &Vector<D>) {
+        let mut along = [0.0; D];
+        for tangent in &self.tangents[..self.count] {
+            let share = dot(tangent, direction);
+            (0..D).for_each(|i| along[i] += share * tangent[i]);
+        }
+        let size = norm(&along);
+        if size > ROUNDING {
+            let along = along.map(|x| x / size);
+            (self.tangents, self.count) = span_without(&self.tangents[..self.count], &[along]);
+        }
+    }
+
+    /// The part of a nodal value along the tangents.
+    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
+        let value = &nodal[self.numbers[vectors as usize] * D..][..D];
+        self.part(&std::array::from_fn(|i| value[i]))
+    }
+
+    /// The part of a vector along the tangents.
+    pub fn part(&self, vector: &Vector<D>) -> Vector<D> {
+        let mut out = [0.0; D];
+        for tangent in &self.tangents[..self.count] {
+            let along: f64 = (0..D).map(|i| tangent[i] * vector[i]).sum();
+            (0..D).for_each(|i| out[i] += along * tangent[i]);
+        }
+        out
+    }
+
+    /// Adds to a nodal value.
+    pub fn add(&self, vectors: Vectors, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
+        let target = &mut nodal[self.numbers[vectors as usize] * D..][..D];
+        (0..D).for_each(|i| target[i] += factor * vector[i]);
+    }
+
+    /// Replaces the part of a value along the tangents in a vector of Newton's method.
+    pub fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
+        let now = self.along(Newton, nodal);
+        let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
+        self.add(Newton, 1.0, &change, nodal);
+    }
+
+    /// Change of the traction at a point that slides, with a change of the velocity, a vector of Newton's method, and of the pressure.
+    pub fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
+        let Tangent { toward, slopes, coefficient, .. } = self.tangent;
+        let velocity = self.along(Newton, direction);
+        let ahead = dot(&toward, &velocity);
+        std::array::from_fn(|i| {
+            slopes[1] * (velocity[i] - ahead * toward[i])
+                + (slopes[0] * ahead + coefficient * pressed) * toward[i]
+        })
+    }
+}
+
+/// An orthonormal basis of what these orthonormal vectors span, without these orthonormal or zero directions.
+pub(super) fn span_without<const D: usize>(
+    vectors: &[Vector<D>],
+    directions: &[Vector<D>],
+) -> ([Vector<D>; D], usize) {
+    let (mut basis, mut count) = ([[0.0; D]; D], 0);
+    for vector in vectors {
+        let mut left = *vector;
+        // Twice, so that what is left is orthogonal to rounding.
+        for _ in 0..2 {
+            for known in directions.iter().chain(&basis[..count]) {
+                let along = dot(known, &left);
+                (0..D).for_each(|i| left[i] -= along * known[i]);
+            }
+        }
+        // Of D vectors, those that lack a dimension of their span can't all be shorter than this.
+        let size = norm(&left);
+        if size > 0.9 / (D as f64).sqrt() {
+            basis[count] = left.map(|x| x / size);
+            count += 1;
+        }
+    }
+    (basis, count)
+}

@@ -1,0 +1,100 @@
+//! At which points the parameter of the law's graph can be the unknown.
+
+use super::{Contact, point::Unknown};
+use crate::{
+    error::{Error, Result},
+    linear_algebra::tensor::dot,
+    mesh::Mesh,
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Cosine below which directions at a node count as orthogonal.
+const ORTHOGONAL: f64 = 1e-9;
+
+/// Decides at which points the unknown is the velocity, because directions at a node are not orthogonal; refuses laws
+/// with vertical parts there and at Gauss points.
+pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
+    let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
+    for (number, contact) in contacts.iter().enumerate() {
+        if contact.needs_ghosts {
+            if contact.law.has_vertical_parts() || contact.law.depends_on_displacement() {
+                return Err(Error::Refused(
+                    "contact at Gauss points needs a law of the velocity without jumps: use quadrature = \"nodal\"".into(),
+                ));
+            }
+            continue;
+        }
+        for (at, point) in contact.points.iter().enumerate().filter(|(_, p)| p.unknown == Unknown::Parameter)
+        {
+            around.entry(point.node()).or_default().push((number, at));
+        }
+    }
+    keep_tangents_free_of_normals(contacts, &around);
+    let with_friction = refuse_shared_tangents(contacts, mesh)?;
+    for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {
+        let direction = |&(number, at): &(usize, usize)| contacts[number].points[at].direction;
+        let skew = (1..places.len()).any(|i| {
+            places[..i].iter().any(|other| dot(&direction(other), &direction(&places[i])).abs() > ORTHOGONAL)
+        });
+        if !skew {
+            continue;
+        }
+        if with_friction.contains(&node) {
+            return Err(Error::Refused(format!(
+                "contact at {:?} m: boundaries meet at an angle that is not square, and friction acts there; round the edge \
+                 with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
+                mesh.nodes[node]
+            )));
+        }
+        for (number, at) in places {
+            if contacts[number].law.has_vertical_parts() {
+                return Err(Error::Refused(format!(
+                    "contact at {:?} m: boundaries meet at an angle that is not square, and a law with jumps or \
+                     constraints acts there; round the edge with facets that turn by less than 40 degrees each, or leave \
+                     one of the boundaries out of contact",
+                    mesh.nodes[node]
+                )));
+            }
+            contacts[number].points[at].unknown = Unknown::Velocity;
+        }
+    }
+    Ok(())
+}
+
+/// Friction at an edge acts along what is a tangent of every contact boundary there.
+fn keep_tangents_free_of_normals<const D: usize>(
+    contacts: &mut [Contact<D>],
+    around: &BTreeMap<usize, Vec<(usize, usize)>>,
+) {
+    let normal = |&(number, at): &(usize, usize)| ((number, at), contacts[number].points[at].direction);
+    let normals: BTreeMap<usize, Vec<_>> =
+        around.iter().map(|(&node, places)| (node, places.iter().map(normal).collect())).collect();
+    for (number, contact) in contacts.iter_mut().enumerate() {
+        let Some(friction) = &mut contact.friction else { continue };
+        for point in &mut friction.points {
+            let own = (number, point.at);
+            let others = normals.get(&point.node()).into_iter().flatten();
+            others.filter(|(at, _)| *at != own).for_each(|(_, direction)| point.remove_direction(direction));
+        }
+        friction.keep_points_with_tangents();
+    }
+}
+
+/// The nodes with friction; along one direction only that of one boundary can act.
+fn refuse_shared_tangents<const D: usize>(
+    contacts: &[Contact<D>],
+    mesh: &Mesh<D>,
+) -> Result<BTreeSet<usize>> {
+    let mut nodes = BTreeSet::new();
+    let frictions = contacts.iter().filter_map(|contact| contact.friction.as_ref());
+    for point in frictions.flat_map(|friction| &friction.points) {
+        if !nodes.insert(point.node()) {
+            return Err(Error::Refused(format!(
+                "friction at {:?} m: two boundaries with friction meet at an edge there, and both would act along it; give \
+                 friction to one of them only, or round the edge",
+                mesh.nodes[point.node()]
+            )));
+        }
+    }
+    Ok(nodes)
+}

@@ -1,0 +1,42 @@
+use super::{Effect, Energy, Evaluation, Outcome, Phases, Step, Term, mass};
+use crate::{
+    fem::space::{Batch, Needs},
+    laws::material::ByMaterial,
+};
+
+/// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
+#[derive(Debug)]
+pub struct Inertia {
+    /// Density in kg/m^d.
+    pub density: ByMaterial<f64>,
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
+    fn name(&self) -> &'static str {
+        "inertia"
+    }
+
+    fn phases(&self, _: Evaluation) -> Phases {
+        let velocity = Needs { velocity: true, ..Needs::default() };
+        let both = Needs { velocity_change: true, ..velocity };
+        Phases { start: Some(velocity), energy: Some(both), ..Phases::default() }
+    }
+
+    fn term(&self) -> Term<'_> {
+        Term::Mass(&self.density)
+    }
+
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, _: &mut Outcome) {
+        let length = match at {
+            Evaluation::Converged => step.length,
+            Evaluation::Start(blend) | Evaluation::End(blend) => blend.length,
+        };
+        mass::add_to_batch(&self.density, 1.0 / length, batch);
+    }
+
+    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(&density) = self.density.get(batch.material) else { return };
+        energy.kinetic += 0.5 * mass::square(density, batch.cells, &batch.velocity);
+        energy.numerical -= 0.5 * mass::square(density, batch.cells, &batch.velocity_change);
+    }
+}

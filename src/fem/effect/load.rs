@@ -1,0 +1,133 @@
+//! Tractions and body forces.
+
+use crate::{
+    error::{Error, Result},
+    fem::space::{Geometry, cell_rule, facet_rule},
+    job::{BodyForce, Scalar},
+    linear_algebra::tensor::{Vector, norm},
+    mesh::{Mesh, shape::facet_normal},
+};
+
+/// A force per area on facets of this rank.
+#[derive(Debug)]
+pub struct Traction {
+    /// Local facets.
+    pub facets: Vec<u32>,
+    /// One component an axis, in Pa.
+    pub value: Vec<Scalar>,
+}
+
+/// All loads of a job.
+#[derive(Debug, Default)]
+pub struct Load {
+    /// Forces on the surface.
+    pub tractions: Vec<Traction>,
+    /// Forces in the interior.
+    pub body_forces: Vec<BodyForce>,
+}
+
+impl Load {
+    /// Whether there is any load.
+    pub fn is_empty(&self) -> bool {
+        self.tractions.is_empty() && self.body_forces.is_empty()
+    }
+
+    /// Whether the nodal forces are the same at all times.
+    pub fn is_steady(&self) -> bool {
+        let values = self.tractions.iter().map(|t| &t.value).chain(self.body_forces.iter().map(|b| &b.value));
+        !values.flatten().any(Scalar::depends_on_time)
+    }
+
+    /// Adds the nodal forces at `time` to `forces` (`D` a local node, ghosts to be added to their owners), by
+    /// quadrature of degree 2.
+    pub fn add<const D: usize>(
+        &self,
+        mesh: &Mesh<D>,
+        geometry: &Geometry<D>,
+        time: f64,
+        forces: &mut [f64],
+    ) -> Result<()> {
+        for traction in &self.tractions {
+            for &facet in &traction.facets {
+                let nodes = mesh.facets[facet as usize];
+                let corners = nodes.map(|n| mesh.nodes[n as usize]);
+                let measure = norm(&facet_normal(&corners));
+                for (place, weight) in facet_rule::<D>() {
+                    let value = evaluate(&traction.value, time, &point(&corners, place), "traction")?;
+                    scatter(forces, &nodes, place, measure * weight, &value);
+                }
+            }
+        }
+        for body_force in &self.body_forces {
+            for (number, cell) in geometry.iter().enumerate() {
+                let nodes = mesh.cell(number);
+                let mut corners = [[0.0; D]; 4];
+                for (corner, &node) in corners.iter_mut().zip(nodes) {
+                    *corner = mesh.nodes[node as usize];
+                }
+                for (place, weight) in cell_rule::<D>() {
+                    let at = point(&corners[..=D], place);
+                    let value = evaluate(&body_force.value, time, &at, "body_force")?;
+                    scatter(forces, nodes, place, cell.volume * weight, &value);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn point<const D: usize>(corners: &[Vector<D>], place: &[f64]) -> Vector<D> {
+    let mut out = [0.0; D];
+    for (corner, share) in corners.iter().zip(place) {
+        for i in 0..D {
+            out[i] += share * corner[i];
+        }
+    }
+    out
+}
+
+fn scatter<const D: usize>(forces: &mut [f64], nodes: &[u32], place: &[f64], weight: f64, value: &Vector<D>) {
+    for (&node, share) in nodes.iter().zip(place) {
+        for i in 0..D {
+            forces[node as usize * D + i] += weight * share * value[i];
+        }
+    }
+}
+
+/// The components at a time and point; refused where one is not finite.
+pub(super) fn evaluate<const D: usize>(
+    value: &[Scalar],
+    time: f64,
+    at: &Vector<D>,
+    what: &str,
+) -> Result<Vector<D>> {
+    let mut out = [0.0; D];
+    for (i, component) in value.iter().enumerate().take(D) {
+        out[i] = component.evaluate(time, at);
+        if !out[i].is_finite() {
+            return Err(Error::Failed(format!(
+                "{what}: component {} is {} at t = {time} s, position {at:?} m; correct the expression in the job",
+                ["x", "y", "z"][i],
+                out[i]
+            )));
+        }
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Expression;
+
+    #[test]
+    fn loads_are_steady_where_neither_tractions_nor_body_forces_depend_on_time() {
+        let of = |text: &str| vec![Scalar::Expression(Expression::parse(text).expect("an expression"))];
+        let load = |traction: &str, force: &str| Load {
+            tractions: vec![Traction { facets: Vec::new(), value: of(traction) }],
+            body_forces: vec![BodyForce { value: of(force) }],
+        };
+        assert!(load("x", "3*y").is_steady() && Load::default().is_steady());
+        assert!(!load("t", "3*y").is_steady() && !load("x", "3*t").is_steady());
+    }
+}

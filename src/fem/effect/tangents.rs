@@ -1,0 +1,80 @@
+use crate::laws::material::Tangent;
+
+/// The part of the Jacobian of an implicit step that the constant matrix does not contain: for cells that flow or are damaged, the
+/// derivative of the stress by the strain rate beyond that of elasticity, in Pa s; for nodes with adhesion or contact memory, the
+/// derivative of minus the force by the velocity, in N s/m.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tangents {
+    cells: Vec<u32>,
+    values: Vec<f64>,
+    nodes: Vec<u32>,
+    nodal: Vec<f64>,
+    skew: bool,
+}
+
+impl Tangents {
+    /// Removes all cells and nodes, and reserves room for so many cells; the system provides the memory when it is written.
+    pub fn restart<const S: usize>(&mut self, cells: usize) {
+        self.skew = false;
+        self.nodes.clear();
+        self.nodal.clear();
+        self.cells.clear();
+        self.cells.reserve(cells);
+        self.values.clear();
+        self.values.reserve(cells * S * S);
+    }
+
+    /// Adds the matrix of a cell by its local number; `symmetric` is whether it is symmetric, if
+    /// [`FlowProperties::has_symmetric_tangent`](super::FlowProperties::has_symmetric_tangent) says so of its effect.
+    pub(super) fn push<const S: usize>(&mut self, cell: usize, tangent: &Tangent<S>, symmetric: bool) {
+        self.skew |= !symmetric;
+        self.cells.push(cell as u32);
+        self.values.extend_from_slice(tangent.as_flattened());
+    }
+
+    /// The matrix of a cell, inserted as zero if it is absent, and whether it was present: for effects that change the stress of
+    /// others.
+    pub(super) fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
+        // Cells come in their order.
+        let found = self.cells.binary_search(&(cell as u32));
+        let at = found.unwrap_or_else(|at| {
+            self.cells.insert(at, cell as u32);
+            self.values.splice(at * S * S..at * S * S, std::iter::repeat_n(0.0, S * S));
+            at
+        });
+        (&mut self.values[at * S * S..][..S * S], found.is_ok())
+    }
+
+    /// Records that a matrix is not symmetric.
+    pub(super) fn mark_skew(&mut self) {
+        self.skew = true;
+    }
+
+    /// Adds the matrix of a node of this rank.
+    pub(super) fn push_node<const D: usize>(&mut self, node: u32, tangent: &[[f64; D]; D], symmetric: bool) {
+        self.skew |= !symmetric;
+        self.nodes.push(node);
+        self.nodal.extend_from_slice(tangent.as_flattened());
+    }
+
+    /// Adds the change of the forces of nodes with a velocity to `forces`, `D` values a node.
+    pub fn add_nodal<const D: usize>(&self, velocity: &[f64], forces: &mut [f64]) {
+        for (&node, tangent) in self.nodes.iter().zip(self.nodal.chunks_exact(D * D)) {
+            let at = node as usize * D;
+            for (i, row) in tangent.chunks_exact(D).enumerate() {
+                let change = row.iter().zip(&velocity[at..at + D]).map(|(t, v)| t * v).sum::<f64>();
+                forces[at + i] += change;
+            }
+        }
+    }
+
+    /// Whether the matrices of all cells and nodes are symmetric.
+    pub fn are_symmetric(&self) -> bool {
+        !self.skew
+    }
+
+    /// Cells and their matrices, row by row.
+    pub fn iter<const S: usize>(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        self.cells.iter().map(|&cell| cell as usize).zip(self.values.chunks_exact(S * S))
+    }
+}

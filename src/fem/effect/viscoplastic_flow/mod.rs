@@ -1,0 +1,116 @@
+mod explicit;
+mod implicit;
+
+use super::{
+    Curvature, Effect, Energy, Evaluation, FlowProperties, HistoryStore, Outcome, Phases, Step, StressError,
+    Term, cell_history::CellHistory, isotropic,
+};
+use crate::{
+    fem::space::{Batch, CellRun, Integrity, Needs},
+    laws::material::{ByMaterial, Flow, FlowLaw},
+};
+
+/// Viscoplastic flow, by the stress `H` that it leaves in the elastic stress `E e(u) + H`, one tensor for each cell that flows, and the
+/// viscoplastic strain that hardening cells accumulate.
+#[derive(Debug)]
+pub struct ViscoplasticFlow<const S: usize> {
+    laws: ByMaterial<FlowLaw>,
+    properties: FlowProperties,
+    stress: CellHistory<S>,
+    accumulated: Option<CellHistory<1>>,
+}
+
+impl<const S: usize> ViscoplasticFlow<S> {
+    /// No history yet, for the cells of these runs whose material has a law.
+    pub fn new(laws: ByMaterial<FlowLaw>, runs: &[CellRun]) -> Self {
+        let flows = |material: usize| laws.get(material).is_some();
+        let hardens = |material: usize| laws.get(material).is_some_and(FlowLaw::hardens);
+        let stress = CellHistory::new(["viscoplastic_history", "previous_viscoplastic_history"], runs, flows);
+        let names = ["equivalent_viscoplastic_strain", "previous_equivalent_viscoplastic_strain"];
+        let accumulated =
+            laws.laws().any(FlowLaw::hardens).then(|| CellHistory::new(names, runs, hardens).without_error());
+        let properties = FlowProperties {
+            step_bound: laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).fold(f64::INFINITY, f64::min),
+            has_power_law: laws.laws().any(FlowLaw::is_power_law),
+            has_symmetric_tangent: laws.laws().all(FlowLaw::has_symmetric_tangent::<S>),
+        };
+        Self { laws, properties, stress, accumulated }
+    }
+}
+
+impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
+    fn name(&self) -> &'static str {
+        "viscoplasticity"
+    }
+
+    fn phases(&self, at: Evaluation) -> Phases {
+        let strain = Needs { strain: true, ..Needs::default() };
+        let both = Needs { strain_rate: true, ..strain };
+        let is_explicit = at == Evaluation::Converged;
+        Phases {
+            start: Some(if is_explicit { both } else { Needs::default() }),
+            end: !is_explicit,
+            energy: Some(strain),
+            stress: Some(Needs::default()),
+            error: Some(strain),
+            weakens: false,
+        }
+    }
+
+    fn term(&self) -> Term<'_> {
+        Term::Flow(self.properties)
+    }
+
+    fn evaluate(&mut self, at: Evaluation, step: Step, batch: &mut Batch<D, S>, outcome: &mut Outcome) {
+        match at {
+            Evaluation::Converged => self.advance_explicitly(step, batch, outcome),
+            Evaluation::Start(_) => {
+                let Some(history) = self.stress.converged(batch.number) else { return };
+                isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
+            }
+            Evaluation::End(blend) => self.advance_implicitly(blend, step, batch, outcome),
+        }
+    }
+
+    fn add_elastic_stress(&self, batch: &mut Batch<D, S>) {
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &Integrity::default(), &mut batch.elastic_stress);
+    }
+
+    fn add_stress(&self, _: Evaluation, _: Step, batch: &mut Batch<D, S>) {
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        isotropic::add_histories(history, &batch.integrity, &mut batch.stress);
+    }
+
+    fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(history) = self.stress.converged(batch.number) else { return };
+        let (strain, integrity) = (&batch.strain, &batch.integrity);
+        energy.elastic +=
+            0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
+    }
+
+    fn add_step_energy(&self, at: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
+        if let Evaluation::End(blend) = at {
+            self.add_energy_of_implicit_flow(blend, step, batch, energy);
+        }
+    }
+
+    fn add_error(&self, curvature: Curvature, batch: &mut Batch<D, S>, error: &mut StressError) {
+        let Some(law) = self.laws.get(batch.material) else { return };
+        let Some(histories) = self.stress.last_three(batch.number) else { return };
+        error.add_history(law.elasticity(), batch, curvature, histories);
+    }
+
+    fn histories(&self) -> Vec<&dyn HistoryStore> {
+        let accumulated = self.accumulated.as_ref().map(|accumulated| accumulated as &dyn HistoryStore);
+        std::iter::once(&self.stress as &dyn HistoryStore).chain(accumulated).collect()
+    }
+
+    fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {
+        visit(&mut self.stress);
+        if let Some(accumulated) = &mut self.accumulated {
+            visit(accumulated);
+        }
+    }
+}

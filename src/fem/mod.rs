@@ -1,0 +1,6 @@
+//! Finite elements: spaces, nodal fields, and the effects that act on a body.
+
+pub mod space;
+pub mod state;
+pub mod effect;
+pub mod body;

@@ -1,0 +1,81 @@
+//! The converged state of a run: nodal fields and time. Cell histories live with their effects.
+
+use crate::{error::Result, linear_algebra::petsc::DistributedVector, mesh::Mesh};
+
+/// Nodal fields, `D` values a node, with ghosts up to date.
+#[derive(Debug)]
+pub struct State {
+    /// Displacement in m.
+    pub displacement: DistributedVector,
+    /// Displacement before the last step in m; present if the scheme needs it.
+    pub previous_displacement: Option<DistributedVector>,
+    /// Velocity in m/s.
+    pub velocity: DistributedVector,
+    /// Velocity before the last step in m/s.
+    pub previous_velocity: DistributedVector,
+    /// Traction of nodal contacts, `-sigma_nu` along the normal without held components, in Pa; present if
+    /// there is such contact.
+    pub contact_traction: Option<DistributedVector>,
+    /// Time in s.
+    pub time: f64,
+    /// Steps taken.
+    pub step: u64,
+    /// Length of the last step in s; 0 before the first.
+    pub step_length: f64,
+}
+
+impl State {
+    /// At rest, undeformed, at time 0. Collective.
+    pub fn at_rest<const D: usize>(mesh: &Mesh<D>) -> Result<Self> {
+        let displacement = DistributedVector::ghosted(D, mesh.owned, &mesh.ghosts)?;
+        let velocity = displacement.like()?;
+        let previous_velocity = displacement.like()?;
+        Ok(Self {
+            displacement,
+            previous_displacement: None,
+            velocity,
+            previous_velocity,
+            contact_traction: None,
+            time: 0.0,
+            step: 0,
+            step_length: 0.0,
+        })
+    }
+
+    /// Commits the velocity of a solved step and the displacement `u_n = u_{n-1} + k v_n`. Collective.
+    pub fn commit(&mut self, solved: &DistributedVector, time: f64, step_length: f64) -> Result<()> {
+        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
+        self.velocity.copy_from(solved)?;
+        self.velocity.update_ghosts()?;
+        {
+            let velocity = self.velocity.local()?;
+            let mut displacement = self.displacement.local_mut()?;
+            displacement.iter_mut().zip(velocity.iter()).for_each(|(u, v)| *u += step_length * v);
+        }
+        self.time = time;
+        self.step += 1;
+        self.step_length = step_length;
+        Ok(())
+    }
+
+    /// Commits velocity and displacement of a solved step. Collective.
+    pub fn commit_both(
+        &mut self,
+        velocity: &DistributedVector,
+        displacement: &DistributedVector,
+        time: f64,
+        step_length: f64,
+    ) -> Result<()> {
+        if let Some(previous) = &mut self.previous_displacement {
+            std::mem::swap(previous, &mut self.displacement);
+        }
+        self.displacement.copy_from(displacement)?;
+        self.displacement.update_ghosts()?;
+        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
+        self.velocity.copy_from(velocity)?;
+        self.velocity.update_ghosts()?;
+        (self.time, self.step_length) = (time, step_length);
+        self.step += 1;
+        Ok(())
+    }
+}

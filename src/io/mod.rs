@@ -1,0 +1,4 @@
+//! Files: fields, tables, checkpoints, logs, partitioned meshes.
+
+pub mod output;
+pub mod partitioned;

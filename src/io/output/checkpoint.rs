@@ -1,0 +1,229 @@
+//! The content of a run's checkpoints, and how it is restored.
+
+use super::{
+    checkpoint_file::{self, Checkpoint, RowSet, Table},
+    history::Totals,
+};
+use crate::{
+    error::{Error, Exit, Result},
+    fem::{body::Body, effect::History, state::State},
+    job::differing_keys,
+    linear_algebra::petsc::DistributedVector,
+    parallel::{agreement::Agreed, session::Session},
+};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, path::Path};
+
+/// Version of the layout; raised whenever older files can't be read any more.
+const FORMAT: u32 = 3;
+
+/// The data of a checkpoint that are not fields.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of the layout.
+    pub format: u32,
+    /// Version of the solver that wrote it.
+    pub version: String,
+    /// Ranks that wrote it.
+    pub ranks: usize,
+    /// 2 or 3.
+    pub dimension: usize,
+    /// Steps taken.
+    pub step: u64,
+    /// Time in s.
+    pub time: f64,
+    /// Length of the last step in s.
+    pub step_length: f64,
+    /// Sums over the steps so far.
+    pub totals: Totals,
+    /// Digest of the mesh.
+    pub mesh: String,
+    /// The keys of the job that affect the results, with their values.
+    pub physics: BTreeMap<String, String>,
+}
+
+/// What identifies the problem a checkpoint belongs to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// Version of this solver.
+    pub version: String,
+    /// The keys of the job that affect the results, with their values.
+    pub physics: BTreeMap<String, String>,
+}
+
+impl Header {
+    /// The header of a state with the sums over the steps up to it.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        identity: &Identity,
+        body: &Body<D, S>,
+        state: &State,
+        totals: &Totals,
+    ) -> Self {
+        Self {
+            format: FORMAT,
+            version: identity.version.clone(),
+            ranks: session.ranks(),
+            dimension: D,
+            step: state.step,
+            time: state.time,
+            step_length: state.step_length,
+            totals: *totals,
+            mesh: digest(body),
+            physics: identity.physics.clone(),
+        }
+    }
+}
+
+/// Saves the state under its header. Collective, with the same outcome on all ranks.
+pub fn save<const D: usize, const S: usize>(
+    session: &Session,
+    path: &Path,
+    header: &Header,
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<()> {
+    let header = serde_json::to_vec_pretty(header)
+        .map_err(|e| Error::Internal(format!("the checkpoint's header can't be written: {e}")))?;
+    let (nodes, cells) = (owned_node_ids(body), cell_ids(body));
+    let sets = [
+        RowSet { name: "nodes", total: body.mesh.total_nodes as u64, ids: &nodes },
+        RowSet { name: "cells", total: body.mesh.total_cells as u64, ids: &cells },
+    ];
+    let [displacement, velocity, previous] =
+        [state.displacement.owned()?, state.velocity.owned()?, state.previous_velocity.owned()?];
+    let nodal = [("displacement", &displacement), ("velocity", &velocity), ("previous_velocity", &previous)];
+    let mut tables: Vec<Table> =
+        nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
+    let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
+    let traction =
+        traction.as_deref().map(|t| Table { name: "contact_traction", set: "nodes", width: D, values: t });
+    tables.extend(traction);
+    let previous = state.previous_displacement.as_ref().map(DistributedVector::owned).transpose()?;
+    let previous = previous.as_deref();
+    tables.extend(previous.map(|p| Table {
+        name: "previous_displacement",
+        set: "nodes",
+        width: D,
+        values: p,
+    }));
+    let of_cells: Vec<History> = body.all_cell_histories().collect();
+    let of_nodes: Vec<History> = body.all_node_histories().collect();
+    for (set, histories) in [("cells", &of_cells), ("nodes", &of_nodes)] {
+        let table = |h| {
+            let History { name, width, values, .. }: &History = h;
+            Table { name, set, width: *width, values }
+        };
+        tables.extend(histories.iter().map(table));
+    }
+    Ok(checkpoint_file::write(path, session.world(), &header, &sets, &tables)?)
+}
+
+/// Reads a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
+/// damaged or of another problem.
+pub fn restore<const D: usize, const S: usize>(
+    session: &Session,
+    path: &Path,
+    identity: &Identity,
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<Header> {
+    let checkpoint = Checkpoint::open(path, session.world()).map_err(damaged)?;
+    let header = session.agree(check(path, checkpoint.header(), identity, body))?;
+    let nodes = owned_node_ids(body);
+    let names = ["displacement", "velocity", "previous_velocity"].map(|name| (name, D));
+    let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &names, &nodes)?;
+    let fields = [&mut state.displacement, &mut state.velocity, &mut state.previous_velocity];
+    for (field, values) in fields.into_iter().zip(&values) {
+        fill(field, values)?;
+    }
+    if let Some(traction) = &mut state.contact_traction {
+        let values =
+            checkpoint.read("nodes", body.mesh.total_nodes as u64, &[("contact_traction", D)], &nodes)?;
+        fill(traction, &values[0])?;
+    }
+    if let Some(previous) = &mut state.previous_displacement {
+        let wanted = [("previous_displacement", D)];
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &wanted, &nodes)?;
+        fill(previous, &values[0])?;
+    }
+    let cells = cell_ids(body);
+    let kept = |history: History<'_>| (history.name, history.width);
+    let of_cells: Vec<(&str, usize)> = body.all_cell_histories().map(kept).collect();
+    let of_nodes: Vec<(&str, usize)> = body.all_node_histories().map(kept).collect();
+    let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
+    for (set, total, kept, ids) in
+        [("cells", total_cells, &of_cells, &cells), ("nodes", total_nodes, &of_nodes, &nodes)]
+    {
+        let values = checkpoint.read(set, total, kept, ids)?;
+        kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
+    }
+    (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
+    Ok(header)
+}
+
+/// A damaged file is a failure, not a refusal, so that an older checkpoint can be tried.
+fn damaged(error: Agreed) -> Error {
+    if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error.into() }
+}
+
+fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
+    field.owned_mut()?.copy_from_slice(values);
+    field.update_ghosts()
+}
+
+fn check<const D: usize, const S: usize>(
+    path: &Path,
+    bytes: &[u8],
+    identity: &Identity,
+    body: &Body<D, S>,
+) -> Result<Header> {
+    let refuse = |words: String| Err(Error::Refused(format!("{}: {words}", path.display())));
+    let header: Header = match serde_json::from_slice(bytes) {
+        Ok(header) => header,
+        Err(e) => {
+            return refuse(format!(
+                "the header of the checkpoint can't be understood ({e}); start the run anew"
+            ));
+        }
+    };
+    if header.format != FORMAT {
+        return refuse(format!(
+            "checkpoint format {} was written by Clarke {}, this one reads format {FORMAT}; go on with that version",
+            header.format, header.version
+        ));
+    }
+    let differing = differing_keys(&header.physics, &identity.physics);
+    if !differing.is_empty() {
+        let lines: Vec<String> = differing
+            .iter()
+            .map(|key| {
+                let value = |side: &BTreeMap<String, String>| {
+                    side.get(key).cloned().unwrap_or_else(|| "absent".into())
+                };
+                format!("  {key}: checkpoint {}, job {}", value(&header.physics), value(&identity.physics))
+            })
+            .collect();
+        return refuse(format!(
+            "the checkpoint belongs to another problem; these keys differ:\n{}\nrestore them, or start the run anew \
+             without --restart",
+            lines.join("\n")
+        ));
+    }
+    if header.mesh != digest(body) || header.dimension != D {
+        return refuse("the mesh has changed since the checkpoint was written; start the run anew".into());
+    }
+    Ok(header)
+}
+
+fn digest<const D: usize, const S: usize>(body: &Body<D, S>) -> String {
+    format!("{:016x}", body.mesh.digest)
+}
+
+fn owned_node_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
+    body.mesh.node_ids[..body.mesh.owned].iter().map(|&id| u64::from(id)).collect()
+}
+
+fn cell_ids<const D: usize, const S: usize>(body: &Body<D, S>) -> Vec<u64> {
+    body.mesh.cell_ids.iter().map(|&id| u64::from(id)).collect()
+}

@@ -1,0 +1,166 @@
+//! Where the mesh is too coarse: an indicator of the error of the stress, cell by cell.
+//!
+//! After O. C. Zienkiewicz and J. Z. Zhu, International Journal for Numerical Methods in Engineering 24 (1987) 337-357. At
+//! each node the stresses of the cells around it are averaged, weighted by their volume; between the nodes of a cell the
+//! means are interpolated. That field is nearer to the true stress than the constant one of the cell, and stands for it:
+//!
+//! ```text
+//! eta_K^2 = integral over K of (mean - sigma_K) : E^-1 (mean - sigma_K)
+//! ```
+//!
+//! Means never cross the boundary between two materials, where stresses may jump.
+
+use super::{
+    field::{Place, Shape},
+    output_field::{Computed, Converged, FieldPicture, Figures, OutputField, Shading},
+};
+use crate::{
+    error::Result,
+    fem::{body::Body, effect::Form},
+    job::Output,
+    laws::material::Isotropic,
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Mandel, add_scaled},
+    },
+    parallel::session::Session,
+};
+
+/// The indicator as a field that runs write.
+pub(super) const FIELD: OutputField = OutputField {
+    name: "error_indicator",
+    place: Place::Cell,
+    shape: Shape::Scalar,
+    units: ["√(J/m)", "√J"],
+    is_asked_for: Some(|output: &Output| output.error_indicator),
+    picture: Some(FieldPicture {
+        name: "error_indicator",
+        quantity: "error indicator",
+        shading: Shading::Errors,
+    }),
+    figures: Some(Figures {
+        names: &["error_indicator", "relative_error_indicator"],
+        line: |figures: &[f64]| {
+            format!(
+                "indicator  error of the stress {:.4e}, {:.1} % of its norm",
+                figures[0],
+                100.0 * figures[1]
+            )
+        },
+        shown: &[("relative_error_indicator", "error indicator over the norm of the stress at the end", "")],
+    }),
+};
+
+/// Computes the field; its figures are total and relative size. Collective.
+pub(super) fn compute<'a, const D: usize, const S: usize>(at: Converged<'a, D, S>) -> Result<Computed<'a>> {
+    let indicator = &mut ErrorIndicator::new(at.session, at.body)?;
+    let Indicated { cells, total, relative } = indicator.of(at.session, at.body, at.stress)?;
+    Ok(Computed { values: Box::new(cells), figures: vec![total, relative] })
+}
+
+/// The indicator of a body, with room for the means.
+#[derive(Debug)]
+pub struct ErrorIndicator<const S: usize> {
+    /// Elastic tensors of the body's materials in Pa; none for a material that nothing is known of.
+    elasticity: Vec<Option<Isotropic>>,
+    /// Mean stress and volume of the cells around, for each node.
+    means: DistributedVector,
+}
+
+/// What the indicator says of a state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Indicated {
+    /// `eta_K` of each cell here, in J^(1/2), in two dimensions (J/m)^(1/2); zero where the material has no elasticity.
+    pub cells: Vec<f64>,
+    /// The square root of the sum of the squares over all ranks.
+    pub total: f64,
+    /// The total over the norm of the stress, error included: about 0.1 means an error of 10 %.
+    pub relative: f64,
+}
+
+impl<const S: usize> ErrorIndicator<S> {
+    /// For this body. Collective.
+    pub fn new<const D: usize>(session: &Session, body: &Body<D, S>) -> Result<Self> {
+        let mine = body.geometry.runs.iter().map(|run| run.material + 1).max().unwrap_or(0);
+        let count = session.largest([mine as f64])[0] as usize;
+        let of = |material| body.tensor(Form::Elasticity, material);
+        let means = DistributedVector::ghosted(S + 1, body.mesh.owned, &body.mesh.ghosts);
+        Ok(Self { elasticity: (0..count).map(of).collect(), means: session.agree(means)? })
+    }
+
+    /// The indicator of a stress in Pa, given one a cell. Collective.
+    pub fn of<const D: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        stress: &[Mandel<S>],
+    ) -> Result<Indicated> {
+        let mut cells = vec![0.0; stress.len()];
+        let mut squares = [0.0; 2];
+        for material in 0..self.elasticity.len() {
+            let Some(elasticity) = self.elasticity[material] else { continue };
+            session.agree(self.add(body, material, stress))?;
+            self.means.add_ghosts_to_owners()?;
+            session.agree(self.divide())?;
+            self.means.update_ghosts()?;
+            let means = self.means.local()?;
+            for cell in of_material(body, material) {
+                let volume = body.geometry.cell(cell).volume;
+                let square = |t: &Mandel<S>| volume * elasticity.inverse_square(t);
+                let (mut sum, mut each) = ([0.0; S], 0.0);
+                for &node in body.mesh.cell(cell) {
+                    let mean = &means[node as usize * (S + 1)..][..S];
+                    let apart: Mandel<S> = std::array::from_fn(|c| mean[c] - stress[cell][c]);
+                    each += square(&apart);
+                    sum = add_scaled(&sum, 1.0, &apart);
+                }
+                // The integral of a product of shape functions is volume / ((D + 1)(D + 2)), twice that on the diagonal.
+                let error = (each + square(&sum)) / ((D + 1) * (D + 2)) as f64;
+                cells[cell] = error.sqrt();
+                squares[0] += error;
+                squares[1] += square(&stress[cell]);
+            }
+        }
+        let [error, size] = session.sum(squares);
+        let relative = if error > 0.0 { (error / (error + size)).sqrt() } else { 0.0 };
+        Ok(Indicated { cells, total: error.sqrt(), relative })
+    }
+
+    /// Sums volumes and stresses times volume of the cells of a material around each node, as far as they are here.
+    fn add<const D: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        material: usize,
+        stress: &[Mandel<S>],
+    ) -> Result<()> {
+        let mut sums = self.means.local_mut()?;
+        sums.fill(0.0);
+        for cell in of_material(body, material) {
+            let volume = body.geometry.cell(cell).volume;
+            for &node in body.mesh.cell(cell) {
+                let sum = &mut sums[node as usize * (S + 1)..][..=S];
+                sum.iter_mut().zip(&stress[cell]).for_each(|(sum, value)| *sum += volume * value);
+                sum[S] += volume;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes means of the sums at the nodes owned here; nodes without a cell of the material keep zero.
+    fn divide(&mut self) -> Result<()> {
+        for sum in self.means.owned_mut()?.chunks_exact_mut(S + 1).filter(|sum| sum[S] > 0.0) {
+            let volume = sum[S];
+            sum[..S].iter_mut().for_each(|value| *value /= volume);
+        }
+        Ok(())
+    }
+}
+
+/// The cells here of a material.
+fn of_material<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    material: usize,
+) -> impl Iterator<Item = usize> {
+    let runs = body.geometry.runs.iter().filter(move |run| run.material == material);
+    runs.flat_map(|run| run.first..run.first + run.count)
+}

@@ -1,0 +1,82 @@
+//! The fields that runs write, each declared once: field files, restarts, the summary, the log, the report and studies follow this
+//! list. Histories of effects are appended automatically.
+
+use super::{
+    error_indicator,
+    field::{Place, Shape},
+    output_field::{Computed, Converged, OutputField},
+};
+use crate::{error::Result, linear_algebra::tensor::von_mises};
+
+/// Computes a field; none where the run has no such field, on all ranks alike. Collective.
+type Compute<const D: usize, const S: usize> =
+    for<'a> fn(Converged<'a, D, S>) -> Result<Option<Computed<'a>>>;
+
+/// Makes [`FIELDS`] of a list: the meaning of each field, its name in the program, what it is, and what computes it.
+macro_rules! fields {
+    ($($(#[$meaning:meta])* $name:ident = $field:expr, |$at:ident| $computed:expr;)*) => {
+        $($(#[$meaning])* pub(crate) const $name: OutputField = $field;)*
+
+        /// How many there are.
+        pub(super) const COUNT: usize = [$(stringify!($name)),*].len();
+
+        /// All of them, in the order of field files.
+        pub(crate) static FIELDS: [OutputField; COUNT] = [$($name),*];
+
+        /// What computes them, in the same order.
+        pub(super) fn computations<const D: usize, const S: usize>() -> [Compute<D, S>; COUNT] {
+            [$({
+                fn compute<'a, const D: usize, const S: usize>(
+                    $at: Converged<'a, D, S>,
+                ) -> Result<Option<Computed<'a>>> {
+                    Ok(Some($computed))
+                }
+                compute
+            }),*]
+        }
+    };
+}
+
+fields! {
+    /// Displacement of the nodes.
+    DISPLACEMENT = OutputField::plain("displacement", Place::Node, Shape::Vector, "m"),
+        |at| Computed::of(at.state.displacement.owned()?);
+    /// Velocity of the nodes.
+    VELOCITY = OutputField::plain("velocity", Place::Node, Shape::Vector, "m/s").with_picture("speed", "speed"),
+        |at| Computed::of(at.state.velocity.owned()?);
+    /// Total stress of the cells.
+    STRESS = OutputField::plain("stress", Place::Cell, Shape::Tensor, "Pa"),
+        |at| Computed::of(at.stress.as_flattened());
+    /// Von Mises norm of the total stress of the cells.
+    VON_MISES = OutputField::plain("von_mises", Place::Cell, Shape::Scalar, "Pa")
+            .with_picture("von_mises", "von Mises stress"),
+        |at| Computed::of(at.stress.iter().map(von_mises).collect::<Vec<_>>());
+    /// See [`error_indicator`].
+    ERROR_INDICATOR = error_indicator::FIELD,
+        |at| error_indicator::compute(at)?;
+    /// Traction of contact at the nodes, where it is an unknown of steps.
+    CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
+        |at| match &at.state.contact_traction {
+            Some(traction) => Computed::of(traction.owned()?),
+            None => return Ok(None),
+        };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_and_figures_have_names_of_their_own_and_the_report_shows_figures_that_are_there() {
+        let figures: Vec<_> = FIELDS.iter().filter_map(|field| field.figures).collect();
+        let mut names: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+        let mut names: Vec<&str> = figures.iter().flat_map(|figures| figures.names).copied().collect();
+        for (shown, _, _) in figures.iter().flat_map(|figures| figures.shown) {
+            assert!(names.contains(shown), "{shown}");
+        }
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+    }
+}

@@ -1,0 +1,156 @@
+//! The field file of a run.
+
+use super::{
+    field_list::{COUNT, FIELDS, computations},
+    fields::{Field, FieldFile, FieldMesh, Place, Shape},
+    log::Log,
+    output_field::{Computed, Converged, OutputField},
+};
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::History},
+    job::Job,
+    parallel::{agreement::Agreed, session::Session},
+};
+use hdf5::filters::deflate_available;
+use std::{collections::BTreeMap, path::Path};
+
+/// The field file of a run.
+pub(crate) struct FieldOutput<const D: usize> {
+    file: FieldFile<D>,
+    /// Which of [`FIELDS`] the run writes if it has them.
+    is_wanted: [bool; COUNT],
+}
+
+impl<const D: usize> FieldOutput<D> {
+    /// Creates the files in the job's output folder with the mesh, or continues them after this time; files that can't be read are
+    /// renamed and kept. Refused if existing files and the job differ in a field that jobs ask for, and if compression is asked for
+    /// and HDF5 has none. Collective.
+    pub(crate) fn open<const S: usize>(
+        session: &Session,
+        job: &Job,
+        body: &Body<D, S>,
+        goes_on_after: Option<f64>,
+        log: &mut Log,
+    ) -> Result<Self> {
+        let (folder, mesh, compression) = (job.output_folder(), &body.mesh, job.output.compression);
+        if compression > 0 && !deflate_available() {
+            let words = "output.compression: the HDF5 library here was built without zlib; leave the key out";
+            return Err(Error::Refused(words.into()));
+        }
+        let is_wanted = FIELDS.each_ref().map(|field| field.is_wanted(&job.output));
+        let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
+        let (point_ids, cell_ids) = (wide(&mesh.node_ids[..mesh.owned]), wide(&mesh.cell_ids));
+        let cells: Vec<u64> = mesh.cells.iter().map(|&node| u64::from(mesh.global_node(node))).collect();
+        let parts = FieldMesh {
+            points: &mesh.nodes[..mesh.owned],
+            point_ids: &point_ids,
+            cells: &cells,
+            cell_ids: &cell_ids,
+        };
+        let create = || FieldFile::create(folder, session.world(), parts, compression);
+        let path = folder.join("fields.vtkhdf");
+        let exists = session.largest([f64::from(u8::from(session.is_first() && path.exists()))])[0] > 0.0;
+        let (Some(time), true) = (goes_on_after, exists) else {
+            return Ok(Self { file: create()?, is_wanted });
+        };
+        session.agree(if session.is_first() { refuse_other_fields(&path, is_wanted) } else { Ok(()) })?;
+        let file = match FieldFile::resume(folder, session.world(), parts, time, compression) {
+            Ok(resumed) => resumed,
+            Err(error) => {
+                let aside = folder.join("fields.damaged.vtkhdf");
+                log.warning(format!("{error}; it is kept as {}, a new one is begun", aside.display()));
+                let moved = if session.is_first() { std::fs::rename(&path, &aside) } else { Ok(()) };
+                session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
+                create()?
+            }
+        };
+        Ok(Self { file, is_wanted })
+    }
+
+    /// Whether writing failed before, so that no step can follow.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.file.is_broken()
+    }
+
+    /// The last time written, if any.
+    pub(crate) fn last_time(&self) -> Option<f64> {
+        self.file.times().last().copied()
+    }
+
+    /// Appends a state. Collective.
+    pub(crate) fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
+        let computed = self.computed(at, |_| true)?;
+        let mut fields = Vec::new();
+        for (OutputField { name, place, shape, .. }, computed) in &computed {
+            fields.push(Field { name, place: *place, shape: *shape, values: &computed.values });
+        }
+        let of_cells: Vec<History> = at.body.cell_histories().collect();
+        for history in &of_cells {
+            let shape = if history.width == S { Shape::Tensor } else { Shape::Scalar };
+            fields.push(Field { name: history.name, place: Place::Cell, shape, values: &history.values });
+        }
+        let of_nodes: Vec<History> = at.body.node_histories().collect();
+        for history in &of_nodes {
+            let shape = if history.width == D { Shape::Vector } else { Shape::Scalar };
+            fields.push(Field { name: history.name, place: Place::Node, shape, values: &history.values });
+        }
+        Ok(self.file.write_step(at.state.time, &fields)?)
+    }
+
+    /// The figures of the fields of a state, by their names. Collective.
+    pub(crate) fn figures<const S: usize>(
+        &self,
+        at: Converged<D, S>,
+    ) -> Result<BTreeMap<&'static str, f64>, Agreed> {
+        let computed = self.computed(at, |field| field.figures.is_some())?;
+        let named = |(field, computed): (&OutputField, Computed)| {
+            field.figures.into_iter().flat_map(|f| f.names).copied().zip(computed.figures)
+        };
+        Ok(computed.into_iter().flat_map(named).collect())
+    }
+
+    /// Those fields of a state that the run writes and that are chosen. Collective.
+    fn computed<'a, const S: usize>(
+        &self,
+        at: Converged<'a, D, S>,
+        is_chosen: impl Fn(&OutputField) -> bool,
+    ) -> Result<Vec<(&'static OutputField, Computed<'a>)>, Agreed> {
+        let mut found = Vec::new();
+        for ((field, compute), is_wanted) in FIELDS.iter().zip(computations::<D, S>()).zip(self.is_wanted) {
+            if is_wanted && is_chosen(field) {
+                let computed = at.session.agree(compute(at))?;
+                found.extend(computed.map(|computed| (field, computed)));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Closes the files. Collective.
+    pub(crate) fn close(self) -> Result<(), Agreed> {
+        self.file.close()
+    }
+}
+
+/// Refuses a file whose times hold a field that the run does not write, or lack one that it writes. A file without times or one
+/// that can't be read fits.
+fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
+    let Ok(file) = hdf5::File::open(path) else { return Ok(()) };
+    if !file.link_exists("VTKHDF/Steps") {
+        return Ok(());
+    }
+    for (OutputField { name, .. }, is_wanted) in
+        FIELDS.iter().zip(is_wanted).filter(|(field, _)| field.is_asked_for.is_some())
+    {
+        let holds = file.link_exists(&format!("Fields/{name}"));
+        if holds != is_wanted {
+            let word = if holds { "holds" } else { "does not hold" };
+            return Err(Error::Refused(format!(
+                "{} {word} {name}, and all its times have the same fields: go on with output.{name} = {holds}, or in another \
+                 output.folder from a named checkpoint (--restart FILE.h5)",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}

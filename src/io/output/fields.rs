@@ -1,0 +1,346 @@
+//! Fields over time: `fields.vtkhdf` with the numbers, and a light XDMF file beside it that refers to them.
+//!
+//! The mesh and each field of each step are stored once. Readers of VTKHDF want the steps of a field below each other
+//! in one table, readers of XDMF want a table a step, some want connectivity flat and some in rows: HDF5's virtual
+//! datasets show the same numbers both ways.
+//!
+//! ```text
+//! /Mesh/cells              nodes of each cell, stored
+//! /Fields/NAME/STEP        the field at a step, stored; attributes place and shape
+//! /VTKHDF/Points, Types, Offsets, NumberOf...
+//! /VTKHDF/Connectivity     view of /Mesh/cells
+//! /VTKHDF/PointData/NAME   view of /Fields/NAME/0, 1, ...; stored once: node
+//! /VTKHDF/CellData/NAME    the same for cells; stored once: cell, rank
+//! /VTKHDF/Steps            times and offsets; attribute NSteps
+//! ```
+//!
+//! A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file of a run that dies holds
+//! all steps before.
+
+use super::field::{
+    FieldKind, component_names, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread,
+    view_columns,
+};
+use super::field_slab::Slab;
+use super::parallel_file::{Element, ParallelFile};
+use super::xdmf;
+use crate::error::{Error, Result};
+use crate::linear_algebra::tensor::Vector;
+use crate::parallel::agreement::{Agreed, agree};
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::Communicator;
+use std::path::{Path, PathBuf};
+
+pub use super::field::{Field, Place, Shape};
+
+/// Rows a chunk of the small tables of steps holds.
+const STEPS_PER_CHUNK: usize = 256;
+/// The tables of offsets that stay zero because the mesh does not change.
+const STATIC_OFFSETS: [&str; 4] = ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
+
+/// This rank's part of the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldMesh<'a, const D: usize> {
+    /// Coordinates in m of the nodes this rank owns; over the ranks they are numbered in this order.
+    pub points: &'a [Vector<D>],
+    /// Ids of these nodes in the mesh as it was read; over all ranks each of `0..total` once.
+    pub point_ids: &'a [u64],
+    /// Nodes of the cells this rank owns, `D + 1` a cell, by their number over the ranks.
+    pub cells: &'a [u64],
+    /// Ids of these cells in the mesh as it was read; over all ranks each of `0..total` once.
+    pub cell_ids: &'a [u64],
+}
+
+/// The field files of a run, open for writing.
+pub struct FieldFile<const D: usize> {
+    file: ParallelFile,
+    communicator: SimpleCommunicator,
+    xdmf: PathBuf,
+    points: Slab,
+    cells: Slab,
+    kinds: Vec<FieldKind>,
+    times: Vec<f64>,
+    compression: u8,
+}
+
+impl<const D: usize> FieldFile<D> {
+    /// Creates `fields.vtkhdf` in the folder, with the mesh and no steps, replacing older ones. Its large tables are
+    /// compressed at a level from 1 to 9, or not at all (0). Collective, as all functions of this type, with the same
+    /// outcome on all ranks.
+    pub fn create(
+        folder: &Path,
+        communicator: &impl Communicator,
+        mesh: FieldMesh<D>,
+        compression: u8,
+    ) -> Result<Self, Agreed> {
+        let communicator = communicator.duplicate();
+        let sound =
+            mesh.points.len() == mesh.point_ids.len() && mesh.cells.len() == (D + 1) * mesh.cell_ids.len();
+        let fault = || Error::Internal("the mesh for fields.vtkhdf has lists of unequal length".into());
+        agree(&communicator, sound.then_some(()).ok_or_else(fault))?;
+        let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
+        let points = Slab::new(&file, &communicator, mesh.points.len());
+        let cells = Slab::new(&file, &communicator, mesh.cell_ids.len());
+        let (kinds, times, xdmf) = (Vec::new(), Vec::new(), folder.join("fields.xdmf"));
+        let created = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
+        created.write_mesh(&mesh)?;
+        created.file.flush()?;
+        let stale = created.communicator.rank() == 0 && created.xdmf.exists();
+        let removed = if stale { std::fs::remove_file(&created.xdmf) } else { Ok(()) };
+        agree(&created.communicator, removed.map_err(|error| Error::unwritable(&created.xdmf, error)))?;
+        Ok(created)
+    }
+
+    /// Opens the files of an earlier run to go on, keeping the steps up to `time` (s). The mesh must be the same, its
+    /// distribution over ranks and the compression of new steps may differ.
+    pub fn resume(
+        folder: &Path,
+        communicator: &impl Communicator,
+        mesh: FieldMesh<D>,
+        time: f64,
+        compression: u8,
+    ) -> Result<Self, Agreed> {
+        let communicator = communicator.duplicate();
+        let file = ParallelFile::open_append(&folder.join("fields.vtkhdf"), &communicator)?;
+        let points = Slab::resume(&file, &communicator, "VTKHDF/PointData/node", mesh.point_ids)?;
+        let cells = Slab::resume(&file, &communicator, "VTKHDF/CellData/cell", mesh.cell_ids)?;
+        let kinds = read_kinds(&file)?;
+        let mut times = Vec::new();
+        if !kinds.is_empty() {
+            let counted: i64 = file.number("VTKHDF/Steps", "NSteps")?;
+            times = file.rows::<f64>("VTKHDF/Steps/Values")?.read(0, counted.max(0) as usize)?;
+            times.retain(|kept| *kept <= time);
+            cut(&file, &kinds, times.len())?;
+        }
+        let xdmf = folder.join("fields.xdmf");
+        let resumed = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
+        resumed.write_xdmf(false)?;
+        Ok(resumed)
+    }
+
+    /// Whether writing failed before, so that no step can follow.
+    pub fn is_broken(&self) -> bool {
+        self.file.is_broken()
+    }
+
+    /// Times of the steps in the file, in s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Appends a step at `time` (s), later than those before. All steps have the same fields.
+    pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<(), Agreed> {
+        agree(&self.communicator, self.check(time, fields))?;
+        let step = self.times.len();
+        if self.kinds.is_empty() {
+            self.add_fields(fields)?;
+        }
+        for field in fields {
+            let slab = self.slab(field.place);
+            let mut values = spread::<D>(field, slab.owned);
+            let width = file_width(field.shape);
+            if let Some(reorder) = &slab.reorder {
+                values = reorder.apply(width, &values)?;
+            }
+            let name = format!("Fields/{}/{step}", field.name);
+            let rows = self.file.create_packed_rows::<f64>(&name, slab.total, width, self.compression)?;
+            rows.write(slab.first, &values)?;
+            self.append(&offsets_name(field.place, field.name), step, step as i64 * slab.total as i64)?;
+        }
+        for name in STATIC_OFFSETS {
+            self.append(&format!("VTKHDF/Steps/{name}"), step, 0_i64)?;
+        }
+        self.append("VTKHDF/Steps/NumberOfParts", step, 1_i64)?;
+        self.append("VTKHDF/Steps/Values", step, time)?;
+        self.file.flush()?;
+        self.file.set_number("VTKHDF/Steps", "NSteps", step as i64 + 1)?;
+        self.file.flush()?;
+        self.times.push(time);
+        self.write_xdmf(true)
+    }
+
+    /// Closes the files.
+    pub fn close(self) -> Result<(), Agreed> {
+        self.file.close()
+    }
+
+    fn write_mesh(&self, mesh: &FieldMesh<D>) -> Result<(), Agreed> {
+        let Self { file, points, cells, compression: level, .. } = self;
+        for group in ["Mesh", "Fields", "VTKHDF", "VTKHDF/PointData", "VTKHDF/CellData"] {
+            file.create_group(group)?;
+        }
+        file.set_numbers("VTKHDF", "Version", &[2_i64, 3])?;
+        file.set_text("VTKHDF", "Type", "UnstructuredGrid")?;
+        let first = self.communicator.rank() == 0;
+        let corners = D + 1;
+        let only_first = |value: u64| if first { vec![value as i64] } else { Vec::new() };
+        for (name, count) in [
+            ("NumberOfPoints", points.total),
+            ("NumberOfCells", cells.total),
+            ("NumberOfConnectivityIds", cells.total * corners as u64),
+        ] {
+            file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
+        }
+        let whole = |ids: &[u64]| ids.iter().map(|id| *id as i64).collect::<Vec<_>>();
+        let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
+        file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, *level)?
+            .write(points.first, &coordinates)?;
+        file.create_packed_rows::<i64>("Mesh/cells", cells.total, corners, *level)?
+            .write(cells.first, &whole(mesh.cells))?;
+        file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
+
+        let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
+        let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
+        let start = if first { 0 } else { cells.first + 1 };
+        file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, *level)?
+            .write(start, &offsets)?;
+        let kind: u8 = if D == 2 { 5 } else { 10 };
+        file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, *level)?
+            .write(cells.first, &vec![kind; cells.owned])?;
+
+        let node_ids = file.create_packed_rows::<i64>("VTKHDF/PointData/node", points.total, 1, *level)?;
+        node_ids.write(points.first, &whole(mesh.point_ids))?;
+        let cell_ids = file.create_packed_rows::<i64>("VTKHDF/CellData/cell", cells.total, 1, *level)?;
+        cell_ids.write(cells.first, &whole(mesh.cell_ids))?;
+        let ranks = file.create_packed_rows::<i32>("VTKHDF/CellData/rank", cells.total, 1, *level)?;
+        ranks.write(cells.first, &vec![self.communicator.rank(); cells.owned])
+    }
+
+    fn slab(&self, place: Place) -> &Slab {
+        match place {
+            Place::Node => &self.points,
+            Place::Cell => &self.cells,
+        }
+    }
+
+    fn check(&self, time: f64, fields: &[Field]) -> Result<()> {
+        let fault = |what: String| Err(Error::Internal(format!("{}: {what}", self.file.path().display())));
+        if !time.is_finite() || self.times.last().is_some_and(|last| time <= *last) {
+            return fault(format!("a step at t = {time} s does not follow the steps before"));
+        }
+        for field in fields {
+            let named = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+            if field.name.is_empty() || !field.name.chars().all(named) {
+                return fault(format!("a field cannot be named {:?}", field.name));
+            }
+            let rows = self.slab(field.place).owned;
+            let widths: &[usize] = match field.shape {
+                Shape::Scalar => &[1],
+                Shape::Vector => &[D],
+                Shape::Tensor => &[3, 4, 6],
+            };
+            if !widths.iter().any(|width| width * rows == field.values.len()) {
+                return fault(format!(
+                    "field {} has {} numbers for {rows} rows",
+                    field.name,
+                    field.values.len()
+                ));
+            }
+        }
+        let same = fields.iter().map(kind_of).eq(self.kinds.iter().cloned());
+        if fields.is_empty() || (!self.kinds.is_empty() && !same) {
+            return fault(format!(
+                "its fields are {}; a step with {} does not fit",
+                list(&self.kinds),
+                list(&fields.iter().map(kind_of).collect::<Vec<_>>())
+            ));
+        }
+        Ok(())
+    }
+
+    fn add_fields(&mut self, fields: &[Field]) -> Result<(), Agreed> {
+        self.file.create_group("VTKHDF/Steps")?;
+        self.file.create_group("VTKHDF/Steps/PointDataOffsets")?;
+        self.file.create_group("VTKHDF/Steps/CellDataOffsets")?;
+        self.file.set_number("VTKHDF/Steps", "NSteps", 0_i64)?;
+        for name in STATIC_OFFSETS.iter().chain(&["NumberOfParts"]) {
+            self.file.create_series::<i64>(&format!("VTKHDF/Steps/{name}"), 1, STEPS_PER_CHUNK)?;
+        }
+        self.file.create_series::<f64>("VTKHDF/Steps/Values", 1, STEPS_PER_CHUNK)?;
+        for (position, field) in fields.iter().enumerate() {
+            let folder = format!("Fields/{}", field.name);
+            self.file.create_group(&folder)?;
+            self.file.set_text(&folder, "place", place_word(field.place))?;
+            self.file.set_text(&folder, "shape", shape_word(field.shape))?;
+            self.file.set_number(&folder, "position", position as i64)?;
+            let (group, rows) = (data_group(field.place), self.slab(field.place).total as usize);
+            let view = format!("VTKHDF/{group}/{}", field.name);
+            self.file.create_stacked_view::<f64>(
+                &view,
+                &format!("/{folder}"),
+                rows,
+                view_columns(field.shape),
+            )?;
+            let names = component_names(field.shape);
+            if !names.is_empty() {
+                let seen: Vec<&str> = view_columns(field.shape).iter().map(|column| names[*column]).collect();
+                self.file.set_text(&folder, "components", &names.join(" "))?;
+                self.file.set_text(&view, "components", &seen.join(" "))?;
+            }
+            self.file.create_series::<i64>(&offsets_name(field.place, field.name), 1, STEPS_PER_CHUNK)?;
+        }
+        self.kinds = fields.iter().map(kind_of).collect();
+        Ok(())
+    }
+
+    fn append<T: Element>(&self, name: &str, step: usize, value: T) -> Result<(), Agreed> {
+        let series = self.file.rows::<T>(name)?;
+        series.resize(step as u64 + 1)?;
+        let own = [value];
+        series.write(step as u64, if self.communicator.rank() == 0 { &own } else { &[] })
+    }
+
+    /// Writes the file anew, or adds the last step to it if it has `grown` by that.
+    fn write_xdmf(&self, grown: bool) -> Result<(), Agreed> {
+        let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
+        let written = match self.times.split_last() {
+            _ if self.communicator.rank() != 0 => Ok(()),
+            Some((time, before)) if grown && !before.is_empty() && self.xdmf.exists() => {
+                xdmf::append(&self.xdmf, mesh, &self.kinds, before.len(), *time)
+            }
+            _ => xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times),
+        };
+        agree(&self.communicator, written)
+    }
+}
+
+fn read_kinds(file: &ParallelFile) -> Result<Vec<FieldKind>, Agreed> {
+    let mut kinds = Vec::new();
+    for name in file.names("Fields")? {
+        let folder = format!("Fields/{name}");
+        let (place, shape) = (file.text(&folder, "place")?, file.text(&folder, "shape")?);
+        let position: i64 = file.number(&folder, "position")?;
+        let place = if place == place_word(Place::Node) { Place::Node } else { Place::Cell };
+        let shape = match shape.as_str() {
+            "scalar" => Shape::Scalar,
+            "vector" => Shape::Vector,
+            _ => Shape::Tensor,
+        };
+        kinds.push((position, FieldKind { name, place, shape }));
+    }
+    kinds.sort_by_key(|(position, _)| *position);
+    Ok(kinds.into_iter().map(|(_, kind)| kind).collect())
+}
+
+/// Removes all steps from `steps` on.
+fn cut(file: &ParallelFile, kinds: &[FieldKind], steps: usize) -> Result<(), Agreed> {
+    file.set_number("VTKHDF/Steps", "NSteps", steps as i64)?;
+    for kind in kinds {
+        let folder = format!("Fields/{}", kind.name);
+        for step in file.names(&folder)? {
+            if step.parse().is_ok_and(|step: usize| step >= steps) {
+                file.remove(&format!("{folder}/{step}"))?;
+            }
+        }
+        file.rows::<i64>(&offsets_name(kind.place, &kind.name))?.resize(steps as u64)?;
+    }
+    for name in STATIC_OFFSETS.iter().chain(&["NumberOfParts"]) {
+        file.rows::<i64>(&format!("VTKHDF/Steps/{name}"))?.resize(steps as u64)?;
+    }
+    file.rows::<f64>("VTKHDF/Steps/Values")?.resize(steps as u64)?;
+    file.flush()
+}
+
+fn offsets_name(place: Place, name: &str) -> String {
+    format!("VTKHDF/Steps/{}Offsets/{name}", data_group(place))
+}

@@ -1,0 +1,263 @@
+//! `history.csv`: a row a step.
+
+use super::csv::{CsvFile, Number, Numbers};
+use crate::{
+    error::Result,
+    fem::effect::{Energy, Peaks, Role},
+    linear_algebra::tensor::larger,
+    solver::stepping::{Pace, StepOutcome},
+};
+use serde::{Deserialize, Serialize};
+use std::{cmp::Ordering, path::Path};
+
+const STEP_COLUMNS: &str =
+    "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual";
+
+/// So many energies stand before the column of their imbalance.
+const BEFORE_IMBALANCE: usize = 6;
+
+/// Energies in the order of the file.
+fn in_columns<T: Copy>(energies: [T; Energy::COUNT], imbalance: T) -> [T; Energy::COUNT + 1] {
+    std::array::from_fn(|at| match at.cmp(&BEFORE_IMBALANCE) {
+        Ordering::Less => energies[at],
+        Ordering::Equal => imbalance,
+        Ordering::Greater => energies[at - 1],
+    })
+}
+
+/// What adds up over the steps of a run; saved in checkpoints.
+///
+/// Energies are in J (J/m in the plane).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Totals {
+    /// What is stored now, and the sums of the others since time 0; of the scheme's own terms minus their sum.
+    #[serde(flatten)]
+    pub energy: Energy,
+    /// Energy that was there at first or came in since, without signs: work of loads and of obstacles, and what foundations
+    /// that remember gave back.
+    pub supplied: f64,
+    /// Largest amount of energy seen in any of these, the scale of the imbalance.
+    pub turnover: f64,
+    /// Imbalance of the last step over the turnover.
+    pub energy_imbalance: f64,
+    /// Largest imbalance of any step.
+    pub max_energy_imbalance: f64,
+    /// Largest inclusion residual of any step.
+    pub max_inclusion_residual: f64,
+    /// Largest stress and strain after any step.
+    #[serde(flatten)]
+    pub peaks: Peaks,
+    /// Largest contact pressure of any step, where friction weakens under a pressure that no law bounds.
+    pub max_slip_pressure: Option<f64>,
+    /// Newton iterations.
+    pub newton_iterations: u64,
+    /// Linear iterations.
+    pub linear_iterations: u64,
+    /// Steps for which other solutions were looked for.
+    pub guessed_steps: u64,
+    /// Steps for which some were found.
+    pub steps_with_several: u64,
+    /// Most different solutions of a step.
+    pub most_solutions: u64,
+    /// Where adaptive steps are on their ladder.
+    #[serde(default)]
+    pub pace: Option<Pace>,
+}
+
+impl Totals {
+    /// At time 0, with the energy of the initial state.
+    pub fn at_start(energy: Energy) -> Self {
+        let mut stored = energy.to_array();
+        for (energy, role) in stored.iter_mut().zip(Energy::ROLES) {
+            *energy = if role == Role::Stored { *energy } else { 0.0 };
+        }
+        let turnover = stored.iter().sum();
+        Self { energy: Energy::from_array(stored), supplied: turnover, turnover, ..Self::default() }
+    }
+
+    /// Takes a step in.
+    pub fn add(&mut self, outcome: &StepOutcome) {
+        let energy = &outcome.energy;
+        let mut sides = [0.0; 4];
+        let mut totals = self.energy.to_array();
+        for ((total, now), role) in totals.iter_mut().zip(energy.to_array()).zip(Energy::ROLES) {
+            let side = &mut sides[role as usize];
+            *side += now;
+            match role {
+                Role::Stored => {
+                    *side -= *total;
+                    *total = now;
+                }
+                Role::Dissipated | Role::Work => *total += now,
+                Role::Numerical => *total -= now,
+            }
+            if role != Role::Numerical {
+                self.turnover = larger(self.turnover, total.abs());
+            }
+        }
+        self.energy = Energy::from_array(totals);
+        let [stored, dissipated, work, numerical] = sides;
+        let open = stored + dissipated - work - numerical;
+        self.supplied += work.abs() + larger(-energy.contact, 0.0);
+        self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
+        self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
+        self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
+        self.peaks.von_mises = larger(self.peaks.von_mises, outcome.peaks.von_mises);
+        self.peaks.strain = larger(self.peaks.strain, outcome.peaks.strain);
+        self.newton_iterations += outcome.newton_iterations as u64;
+        self.linear_iterations += outcome.linear_iterations as u64;
+        self.guessed_steps += u64::from(outcome.solutions > 0);
+        self.steps_with_several += u64::from(outcome.solutions > 1);
+        self.most_solutions = self.most_solutions.max(outcome.solutions as u64);
+    }
+}
+
+impl Totals {
+    /// Whether all that was added up is finite: what is not in a step stays in the maxima.
+    pub fn are_finite(&self) -> bool {
+        let most = [
+            self.turnover,
+            self.max_energy_imbalance,
+            self.max_inclusion_residual,
+            self.peaks.von_mises,
+            self.peaks.strain,
+        ];
+        most.iter().all(|most| most.is_finite())
+    }
+
+    /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
+    pub fn made_by_scheme(&self) -> f64 {
+        let made = larger(-self.energy.numerical, 0.0);
+        if made == 0.0 { 0.0 } else { made / self.supplied }
+    }
+}
+
+/// The file, on rank 0.
+#[derive(Debug)]
+pub struct History(CsvFile);
+
+impl History {
+    /// Creates the file, or continues it after this step.
+    pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
+        let path = folder.join("history.csv");
+        let energies = in_columns(Energy::COLUMNS, "energy_imbalance").join(",");
+        let header = format!("{STEP_COLUMNS},{energies}");
+        Ok(Self(match goes_on_after {
+            Some(step) => CsvFile::resume(&path, &header, step as f64)?,
+            None => CsvFile::create(&path, &header)?,
+        }))
+    }
+
+    /// Writes the row of a step.
+    pub fn row(
+        &mut self,
+        step: u64,
+        time: f64,
+        length: f64,
+        outcome: &StepOutcome,
+        totals: &Totals,
+    ) -> Result<()> {
+        self.0.row(format_args!(
+            "{step},{},{},{},{},{},{},{}",
+            Number(time),
+            Number(length),
+            outcome.newton_iterations,
+            outcome.linear_iterations,
+            outcome.active_changes,
+            Number(outcome.inclusion_residual),
+            Numbers(&in_columns(totals.energy.to_array(), totals.energy_imbalance))
+        ))
+    }
+
+    /// Flushes all rows to the file.
+    pub fn flush(&mut self) -> Result<()> {
+        self.0.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {
+        let energy = Energy {
+            kinetic: 1.0,
+            elastic: 2.0,
+            viscous: 3.0,
+            work: 6.5,
+            numerical: -0.5,
+            ..Energy::default()
+        };
+        let mut totals = Totals::default();
+        totals.add(&StepOutcome { energy, ..StepOutcome::default() });
+        assert_eq!(totals.energy_imbalance, 0.0);
+        let mut wrong = Totals::default();
+        wrong.add(&StepOutcome { energy: Energy { work: -6.5, ..energy }, ..StepOutcome::default() });
+        assert_eq!(wrong.energy_imbalance, 2.0);
+    }
+
+    #[test]
+    fn imbalances_are_relative_to_the_most_energy_turned_over_so_far() {
+        let step = |kinetic, work| StepOutcome {
+            energy: Energy { kinetic, work, ..Energy::default() },
+            ..StepOutcome::default()
+        };
+        let mut totals = Totals::default();
+        totals.add(&step(8.0, 8.0));
+        totals.add(&step(0.0, -7.0));
+        assert_eq!((totals.turnover, totals.energy_imbalance), (8.0, 0.125), "1 of 8 J lost");
+    }
+
+    #[test]
+    fn totals_are_kept_by_column_and_those_of_older_checkpoints_are_read() {
+        let energy = Energy::from_array(std::array::from_fn(|at| 0.5 + at as f64));
+        let totals = Totals { energy, turnover: 20.0, newton_iterations: 3, ..Totals::default() };
+        let mut kept = serde_json::to_value(totals).expect("an object");
+        for (column, value) in Energy::COLUMNS.into_iter().zip(energy.to_array()) {
+            assert_eq!(kept[column], value, "{column}");
+        }
+        assert_eq!(serde_json::from_value::<Totals>(kept.clone()).ok(), Some(totals));
+        kept["heat"] = 1.0.into();
+        let refused = serde_json::from_value::<Totals>(kept).expect_err("a key that is not there");
+        assert!(refused.to_string().contains("heat"), "{refused}");
+        let older = r#"{ "kinetic_energy": 1.0, "elastic_energy": 2.0, "contact_energy": 3.0, "viscous_dissipation": 4.0,
+            "viscoplastic_dissipation": 5.0, "contact_dissipation": 6.0, "external_work": 7.0, "numerical_dissipation": 8.0,
+            "turnover": 9.0, "newton_iterations": 10, "pace": null }"#;
+        let read: Totals = serde_json::from_str(older).expect("totals without damage and adhesion");
+        let expected = [1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 3.0, 0.0, 0.0, 0.0];
+        assert_eq!(read.energy.to_array()[..expected.len()], expected);
+        assert_eq!((read.turnover, read.newton_iterations), (9.0, 10));
+    }
+
+    #[test]
+    fn what_is_not_finite_in_one_step_shows_ever_after() {
+        let good = StepOutcome {
+            energy: Energy { kinetic: 1.0, work: 1.0, ..Energy::default() },
+            ..StepOutcome::default()
+        };
+        let mut energy = good.energy.to_array();
+        for (at, bad) in (0..energy.len()).flat_map(|at| [(at, f64::NAN), (at, f64::INFINITY)]) {
+            energy = good.energy.to_array();
+            energy[at] = bad;
+            let mut totals = Totals::default();
+            totals.add(&good);
+            assert!(totals.are_finite());
+            totals.add(&StepOutcome { energy: Energy::from_array(energy), ..good });
+            assert!(!totals.are_finite() && !totals.max_energy_imbalance.is_finite(), "{energy:?}");
+            totals.add(&good);
+            assert!(!totals.are_finite(), "{energy:?}");
+        }
+        let mut totals = Totals::default();
+        totals.add(&StepOutcome { inclusion_residual: f64::NAN, ..good });
+        assert!(totals.max_inclusion_residual.is_nan() && !totals.are_finite());
+        for peaks in
+            [Peaks { von_mises: f64::NAN, strain: 0.0 }, Peaks { von_mises: 0.0, strain: f64::INFINITY }]
+        {
+            let mut totals = Totals::default();
+            totals.add(&StepOutcome { peaks, ..good });
+            assert!(!totals.are_finite(), "{peaks:?}");
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! A field that runs write, as field files, restarts, the summary, the log, the report and studies use it, and the state it is
+//! computed from.
+
+use super::field::{Place, Shape, file_width};
+use crate::{
+    fem::{body::Body, state::State},
+    job::Output,
+    linear_algebra::tensor::Mandel,
+    parallel::session::Session,
+};
+use std::ops::Deref;
+
+/// A field that runs write.
+#[derive(Debug, Clone, Copy)]
+pub struct OutputField {
+    /// Its name in field files: letters, digits and underscores. Also its key under `[output]` if the job has to ask for it.
+    pub name: &'static str,
+    /// What it has a value for.
+    pub place: Place,
+    /// What a value is.
+    pub shape: Shape,
+    /// Its unit in the plane and in space.
+    pub units: [&'static str; 2],
+    /// Whether a job asks for it; absent: every run that has it writes it.
+    pub is_asked_for: Option<fn(&Output) -> bool>,
+    /// The report's picture of it.
+    pub picture: Option<FieldPicture>,
+    /// Numbers that summarise it at the end of a run.
+    pub figures: Option<Figures>,
+}
+
+/// A picture of the body, coloured by a field: by the length of vectors.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldPicture {
+    /// Name of the picture.
+    pub name: &'static str,
+    /// What it shows, in words.
+    pub quantity: &'static str,
+    /// How values become colours.
+    pub shading: Shading,
+}
+
+/// How values of a field become colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shading {
+    /// Linear, from the smallest to the largest value.
+    Linear,
+    /// Of errors: logarithmic, down to a hundredth of the largest; the caption has the root of the sum of their squares.
+    Errors,
+}
+
+/// Numbers that summarise a field at the end of a run.
+#[derive(Debug, Clone, Copy)]
+pub struct Figures {
+    /// Their names in `summary.json`.
+    pub names: &'static [&'static str],
+    /// The line of the log about them.
+    pub line: fn(&[f64]) -> String,
+    /// Those of them that the report shows: name, words and unit.
+    pub shown: &'static [(&'static str, &'static str, &'static str)],
+}
+
+impl OutputField {
+    /// A field that every run writes, with the same unit in the plane and in space, no picture and no figures.
+    pub(super) const fn plain(name: &'static str, place: Place, shape: Shape, unit: &'static str) -> Self {
+        Self { name, place, shape, units: [unit; 2], is_asked_for: None, picture: None, figures: None }
+    }
+
+    /// The same with a picture of this name, coloured linearly.
+    pub(super) const fn with_picture(self, name: &'static str, quantity: &'static str) -> Self {
+        Self { picture: Some(FieldPicture { name, quantity, shading: Shading::Linear }), ..self }
+    }
+
+    /// Numbers of a value in files.
+    pub fn width(&self) -> usize {
+        file_width(self.shape)
+    }
+
+    /// Its unit in this dimension.
+    pub fn unit(&self, dimension: usize) -> &'static str {
+        self.units[usize::from(dimension == 3)]
+    }
+
+    /// Whether runs with these keys write it, if they have it.
+    pub fn is_wanted(&self, output: &Output) -> bool {
+        self.is_asked_for.is_none_or(|is_asked_for| is_asked_for(output))
+    }
+}
+
+/// A converged state, from which fields are computed.
+#[derive(Clone, Copy)]
+pub(crate) struct Converged<'a, const D: usize, const S: usize> {
+    /// The ranks.
+    pub session: &'a Session,
+    /// The body.
+    pub body: &'a Body<D, S>,
+    /// Its state.
+    pub state: &'a State,
+    /// Its total stress in Pa, one a cell of this rank.
+    pub stress: &'a [Mandel<S>],
+}
+
+/// A field of a state.
+pub(crate) struct Computed<'a> {
+    /// Values of the nodes or cells that this rank owns, in the order of the mesh.
+    pub values: Box<dyn Deref<Target = [f64]> + 'a>,
+    /// Its [`figures`](OutputField::figures), the same on all ranks; as many as they have names.
+    pub figures: Vec<f64>,
+}
+
+impl<'a> Computed<'a> {
+    /// A field without figures.
+    pub(super) fn of(values: impl Deref<Target = [f64]> + 'a) -> Self {
+        Self { values: Box::new(values), figures: Vec::new() }
+    }
+}

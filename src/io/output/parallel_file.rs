@@ -1,0 +1,247 @@
+//! HDF5 files that all ranks of a communicator write and read together.
+//!
+//! A dataset is a table of `rows x width` numbers, one-dimensional where the width is 1; each rank transfers its
+//! own rows (see [`Rows`](super::hyperslab::Rows)). Every function is collective: all ranks call it in the same order with the same names and
+//! shapes, and a failure on one rank is an error on all, so that no rank goes on alone.
+//!
+//! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
+//! open for writing, so that nobody could open the results of a process that died.
+//!
+//! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
+//! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks ask for room before they
+//! write (free_space.rs). As MPI closes all files of HDF5 when it ends,
+//! a process that gave a file up leaves without (see [`given_up`]).
+
+use super::free_space;
+use crate::error::{Error, Result};
+use crate::parallel::agreement::{Agreed, agree};
+use hdf5::Location;
+use hdf5::types::{FixedAscii, TypeDescriptor};
+use mpi::collective::SystemOperation;
+use mpi::raw::AsRaw;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What is most often wrong when a file can't be written.
+const ROOM: &str = "Is the disk full, or a limit reached (quota, ulimit -f)?";
+/// Whether this process gave a file up.
+static GIVEN_UP: AtomicBool = AtomicBool::new(false);
+
+/// Whether a file that could not be written is still open: then the process must end without `MPI_Finalize`. The same on all
+/// ranks that shared the file.
+pub fn given_up() -> bool {
+    GIVEN_UP.load(Ordering::Relaxed)
+}
+
+/// The longest text an attribute holds, in bytes.
+const LONGEST_TEXT: usize = 256;
+
+/// A number that the files store in the machine's own representation.
+pub trait Element: hdf5::H5Type + Copy + Default {}
+impl Element for f64 {}
+impl Element for u64 {}
+impl Element for i64 {}
+impl Element for u32 {}
+impl Element for i32 {}
+impl Element for u8 {}
+
+/// An HDF5 file opened by all ranks of a communicator.
+pub struct ParallelFile {
+    pub(super) file: hdf5::File,
+    broken: Cell<bool>,
+    pub(super) communicator: SimpleCommunicator,
+    path: PathBuf,
+    pub(super) transfer_bytes: usize,
+}
+
+impl ParallelFile {
+    /// Creates the file, replacing one of the same name.
+    pub fn create(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
+        Self::create_behind(path, 0, communicator)
+    }
+
+    /// Creates the file with `reserved` bytes before the HDF5 content, for the owner of the format
+    /// (HDF5's user block: 0 or a power of two from 512 on).
+    pub fn create_behind(
+        path: &Path,
+        reserved: u64,
+        communicator: &impl Communicator,
+    ) -> Result<Self, Agreed> {
+        let communicator = communicator.duplicate();
+        let lacks = free_space::lacks(path, free_space::TABLES, communicator.rank() == 0);
+        agree(
+            &communicator,
+            lacks.map_err(|why| Error::Failed(format!("cannot write {}: {why}. {ROOM}", path.display()))),
+        )?;
+        let made = hdf5::FileBuilder::new()
+            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .with_fcpl(|layout| layout.userblock(reserved))
+            .create(path);
+        let file = agree(&communicator, made.map_err(|error| Error::unwritable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    /// Opens an existing file for reading.
+    pub fn open_readonly(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
+        let communicator = communicator.duplicate();
+        let opened =
+            hdf5::FileBuilder::new().with_fapl(|access| access.mpio(communicator.as_raw(), None)).open(path);
+        let file = agree(&communicator, opened.map_err(|error| Error::unreadable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    /// Opens an existing file for reading and writing.
+    pub fn open_append(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
+        let communicator = communicator.duplicate();
+        let opened = hdf5::FileBuilder::new()
+            .with_fapl(|access| access.mpio(communicator.as_raw(), None).libver_v18())
+            .open_rw(path);
+        let file = agree(&communicator, opened.map_err(|error| Error::unwritable(path, error)))?;
+        Ok(Self::new(file, communicator, path))
+    }
+
+    fn new(file: hdf5::File, communicator: SimpleCommunicator, path: &Path) -> Self {
+        Self { file, broken: Cell::new(false), communicator, path: path.into(), transfer_bytes: 1 << 30 }
+    }
+
+    /// Sets how many bytes a rank moves in one collective transfer at most (1 GiB unless told; a row is never
+    /// split). The same on all ranks.
+    pub fn limit_transfer(&mut self, bytes: usize) {
+        self.transfer_bytes = bytes.max(1);
+    }
+
+    /// The file's path as it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether writing failed before: then nothing more must be done with the file. The same on all ranks.
+    pub fn is_broken(&self) -> bool {
+        self.broken.get()
+    }
+
+    /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
+    pub(super) fn need_room(&self, bytes: u64) -> Result<(), Agreed> {
+        let more = bytes.saturating_add(free_space::TABLES);
+        let lacks = free_space::lacks(&self.path, more, self.communicator.rank() == 0);
+        self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
+    }
+
+    /// Hands everything written so far to the operating system.
+    pub fn flush(&self) -> Result<(), Agreed> {
+        self.need_room(0)?;
+        self.written("flush", self.file.flush())
+    }
+
+    /// Flushes and closes the file on all ranks; one that could not be written is given up.
+    pub fn close(self) -> Result<(), Agreed> {
+        if self.is_broken() {
+            return Ok(());
+        }
+        self.flush()?;
+        let Self { file, communicator, path, .. } = self;
+        agree(&communicator, file.close().map_err(|error| Error::unwritable(&path, error)))
+    }
+
+    /// The first row of this rank's slab where the ranks' slabs of `rows` rows follow each other.
+    pub fn slab_start(&self, rows: usize) -> u64 {
+        let (own, mut end) = (rows as u64, 0_u64);
+        self.communicator.scan_into(&own, &mut end, SystemOperation::sum());
+        end - own
+    }
+
+    /// Makes a group; groups above it that are missing are made too.
+    pub fn create_group(&self, name: &str) -> Result<(), Agreed> {
+        self.written(&format!("make group {name}"), self.file.create_group(name).map(drop))
+    }
+
+    /// Whether there is a group or dataset of this name (`/` apart).
+    pub fn contains(&self, name: &str) -> bool {
+        let mut reached = String::new();
+        name.split('/').filter(|part| !part.is_empty()).all(|part| {
+            reached = format!("{reached}/{part}");
+            self.file.link_exists(&reached)
+        })
+    }
+
+    /// The names in a group, in alphabetical order.
+    pub fn names(&self, group: &str) -> Result<Vec<String>, Agreed> {
+        let found = self.file.group(group).and_then(|group| group.member_names());
+        let mut names = self.agreed(&format!("list group {group}"), found)?;
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    /// Removes a dataset or group from the file; its space is not given back.
+    pub fn remove(&self, name: &str) -> Result<(), Agreed> {
+        self.written(&format!("remove {name}"), self.file.unlink(name))
+    }
+
+    /// Sets an attribute of a group or dataset to one number.
+    pub fn set_number<T: Element>(&self, object: &str, name: &str, value: T) -> Result<(), Agreed> {
+        let done = self.object(object).and_then(|object| match object.attr(name) {
+            Ok(attribute) => attribute.write_scalar(&value),
+            Err(_) => object.new_attr::<T>().create(name)?.write_scalar(&value),
+        });
+        self.written(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// Adds an attribute that is a list of numbers.
+    pub fn set_numbers<T: Element>(&self, object: &str, name: &str, values: &[T]) -> Result<(), Agreed> {
+        let done = self
+            .object(object)
+            .and_then(|object| object.new_attr::<T>().shape(values.len()).create(name)?.write_raw(values));
+        self.written(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// Adds an attribute that is a fixed-length ASCII text of at most 256 bytes.
+    pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<(), Agreed> {
+        let done = self.object(object).and_then(|object| {
+            let value = FixedAscii::<LONGEST_TEXT>::from_ascii(text).map_err(|error| error.to_string())?;
+            let kind = TypeDescriptor::FixedAscii(text.len().max(1));
+            object.new_attr_builder().empty_as(&kind).create(name)?.write_scalar(&value)
+        });
+        self.written(&format!("set attribute {name} of {object}"), done)
+    }
+
+    /// An attribute that is one number.
+    pub fn number<T: Element>(&self, object: &str, name: &str) -> Result<T, Agreed> {
+        let found = self.object(object).and_then(|object| object.attr(name)?.read_scalar());
+        self.agreed(&format!("read attribute {name} of {object}"), found)
+    }
+
+    /// An attribute that is a fixed-length text.
+    pub fn text(&self, object: &str, name: &str) -> Result<String, Agreed> {
+        let found = self
+            .object(object)
+            .and_then(|object| object.attr(name)?.read_scalar::<FixedAscii<LONGEST_TEXT>>());
+        self.agreed(&format!("read attribute {name} of {object}"), found).map(|text| text.to_string())
+    }
+
+    fn object(&self, name: &str) -> hdf5::Result<Location> {
+        match self.file.group(name) {
+            Ok(group) => Ok((*group).clone()),
+            Err(_) => self.file.dataset(name).map(|dataset| (**dataset).clone()),
+        }
+    }
+
+    /// As `agreed`, of something that writes: after a failure the file is given up.
+    pub(super) fn written<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
+        let outcome = self.agreed(doing, result.map_err(|error| format!("{error}. {ROOM}").into()));
+        if outcome.is_err() && !self.broken.replace(true) {
+            // One more reference, never given back, keeps HDF5 from closing the file.
+            std::mem::forget(self.file.clone());
+            GIVEN_UP.store(true, Ordering::Relaxed);
+        }
+        outcome
+    }
+
+    /// The same outcome on all ranks, with words about what was being done.
+    pub(super) fn agreed<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
+        let explain = |error| Error::Failed(format!("{}: cannot {doing}: {error}", self.path.display()));
+        agree(&self.communicator, result.map_err(explain))
+    }
+}

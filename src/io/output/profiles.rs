@@ -1,0 +1,218 @@
+//! `profiles.csv`: values along boundaries, a row a facet node, output time and profile.
+
+use super::csv::{CsvFile, Number, Numbers};
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        space::{SurfacePoint, surface_points},
+        state::State,
+    },
+    laws::contact::NodeContext,
+    linear_algebra::tensor::{Mandel, Vector, apply, dot, norm},
+    mesh::shape::facet_normal,
+    parallel::{agreement::Agreed, session::Session},
+};
+use mpi::{datatype::PartitionMut, topology::Communicator, traits::Root};
+use std::path::Path;
+
+/// A boundary whose values are written.
+#[derive(Debug)]
+struct Profile<const D: usize> {
+    name: String,
+    facets: Vec<u32>,
+    points: Vec<SurfacePoint<D>>,
+    /// The contact of the body that acts here, if one does.
+    contact: Option<usize>,
+}
+
+/// The profiles of a job.
+#[derive(Debug)]
+pub struct Profiles<const D: usize> {
+    profiles: Vec<Profile<D>>,
+    /// Whether there is friction on one of them.
+    with_friction: bool,
+    file: Option<CsvFile>,
+}
+
+impl<const D: usize> Profiles<D> {
+    /// Prepares profiles along these boundaries, each with the contact that acts on it. Collective.
+    pub fn new<const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        boundaries: &[(String, Option<usize>)],
+    ) -> Result<Self> {
+        let prepare = |(name, contact): &(String, Option<usize>)| {
+            let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
+            let points = surface_points(session, &body.mesh, &facets)?;
+            Ok(Profile { name: name.clone(), facets, points, contact: *contact })
+        };
+        let has_friction = |contact: usize| body.contacts[contact].friction().is_some();
+        Ok(Self {
+            profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?,
+            with_friction: boundaries.iter().any(|(_, contact)| contact.is_some_and(has_friction)),
+            file: None,
+        })
+    }
+
+    /// Opens the file on rank 0, if there are profiles; continues it after this time if one is given.
+    pub fn open(&mut self, folder: &Path, goes_on_after: Option<f64>) -> Result<()> {
+        if self.profiles.is_empty() {
+            return Ok(());
+        }
+        let path = folder.join("profiles.csv");
+        let axes = ["x", "y", "z"][..D].join(",");
+        let friction = ["x", "y", "z"][..if self.with_friction { D } else { 0 }]
+            .iter()
+            .map(|axis| format!(",friction_traction_{axis}"))
+            .collect::<String>();
+        let header =
+            format!("time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}");
+        self.file = Some(match goes_on_after {
+            Some(time) => CsvFile::resume(&path, &header, time)?,
+            None => CsvFile::create(&path, &header)?,
+        });
+        Ok(())
+    }
+
+    /// Writes the rows of the state, whose stress is given one a cell. Collective.
+    pub fn write<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        stress: &[Mandel<S>],
+    ) -> Result<(), Agreed> {
+        let width = if self.with_friction { 2 * D + 3 } else { D + 3 };
+        for profile in &self.profiles {
+            let rows = session.agree(profile.rows(body, state, stress, self.with_friction))?;
+            let rows = gather(session, &rows);
+            let written = self.file.as_mut().map_or(Ok(()), |file| {
+                let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
+                rows.sort_by(|a, b| compare(a, b));
+                let mut row = |row: &[f64]| {
+                    file.row(format_args!("{},{},{}", Number(state.time), profile.name, Numbers(row)))
+                };
+                rows.into_iter().try_for_each(&mut row)
+            });
+            session.agree(written)?;
+        }
+        Ok(())
+    }
+
+    /// Flushes all rows to the file.
+    pub fn flush(&mut self) -> Result<()> {
+        self.file.as_mut().map_or(Ok(()), CsvFile::flush)
+    }
+}
+
+impl<const D: usize> Profile<D> {
+    /// Position, normal displacement, normal velocity, contact pressure and, if asked for, friction traction `-sigma_tau` of
+    /// each point here.
+    fn rows<const S: usize>(
+        &self,
+        body: &Body<D, S>,
+        state: &State,
+        stress: &[Mandel<S>],
+        with_friction: bool,
+    ) -> Result<Vec<f64>> {
+        let by_stress =
+            if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
+        let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
+        let mut out = Vec::with_capacity(self.points.len() * (D + 3));
+        for (at, point) in self.points.iter().enumerate() {
+            let node = point.node as usize;
+            let along = |field: &[f64]| (0..D).map(|i| field[node * D + i] * point.normal[i]).sum::<f64>();
+            let normal_velocity = along(&velocity);
+            let pressure = match self.contact {
+                Some(contact) => match &traction {
+                    Some(traction) if !body.contacts[contact].needs_ghosts() => {
+                        free_component(body, traction, point)
+                    }
+                    _ => body.contacts[contact].law.pressure(normal_velocity, NodeContext::default()),
+                },
+                None => by_stress[at],
+            };
+            out.extend(body.mesh.nodes[node]);
+            out.extend([along(&displacement), normal_velocity, pressure]);
+            if with_friction {
+                let known = self.contact.zip(traction.as_ref());
+                out.extend(known.map_or([0.0; D], |(c, t)| body.contacts[c].friction_traction(node, t)));
+            }
+        }
+        Ok(out)
+    }
+
+    /// `-sigma_nu` at each point: the mean over the facets around it, weighted by their measure. Collective.
+    fn pressure_of_stress<const S: usize>(
+        &self,
+        body: &Body<D, S>,
+        state: &State,
+        stress: &[Mandel<S>],
+    ) -> Result<Vec<f64>> {
+        let mut sums = state.velocity.like()?;
+        {
+            let mut sums = sums.local_mut()?;
+            sums.fill(0.0);
+            for &facet in &self.facets {
+                let nodes = body.mesh.facets[facet as usize];
+                let normal = facet_normal(&nodes.map(|n| body.mesh.nodes[n as usize]));
+                let measure = norm(&normal);
+                let unit = normal.map(|x| x / measure);
+                let sigma = &stress[body.mesh.facet_cells[facet as usize] as usize];
+                let pressure = -dot(&apply(sigma, &unit), &unit);
+                for node in nodes {
+                    sums[node as usize * D] += pressure * measure;
+                    sums[node as usize * D + 1] += measure;
+                }
+            }
+        }
+        sums.add_ghosts_to_owners()?;
+        let sums = sums.owned()?;
+        Ok(self.points.iter().map(|p| sums[p.node as usize * D] / sums[p.node as usize * D + 1]).collect())
+    }
+}
+
+/// The component of a nodal field along the part of a point's normal that no support holds.
+fn free_component<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    nodal: &[f64],
+    point: &SurfacePoint<D>,
+) -> f64 {
+    let at = point.node as usize * D;
+    let free: Vector<D> = std::array::from_fn(|i| if body.fixed[at + i] { 0.0 } else { point.normal[i] });
+    let size = norm(&free);
+    if size == 0.0 { 0.0 } else { (0..D).map(|i| free[i] * nodal[at + i]).sum::<f64>() / size }
+}
+
+/// The rows of all ranks on rank 0; nothing elsewhere. Collective.
+fn gather(session: &Session, mine: &[f64]) -> Vec<f64> {
+    let world = session.world();
+    let count = i32::try_from(mine.len()).expect("the rows of a boundary stay below 2^31 numbers");
+    let root = world.process_at_rank(0);
+    if !session.is_first() {
+        root.gather_into(&count);
+        root.gather_varcount_into(mine);
+        return Vec::new();
+    }
+    let mut counts = vec![0i32; session.ranks()];
+    root.gather_into_root(&count, &mut counts[..]);
+    let starts: Vec<i32> = counts
+        .iter()
+        .scan(0, |at, n| {
+            let start = *at;
+            *at += n;
+            Some(start)
+        })
+        .collect();
+    let mut all = vec![0.0; counts.iter().sum::<i32>() as usize];
+    let mut parts = PartitionMut::new(&mut all[..], counts, &starts[..]);
+    root.gather_varcount_into_root(mine, &mut parts);
+    all
+}
+
+fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+    let differs = a.iter().zip(b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
+    differs.unwrap_or(std::cmp::Ordering::Equal)
+}

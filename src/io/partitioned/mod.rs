@@ -1,0 +1,92 @@
+//! Meshes that are stored in parts, so that each rank reads only its own.
+//!
+//! `solver partition` checks a mesh and splits it once; the file holds each table's rows of part 0, then of part 1, and so
+//! on. Nodes between parts stand in each of them. A part is a [`Piece`](crate::mesh::piece::Piece):
+//!
+//! ```text
+//! /header              JSON: see [`Header`]
+//! /counts              a row a part: rows in nodes, cells, facets, named
+//! /nodes/id, owner     original id; the part that owns the node
+//! /nodes/place         coordinates in m
+//! /cells/id, region    original id; index into the header's regions
+//! /cells/nodes         positions among the part's nodes
+//! /facets/id, cell     position among all facets; position among the part's cells
+//! /facets/nodes        positions among the part's nodes
+//! /named               index into the header's boundaries, position among the part's facets
+//! ```
+//!
+//! A seal ([`crate::io::output::seal`]) proves that every byte is what was written, and the digest of the mesh that ranks find
+//! together is held against the header's.
+
+mod inspect;
+mod make;
+mod read;
+mod write;
+
+pub use inspect::inspect;
+pub use make::make;
+pub use read::PartitionedFile;
+pub use write::write;
+
+use crate::{
+    io::output::seal::{self, Kind},
+    mesh::Names,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A partitioned mesh.
+const MESH: Kind = Kind {
+    magic: b"ClarkePartedMesh",
+    version: 1,
+    noun: "partitioned mesh",
+    remedy: "Make it again from the mesh of Gmsh: solver partition MESH.msh -n RANKS -o FILE.h5",
+};
+
+/// Tables of a part that `counts` counts, in its order.
+const TABLES: [&str; 4] = ["nodes", "cells", "facets", "named"];
+
+/// The header of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// 2 or 3.
+    pub dimension: usize,
+    /// Number of parts.
+    pub parts: usize,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Cells of the mesh.
+    pub cells: usize,
+    /// Facets of its surface.
+    pub facets: usize,
+    /// Names of the regions.
+    pub regions: Vec<String>,
+    /// Names of the boundaries.
+    pub boundaries: Vec<String>,
+    /// Facets of each boundary.
+    pub boundary_facets: Vec<usize>,
+    /// Facets between parts.
+    pub edge_cut: usize,
+    /// Largest number of cells in a part over the mean.
+    pub imbalance: f64,
+    /// Digest of the mesh, in hexadecimal digits.
+    pub digest: String,
+}
+
+impl Header {
+    fn names(&self) -> Names {
+        Names { regions: self.regions.clone(), boundaries: self.boundaries.clone() }
+    }
+}
+
+/// Whether a file is a partitioned mesh, or its name or first bytes say that it was meant to be one, rather than a mesh of Gmsh.
+pub fn is_meant(path: &Path) -> bool {
+    let known = |extension: &std::ffi::OsStr| extension == "h5" || extension == "hdf5";
+    let named = path.extension().is_some_and(known);
+    named || is_one(path) || seal::is_hdf5(path) || seal::is_sealed(path, seal::CHECKPOINT)
+}
+
+/// Whether a file begins with the seal of a partitioned mesh.
+pub fn is_one(path: &Path) -> bool {
+    seal::is_sealed(path, MESH)
+}

@@ -1,0 +1,274 @@
+//! Adhesion: elastic bonds between body and obstacle that break.
+//!
+//! With the bonding `b` between 0 (broken) and 1 (whole), stiffnesses `c_n`, `c_t` and the truncation `R` of lengths at the
+//! bond's length, the traction on the body is
+//!
+//! ```text
+//! b^2 (c_n R(-u_nu) nu - c_t R(u_tau)),    R(-u_nu) = 0 where u_nu >= 0
+//! viscosity b' = -<b (c_n R(-u_nu)^2 + c_t |R(u_tau)|^2) - energy>_+
+//! ```
+//!
+//! with the normal `nu` out of the body and the displacement `u` since the bonds were made, at `u = 0`. Broken bonds are
+//! not restored. Bonds store `b^2 F(u)`, `F` the potential of the truncated springs; in slow separation they take up `energy` in all,
+//! and the largest traction is `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational and
+//! numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003),
+//! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
+//! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
+
+use super::{interface::Interface, laws::NormalLaw};
+use crate::{
+    laws::law::LawFault,
+    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Adhesive bonds on a contact boundary.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adhesion {
+    /// Traction per opening of whole bonds. They pull with at most `sqrt(stiffness energy)` when opened slowly.
+    #[schemars(range(min = 0), extend("unit" = "Pa/m"), example = 1e6)]
+    pub stiffness: f64,
+    /// Traction per sliding of whole bonds; absent: sliding stretches no bond.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0), extend("unit" = "Pa/m"), example = 5e5)]
+    pub tangential_stiffness: Option<f64>,
+    /// Dupré's energy: what it takes to part a unit of area slowly.
+    #[schemars(range(min = 0), extend("unit" = "J/m^2"), example = 10.0)]
+    pub energy: f64,
+    /// What slows debonding; absent: bonds give way at once.
+    #[serde(default)]
+    #[schemars(range(min = 0), extend("unit" = "J s/m^2"), example = 0.1)]
+    pub viscosity: f64,
+    /// Opening or sliding beyond which bonds pull no harder; absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 0.01)]
+    pub length: Option<f64>,
+}
+
+impl Adhesion {
+    /// Traction of whole bonds per sliding, in Pa/m.
+    pub fn tangential_stiffness(&self) -> f64 {
+        self.tangential_stiffness.unwrap_or(0.0)
+    }
+
+    /// The length in m beyond which the traction grows no more; infinite if it always grows.
+    pub fn limit(&self) -> f64 {
+        self.length.unwrap_or(f64::INFINITY)
+    }
+
+    /// A length in m, cut where the traction grows no more.
+    fn cut(&self, length: f64) -> f64 {
+        length.min(self.limit())
+    }
+
+    /// What can't stand beside bonds, which hold what touches at first to an obstacle at rest; keys are those of the contact's table.
+    pub fn faults(beside: &Interface) -> Vec<LawFault> {
+        let help = format!("delete it, or [{}.adhesion]", beside.path);
+        let gap = beside.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
+            let message = "adhesion binds what touches at first: there is no gap";
+            LawFault::at_value(gap, message, help.as_str())
+        });
+        let obstacle = beside.obstacle_moves.then(|| {
+            let message = "bonds follow the displacement of the body alone: the obstacle must be at rest";
+            LawFault::at_key("obstacle", message, format!("keep it where it is, or {help}"))
+        });
+        gap.into_iter().chain(obstacle).collect()
+    }
+
+    /// A warning about the parameters, if they mean that no bond ever breaks.
+    pub fn warning(&self) -> Option<String> {
+        let (length, energy) = (self.length?, self.energy);
+        let most = (self.stiffness + self.tangential_stiffness()) * length * length;
+        (most <= energy && most > 0.0).then(|| {
+            format!(
+                "at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
+            )
+        })
+    }
+
+    /// Opening in m, at least zero, and sliding.
+    fn stretch<const D: usize>(displacement: &Vector<D>, normal: &Vector<D>) -> (f64, Vector<D>) {
+        let along = dot(displacement, normal);
+        ((-along).max(0.0), add_scaled(displacement, -along, normal))
+    }
+
+    /// Traction in Pa of whole bonds on the body.
+    pub fn traction<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let size = norm(&sliding);
+        let cut = if size > self.cut(size) { self.cut(size) / size } else { 1.0 };
+        let pull = normal.map(|n| self.stiffness * self.cut(opening) * n);
+        add_scaled(&pull, -self.tangential_stiffness() * cut, &sliding)
+    }
+
+    /// Energy in J/m² that whole bonds store: the traction is minus its derivative.
+    pub fn potential<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let of = |length: f64| {
+            let cut = self.cut(length);
+            cut * (length - 0.5 * cut)
+        };
+        self.stiffness * of(opening) + self.tangential_stiffness() * of(norm(&sliding))
+    }
+
+    /// What drives debonding, in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
+    pub fn drive<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let square = |length: f64| self.cut(length).powi(2);
+        self.stiffness * square(opening) + self.tangential_stiffness() * square(norm(&sliding))
+    }
+
+    /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
+    pub fn tangent<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> [Vector<D>; D] {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let along = if opening > 0.0 && opening < self.limit() { self.stiffness } else { 0.0 };
+        let size = norm(&sliding);
+        // Beyond the bond's length only the direction of the traction changes.
+        let (across, radial) = if size > self.limit() {
+            let across = self.tangential_stiffness() * self.limit() / size;
+            (across, across / (size * size))
+        } else {
+            (self.tangential_stiffness(), 0.0)
+        };
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let identity = if i == j { across } else { 0.0 };
+                identity + (along - across) * normal[i] * normal[j] - radial * sliding[i] * sliding[j]
+            })
+        })
+    }
+
+    /// The derivative of [`Adhesion::drive`] by the displacement, in J/m^3.
+    pub fn drive_gradient<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
+        let (opening, sliding) = Self::stretch(displacement, normal);
+        let along = if opening < self.limit() { -2.0 * self.stiffness * opening } else { 0.0 };
+        let across = if norm(&sliding) > self.limit() { 0.0 } else { 2.0 * self.tangential_stiffness() };
+        add_scaled(&normal.map(|n| along * n), across, &sliding)
+    }
+
+    /// The bonding after a step of implicit Euler of this length in s from `start`, which is not below the value at which debonding
+    /// ends, and its derivative by the drive. Drive, energy and viscosity may be per area or of a node.
+    pub fn relax(start: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> [f64; 2] {
+        if start * drive <= energy {
+            return [start, 0.0];
+        }
+        let resistance = viscosity + length * drive;
+        let bonding = ((viscosity * start + length * energy) / resistance).min(start);
+        [bonding, -length * bonding / resistance]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GLUE: Adhesion = Adhesion {
+        stiffness: 100.0,
+        tangential_stiffness: Some(40.0),
+        energy: 0.5,
+        viscosity: 2.0,
+        length: Some(0.2),
+    };
+    const DOWN: [f64; 2] = [0.0, -1.0];
+
+    #[test]
+    fn lifted_and_slid_bonds_pull_back_by_hand() {
+        // Lifted by 0.1 m, slid by 0.05 m.
+        let u = [0.05, 0.1];
+        assert_eq!(GLUE.traction(&u, &DOWN), [-2.0, -10.0]);
+        assert!((GLUE.potential(&u, &DOWN) - (0.5 + 0.05)).abs() < 1e-15);
+        assert!((GLUE.drive(&u, &DOWN) - (1.0 + 0.1)).abs() < 1e-15);
+        let far = [-0.3, 1.0];
+        let [along, up] = GLUE.traction(&far, &DOWN);
+        assert!((along - 8.0).abs() < 1e-14 && (up + 20.0).abs() < 1e-14, "truncated: {along} {up}");
+        assert!((GLUE.potential(&far, &DOWN) - (100.0 * 0.18 + 40.0 * 0.04)).abs() < 1e-13);
+        assert_eq!(GLUE.traction(&[0.0, -0.1], &DOWN), [0.0, 0.0], "pressed on: no bond is stretched");
+    }
+
+    #[test]
+    fn bonds_give_way_by_hand() {
+        // Drive 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
+        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 2.0, 0.5), [0.9, -0.18]);
+        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 0.0, 0.5), [0.5, -0.5], "without viscosity at once");
+        assert_eq!(Adhesion::relax(0.4, 1.0, 0.5, 2.0, 0.5), [0.4, 0.0], "the drive is too weak");
+        assert_eq!(Adhesion::relax(0.0, 1e9, 0.0, 2.0, 0.5)[0], 0.0);
+    }
+
+    #[test]
+    fn slow_separation_takes_up_the_energy_and_peaks_at_the_root_of_stiffness_and_energy() {
+        let law = Adhesion { viscosity: 0.0, length: None, ..GLUE };
+        let (mut bonding, mut dissipated, mut work, mut peak) = (1.0, 0.0, 0.0, 0.0f64);
+        let (steps, end) = (100_000, 5.0);
+        for step in 0..steps {
+            let u = [0.0, end * f64::from(step) / f64::from(steps)];
+            let [next, _] = Adhesion::relax(bonding, law.drive(&u, &DOWN), law.energy, law.viscosity, 1.0);
+            dissipated += (bonding * bonding - next * next) * law.potential(&u, &DOWN);
+            bonding = next;
+            let pull = -bonding * bonding * law.traction(&u, &DOWN)[1];
+            work += pull * end / f64::from(steps);
+            peak = peak.max(pull);
+        }
+        assert!((peak / (100.0f64 * 0.5).sqrt() - 1.0).abs() < 1e-3, "peak {peak}");
+        assert!((dissipated / 0.5 - 1.0).abs() < 2e-3, "dissipated {dissipated}");
+        assert!((work / 0.5 - 1.0).abs() < 2e-3, "work {work}");
+    }
+
+    proptest! {
+        #[test]
+        fn bonds_only_break_and_dissipate(
+            u in proptest::array::uniform3(-0.5f64..0.5), bonding in 0.0f64..1.0,
+            viscosity in 0.0f64..10.0, length in 1e-4f64..10.0,
+        ) {
+            let normal = [0.6, 0.0, -0.8];
+            let (drive, potential) = (GLUE.drive(&u, &normal), GLUE.potential(&u, &normal));
+            let [next, _] = Adhesion::relax(bonding, drive, GLUE.energy, viscosity, length);
+            prop_assert!((0.0..=bonding).contains(&next));
+            prop_assert!((bonding * bonding - next * next) * potential >= 0.0, "dissipation");
+            prop_assert!(next == bonding || next * drive >= GLUE.energy * (1.0 - 1e-12), "no further than the end");
+        }
+
+        #[test]
+        fn traction_is_minus_the_derivative_of_the_potential(u in proptest::array::uniform3(-0.5f64..0.5)) {
+            let normal = [0.6, 0.0, -0.8];
+            let traction = GLUE.traction(&u, &normal);
+            for i in 0..3 {
+                let h = 1e-6;
+                let at = |sign: f64| {
+                    let mut moved = u;
+                    moved[i] += sign * h;
+                    GLUE.potential(&moved, &normal)
+                };
+                let quotient = (at(1.0) - at(-1.0)) / (2.0 * h);
+                prop_assert!((quotient + traction[i]).abs() < 1e-3, "{} {}", quotient, traction[i]);
+            }
+        }
+
+        #[test]
+        fn tangent_and_gradient_of_the_drive_are_derivatives(u in proptest::array::uniform3(-0.5f64..0.5)) {
+            let normal = [0.6, 0.0, -0.8];
+            let (opening, sliding) = Adhesion::stretch(&u, &normal);
+            let corners = [opening, opening - GLUE.limit(), norm(&sliding) - GLUE.limit()];
+            prop_assume!(corners.iter().all(|corner| corner.abs() > 1e-4) || opening == 0.0 && corners[2].abs() > 1e-4);
+            prop_assume!(dot(&u, &normal).abs() > 1e-4);
+            let (tangent, gradient) = (GLUE.tangent(&u, &normal), GLUE.drive_gradient(&u, &normal));
+            for j in 0..3 {
+                let h = 1e-6;
+                let [more, less] = [h, -h].map(|h| {
+                    let mut moved = u;
+                    moved[j] += h;
+                    moved
+                });
+                let [up, down] = [more, less].map(|u| GLUE.traction(&u, &normal));
+                for i in 0..3 {
+                    let quotient = (up[i] - down[i]) / (2.0 * h);
+                    prop_assert!((quotient + tangent[i][j]).abs() < 1e-4, "{} {} {} {}", i, j, quotient, tangent[i][j]);
+                }
+                let quotient = (GLUE.drive(&more, &normal) - GLUE.drive(&less, &normal)) / (2.0 * h);
+                prop_assert!((quotient - gradient[j]).abs() < 1e-4, "{} {}", quotient, gradient[j]);
+            }
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Normal compliance: a foundation whose pressure is a power of the penetration.
+//!
+//! `-sigma_nu = stiffness * max(u_nu - gap, 0)^exponent`. Within a step of length `k` that starts with the penetration `d`
+//! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
+//! constant is 0.
+
+use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::{
+    error::Result,
+    laws::{expression::Scalar, law::increasing_root},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Normal compliance: pressure `stiffness * max(normal displacement - gap, 0)^exponent`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Compliance {
+    /// Pressure at unit penetration.
+    #[schemars(extend("unit" = "Pa/m^exponent", "exclusiveMinimum" = 0), example = 1e4)]
+    pub stiffness: f64,
+    /// Power of the penetration; 1 is a bed of springs.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 10), example = 1.5)]
+    pub exponent: f64,
+    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
+    /// or what [contact.obstacle] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
+    pub gap: Option<Scalar>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Compliance {
+    /// Pressure in Pa at a penetration in m.
+    fn pressure_at(&self, penetration: f64) -> f64 {
+        if penetration <= 0.0 {
+            return 0.0;
+        }
+        if self.exponent == 1.0 {
+            self.stiffness * penetration
+        } else {
+            self.stiffness * penetration.powf(self.exponent)
+        }
+    }
+
+    /// Derivative of the pressure in Pa/m.
+    fn stiffness_at(&self, penetration: f64) -> f64 {
+        if penetration <= 0.0 {
+            return 0.0;
+        }
+        self.stiffness * self.exponent * penetration.powf(self.exponent - 1.0)
+    }
+
+    /// Where `d + ratio p(d) = excess`: monotone and convex.
+    fn penetration(&self, excess: f64, ratio: f64) -> f64 {
+        if self.exponent == 1.0 {
+            return excess / (1.0 + ratio * self.stiffness);
+        }
+        increasing_root(0.0, excess, excess, |at| {
+            [at + ratio * self.pressure_at(at) - excess, 1.0 + ratio * self.stiffness_at(at)]
+        })
+    }
+}
+
+impl NormalParameters for Compliance {
+    type Response = Self;
+
+    fn response(&self) -> Result<Self> {
+        Ok(self.clone())
+    }
+
+    fn gap(&self) -> Option<&Scalar> {
+        self.gap.as_ref()
+    }
+
+    fn against_obstacle(&self, _name: &str) -> Option<[String; 2]> {
+        None
+    }
+}
+
+impl Response for Compliance {
+    fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved {
+        let k = node.step_length;
+        let excess = node.penetration_at(s / c);
+        if excess > 0.0 {
+            // The penetration d at the end of the step solves d + (k / c) p(d) = excess.
+            let reached = self.penetration(excess, k / c);
+            let pressure = self.pressure_at(reached);
+            let derivative = 1.0 / (c + k * self.stiffness_at(reached));
+            Resolved { velocity: (s - pressure) / c, pressure, derivative, branch: 1 }
+        } else {
+            Resolved::free(s, c)
+        }
+    }
+
+    fn pressure(&self, velocity: f64, node: NodeContext) -> f64 {
+        self.pressure_at(node.penetration_at(velocity))
+    }
+
+    fn slope(&self, velocity: f64, node: NodeContext) -> f64 {
+        node.step_length * self.stiffness_at(node.penetration_at(velocity))
+    }
+
+    fn depends_on_displacement(&self) -> bool {
+        true
+    }
+
+    fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
+        Err("there is no growth constant because compliance follows the displacement")
+    }
+
+    fn energy(&self, penetration: f64) -> Option<f64> {
+        Some(self.pressure_at(penetration) * penetration.max(0.0) / (self.exponent + 1.0))
+    }
+
+    fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
+        let slope = format!("{} Pa × (penetration / m)^{}", number(self.stiffness), number(self.exponent));
+        vec![
+            Branch::new("open", "below the gap", "no pressure"),
+            Branch::new("closed", "beyond the gap", slope),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_linear_foundation_by_hand() {
+        let law = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
+        assert_eq!(
+            [law.pressure_at(-1.0), law.pressure_at(0.5), law.energy(0.5).unwrap()],
+            [0.0, 50.0, 12.5]
+        );
+        // d + 0.5 * 100 d = 1.02 with d = 0.02.
+        let node = NodeContext { penetration: 0.02, step_length: 1.0 };
+        let found = law.resolve(2.0, 2.0, node);
+        assert!((found.pressure - 2.0).abs() < 1e-14 && found.velocity.abs() < 1e-14);
+        assert!((found.derivative - 1.0 / 102.0).abs() < 1e-16);
+        let open = law.resolve(-4.0, 2.0, node);
+        assert_eq!((open.velocity, open.pressure, open.branch), (-2.0, 0.0, 0));
+    }
+
+    proptest! {
+        #[test]
+        fn the_resolvent_solves_its_equation(
+            exponent in 1.0f64..2.0, stiffness in 0.1f64..1e4, start in -1.0f64..1.0, s in -1e3f64..1e3, c in 0.1f64..100.0,
+        ) {
+            let law = Compliance { stiffness, exponent, gap: None };
+            let node = NodeContext { penetration: start, step_length: 0.1 };
+            let found = law.resolve(s, c, node);
+            let open = c * found.velocity + law.pressure(found.velocity, node) - s;
+            let size = s.abs() + c * found.velocity.abs() + (1.0 + law.stiffness_at(start.max(0.0)) ) * 1e-2;
+            prop_assert!(open.abs() < 1e-9 * (1.0 + size), "{} of {}", open, size);
+            let h = 1e-4 * (1.0 + s.abs());
+            let (above, below) = (law.resolve(s + h, c, node), law.resolve(s - h, c, node));
+            if above.branch == below.branch && start + 0.1 * found.velocity > 1e-2 {
+                let quotient = (above.velocity - below.velocity) / (2.0 * h);
+                prop_assert!((quotient - found.derivative).abs() < 1e-3 * found.derivative);
+            }
+        }
+
+        #[test]
+        fn pressure_is_the_derivative_of_the_energy(exponent in 1.0f64..3.0, penetration in 0.01f64..1.0) {
+            let law = Compliance { stiffness: 7.0, exponent, gap: None };
+            let h = 1e-6;
+            let energy = |at| law.energy(at).unwrap();
+            let quotient = (energy(penetration + h) - energy(penetration - h)) / (2.0 * h);
+            prop_assert!((quotient - law.pressure_at(penetration)).abs() < 1e-7);
+        }
+    }
+}

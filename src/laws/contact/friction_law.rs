@@ -1,0 +1,146 @@
+//! Friction laws: the friction traction as a function of the sliding velocity, at a given contact pressure.
+//!
+//! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g`
+//! never rises with the velocity. Along the direction of sliding this is a scalar graph with a jump at rest and a fall of at
+//! most [`steepest_fall`](FrictionBound::steepest_fall) times the contact pressure: its relaxed monotonicity constant. For a `c`
+//! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
+//! radial, so that `s` as a vector has the direction of both velocity and traction.
+
+use crate::laws::law::LawFault;
+
+/// The point of a friction graph with a given parameter `s = c v + q`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Sliding velocity in m/s, not negative.
+    pub speed: f64,
+    /// Friction traction in Pa, not negative.
+    pub traction: f64,
+    /// Derivative of the velocity by the parameter in m/(Pa s): 0 where the point sticks.
+    pub derivative: f64,
+    /// Slope of the graph in Pa s/m, where the point slides.
+    pub slope: f64,
+    /// Derivative of the traction by the contact pressure at constant velocity; 0 where the point sticks.
+    pub coefficient: f64,
+}
+
+/// Bisection halves the bracket, so that more iterations than bits bring nothing.
+const ITERATIONS: usize = 100;
+
+/// The evaluation of a friction law at a point. The defaults are those of a bound that is proportional to the contact pressure and
+/// the same at any velocity.
+pub trait FrictionBound {
+    /// Friction traction per contact pressure at a sliding velocity; 0 for laws independent of the pressure.
+    fn coefficient(&self, speed: f64) -> f64;
+
+    /// Largest friction traction in Pa at a sliding velocity in m/s and a contact pressure in Pa.
+    fn bound(&self, speed: f64, pressure: f64) -> f64 {
+        self.coefficient(speed) * pressure.max(0.0)
+    }
+
+    /// Derivative of the bound by the sliding velocity, in Pa s/m: not positive.
+    fn slope(&self, _speed: f64, _pressure: f64) -> f64 {
+        0.0
+    }
+
+    /// Whether the bound follows the contact pressure.
+    fn follows_pressure(&self) -> bool {
+        true
+    }
+
+    /// The steepest fall of the coefficient with the sliding velocity, in s/m: times the contact pressure it is the relaxed
+    /// monotonicity constant.
+    fn steepest_fall(&self) -> f64 {
+        0.0
+    }
+
+    /// The velocity in m/s by which the coefficient has changed, 0 where it does not.
+    fn corner_velocity(&self) -> f64 {
+        0.0
+    }
+
+    /// What is wrong with the parameters; keys are those of the law's table.
+    fn own_faults(&self) -> Vec<LawFault> {
+        Vec::new()
+    }
+
+    /// Velocity and traction where `c v + q = s`, for an `s` that is not negative and a `c` above the fall at this pressure.
+    fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
+        let at_rest = self.bound(0.0, pressure);
+        if at_rest > 0.0 && s <= at_rest {
+            return Slip { speed: 0.0, traction: s, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
+        }
+        let speed =
+            if self.steepest_fall() == 0.0 { (s - at_rest) / c } else { sliding_speed(self, s, c, pressure) };
+        let slope = self.slope(speed, pressure);
+        Slip {
+            speed,
+            // Without a bound exactly nothing.
+            traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
+            derivative: 1.0 / (c + slope),
+            slope,
+            coefficient: if pressure > 0.0 { self.coefficient(speed) } else { 0.0 },
+        }
+    }
+}
+
+/// The root of `c v + g(v) = s`, which rises and is convex: Newton's method with bisection where it leaves the bracket.
+fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f64) -> f64 {
+    let (mut low, mut high) = (0.0, s / c);
+    let mut at = high;
+    for _ in 0..ITERATIONS {
+        let open = c * at + law.bound(at, pressure) - s;
+        if open > 0.0 {
+            high = at;
+        } else {
+            low = at;
+        }
+        let newton = at - open / (c + law.slope(at, pressure));
+        let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+        if (next - at).abs() <= 2.0 * f64::EPSILON * high {
+            return next;
+        }
+        at = next;
+    }
+    at
+}
+
+/// The choice of friction laws, defined by their list: the enum of the job, and the dispatch to the chosen law.
+macro_rules! friction_laws {
+    ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
+        /// The friction law.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[schemars(rename = "Friction")]
+        pub enum FrictionLaw {
+            $($(#[$about])* #[serde(rename = $name)] $law($law),)*
+        }
+
+        macro_rules! each_friction_law {
+            ($family:ident, $chosen:expr, $bound:ident => $what:expr) => {
+                match $chosen {
+                    $($family::$law($bound) => $what,)*
+                }
+            };
+        }
+
+        impl FrictionLaw {
+            crate::laws::law::calls! { each_friction_law FrictionLaw FrictionBound:
+                coefficient(speed: f64) -> f64;
+                bound(speed: f64, pressure: f64) -> f64;
+                slope(speed: f64, pressure: f64) -> f64;
+                follows_pressure() -> bool;
+                steepest_fall() -> f64;
+                corner_velocity() -> f64;
+                own_faults() -> Vec<crate::laws::law::LawFault>;
+                resolve(s: f64, c: f64, pressure: f64) -> Slip;
+            }
+
+            /// Its table in the job, from that of the contact.
+            pub fn table(&self) -> &'static str {
+                match self {
+                    $(Self::$law(_) => concat!("friction.", $name),)*
+                }
+            }
+        }
+    };
+}
+pub(super) use friction_laws;

@@ -1,0 +1,222 @@
+//! The lists of normal and friction laws, from which a job chooses.
+
+use super::{
+    compliance::Compliance,
+    coulomb::Coulomb,
+    damped_response::DampedResponse,
+    exponential_damper::ExponentialDamper,
+    friction_law::{FrictionBound, Slip, friction_laws},
+    graph::Graph,
+    normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response, normal_laws},
+    slip_weakening::SlipWeakening,
+    tresca::Tresca,
+    unilateral::Unilateral,
+};
+use crate::{
+    error::Result,
+    laws::{expression::Scalar, law::LawFault},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+normal_laws! {
+    /// A piecewise linear function of the normal velocity that may fall, equation (72).
+    DampedResponse = "damped_response",
+    /// A damper whose pressure rises with the normal velocity toward a limit.
+    ExponentialDamper = "exponential_damper",
+    /// Any polyline of pressure over normal velocity, with upward jumps.
+    Graph = "graph",
+    /// A spring that is felt beyond the gap.
+    Compliance = "compliance",
+    /// A rigid obstacle: the normal displacement never exceeds the gap.
+    Unilateral = "unilateral",
+}
+
+friction_laws! {
+    /// A given bound on the friction traction.
+    Tresca = "tresca",
+    /// A bound proportional to the contact pressure.
+    Coulomb = "coulomb",
+    /// A coefficient that falls with the sliding velocity.
+    SlipWeakening = "slip_weakening",
+}
+
+impl NormalLaw {
+    /// Its table in the job, relative to that of the contact.
+    pub fn table(&self) -> String {
+        format!("normal.{}", self.name())
+    }
+
+    /// The key of its gap, if that is given, relative to the table of the contact.
+    pub fn gap_key(&self) -> Option<String> {
+        self.gap().map(|_| format!("{}.gap", self.table()))
+    }
+
+    /// Whether it does nothing but bound the displacement or the velocity.
+    pub fn is_bound(&self) -> bool {
+        self.response().is_ok_and(|law| law.velocity_bound(NodeContext::AT_THE_GAP).is_some())
+    }
+
+    /// Whether it acts at nodes only: Gauss points support neither jumps nor a dependence on the displacement.
+    pub fn needs_nodes(&self) -> bool {
+        self.response().is_ok_and(|law| law.has_vertical_parts() || law.depends_on_displacement())
+    }
+
+    /// Faults of the law beside an obstacle; keys are those of the contact's table.
+    pub(super) fn faults_beside_obstacle(&self) -> Vec<LawFault> {
+        let against =
+            self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));
+        let help = "give one of them: the obstacle says how far it is";
+        let gap = self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help));
+        against.into_iter().chain(gap).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::Bound;
+    use proptest::prelude::*;
+
+    const NOWHERE: NodeContext = NodeContext { penetration: f64::NEG_INFINITY, step_length: 0.5 };
+
+    fn wall(bound: Bound) -> NormalResponse {
+        NormalResponse::Unilateral(Unilateral { bound, gap: None })
+    }
+
+    fn laws() -> [NormalResponse; 3] {
+        let springs =
+            |exponent| NormalResponse::Compliance(Compliance { stiffness: 100.0, exponent, gap: None });
+        [wall(Bound::Displacement), springs(1.0), springs(1.5)]
+    }
+
+    #[test]
+    fn where_there_is_nothing_to_touch_points_move_freely_without_pressure_or_energy() {
+        for law in laws() {
+            for s in [-4.0, 0.0, 6.0] {
+                let found = law.resolve(s, 2.0, NOWHERE);
+                assert_eq!(
+                    (found.velocity, found.pressure, found.derivative),
+                    (s / 2.0, 0.0, 0.5),
+                    "{law:?}"
+                );
+            }
+            assert_eq!(law.energy(NOWHERE.penetration).unwrap_or(0.0), 0.0);
+            assert_eq!(law.branch(3.0, NOWHERE), 0);
+        }
+    }
+
+    #[test]
+    fn a_grazing_point_touches_without_pressure() {
+        // 0.25 m away, 0.5 m/s, 0.5 s: it arrives as the step ends.
+        let node = NodeContext { penetration: -0.25, step_length: 0.5 };
+        for law in laws() {
+            let found = law.resolve(1.0, 2.0, node);
+            assert_eq!((found.velocity, found.pressure), (0.5, 0.0), "{law:?}");
+            assert_eq!(law.distance(0.5, 0.0, node, [1.0, 1.0]), 0.0);
+            // A hair less and it is open, a hair more and it pushes.
+            let less = law.resolve(1.0 - 1e-9, 2.0, node);
+            assert_eq!((less.pressure, less.derivative, less.branch), (0.0, 0.5, 0), "{law:?}");
+            let more = law.resolve(1.0 + 1e-3, 2.0, node);
+            assert!(more.pressure > 0.0 && more.pressure <= 1.1e-3 && more.branch == 1, "{law:?}: {more:?}");
+        }
+    }
+
+    #[test]
+    fn a_gap_that_is_closed_exactly_bears_pressure_at_rest() {
+        let node = NodeContext { penetration: 0.0, step_length: 0.5 };
+        let wall = wall(Bound::Displacement);
+        let held = wall.resolve(7.0, 2.0, node);
+        assert_eq!((held.velocity, held.pressure, held.derivative), (0.0, 7.0, 0.0));
+        assert_eq!(wall.distance(held.velocity, held.pressure, node, [1.0, 1.0]), 0.0);
+        let leaving = wall.resolve(-7.0, 2.0, node);
+        assert_eq!((leaving.velocity, leaving.pressure), (-3.5, 0.0));
+        // Springs need to be pressed: d + (k / c) p(d) = k s / c, 26 d = 1.75 with 100 Pa/m.
+        let springs = laws()[1].resolve(7.0, 2.0, node);
+        assert!((springs.velocity * 0.5 - 1.75 / 26.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn only_walls_are_pure_bounds() {
+        let node = NodeContext { penetration: -0.25, step_length: 0.5 };
+        let graph = |points, slope_before, slope_after| {
+            NormalLaw::Graph(Graph { points, slope_before, slope_after }).response().unwrap()
+        };
+        assert_eq!(wall(Bound::Velocity).velocity_bound(node), Some(0.0));
+        assert_eq!(wall(Bound::Displacement).velocity_bound(node), Some(0.5));
+        assert_eq!(wall(Bound::Displacement).velocity_bound(NOWHERE), Some(f64::INFINITY));
+        assert_eq!(graph(vec![[0.25, 0.0]], 0.0, f64::INFINITY).velocity_bound(node), Some(0.25));
+        assert_eq!(graph(vec![[0.0, 1.0]], 0.0, f64::INFINITY).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0]], 1.0, f64::INFINITY).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0]], 0.0, 1e9).velocity_bound(node), None);
+        assert_eq!(graph(vec![[0.0, 0.0], [0.0, 1.0]], 0.0, 0.0).velocity_bound(node), None);
+        assert_eq!(laws()[1].velocity_bound(node), None);
+    }
+
+    #[test]
+    fn laws_without_growth_constants_say_why() {
+        let damper = Graph { points: vec![[0.0, 1.0]], slope_before: 0.0, slope_after: 2.0 };
+        assert_eq!(damper.response().unwrap().growth_constants(), Ok([1.0, 2.0]));
+        let [wall, springs, _] = laws().map(|law| law.growth_constants().unwrap_err());
+        assert!(wall.contains("vertical ray") && springs.contains("displacement"), "{wall} {springs}");
+    }
+
+    #[test]
+    fn far_obstacles_take_no_digits_from_the_velocity() {
+        let node = NodeContext { penetration: -1e6, step_length: 1e-3 };
+        for law in laws() {
+            assert_eq!(law.resolve(0.1 * 3.0, 3.0, node).velocity, 0.1 * 3.0 / 3.0, "{law:?}");
+        }
+    }
+
+    fn any_law() -> impl Strategy<Value = FrictionLaw> {
+        let weakening =
+            (0.0f64..1.0, 0.0f64..1.0, 0.01f64..2.0).prop_map(|(dynamic, more, decay_velocity)| {
+                FrictionLaw::SlipWeakening(SlipWeakening { at_rest: dynamic + more, dynamic, decay_velocity })
+            });
+        prop_oneof![
+            (0.0f64..5.0).prop_map(|bound| FrictionLaw::Tresca(Tresca { bound })),
+            (0.0f64..2.0).prop_map(|coefficient| FrictionLaw::Coulomb(Coulomb { coefficient })),
+            weakening,
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn laws_conform(law in any_law(), pressure in -1.0f64..5.0, speed in 0.001f64..3.0, other in 0.0f64..3.0) {
+            let h = 1e-6;
+            let by_value = (law.bound(speed + h, pressure) - law.bound(speed - h, pressure)) / (2.0 * h);
+            prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_fall()));
+            let rise = (law.bound(speed, pressure) - law.bound(other, pressure)) * (speed - other);
+            let fall = law.steepest_fall() * pressure.max(0.0);
+            prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);
+            if law.follows_pressure() && pressure.abs() > 1e-5 {
+                let by_pressure = (law.bound(speed, pressure + h) - law.bound(speed, pressure - h)) / (2.0 * h);
+                let known = if pressure > 0.0 { law.coefficient(speed) } else { 0.0 };
+                prop_assert!((by_pressure - known).abs() < 1e-7);
+            }
+        }
+
+        #[test]
+        fn the_resolvent_finds_every_point_of_the_graph(
+            law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0,
+        ) {
+            let c = more * law.steepest_fall() * pressure.max(0.0) + 0.1;
+            let found = law.resolve(s, c, pressure);
+            prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
+            if found.speed > 0.0 {
+                prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+            } else {
+                prop_assert!(found.traction <= law.bound(0.0, pressure));
+            }
+            let h = 1e-6 * (1.0 + s);
+            if s > h {
+                let (above, below) = (law.resolve(s + h, c, pressure), law.resolve(s - h, c, pressure));
+                if (above.derivative == 0.0) == (below.derivative == 0.0) {
+                    let quotient = (above.speed - below.speed) / (2.0 * h);
+                    prop_assert!((quotient - found.derivative).abs() < 1e-3 * (found.derivative + 1e-6 / c));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! How far a point of the contact boundary is from its obstacle.
+//!
+//! Deformations are small: the gap is measured from the place `x` where the point was at first along its outward normal
+//! `n` there, and compared with the normal displacement. The obstacle itself may move any distance. With `d = x - centre`
+//! and the obstacle's own unit normal `m`,
+//!
+//! ```text
+//! plane    (point - x) . m / (n . m)           if n . m < 0
+//! sphere   -d . n - sqrt((d . n)^2 - |d|^2 + radius^2)
+//! hollow   -d . n + sqrt((d . n)^2 - |d|^2 + radius^2)
+//! ```
+//!
+//! negative where the point is inside the obstacle, infinite where the ray along the normal does not meet it: there is no
+//! contact then.
+
+use crate::{
+    error::{Error, Result},
+    laws::expression::Scalar,
+    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Cosine between boundary and plane below which the ray counts as parallel to the plane.
+const PARALLEL: f64 = 1e-6;
+
+/// A rigid obstacle that may move; friction acts on the velocity relative to it, over a step the mean one. The gap is measured from the
+/// place where a point of the boundary was at first along its normal there (deformations are small); where that ray does not meet the
+/// obstacle there is no contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Obstacle")]
+pub enum Gap {
+    /// No obstacle: the distance itself in m, at a time, of the point that was at a place at first.
+    #[serde(skip)]
+    Distance(Scalar),
+    /// All that lies beyond a plane, in 2D a line.
+    Plane(Plane),
+    /// A sphere, in 2D a disc.
+    Sphere(Sphere),
+}
+
+/// A plane that bounds an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// A point of the plane, one component an axis: numbers, or expressions in t. Motion along the plane is that of a belt.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
+    pub point: Vec<Scalar>,
+    /// The plane's normal, out of the obstacle toward the body, of any length: numbers, or expressions in t.
+    #[schemars(example = [0.0, 1.0])]
+    pub normal: Vec<Scalar>,
+    /// Angular velocity at which the plane turns in itself about its normal through `point`, counterclockwise seen from the
+    /// body, in 3D: a number, or an expression in t. Only friction feels it. Absent: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "rad/s"), example = 10.0)]
+    pub rotation: Option<Scalar>,
+}
+
+/// A sphere as an obstacle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Its centre, one component an axis: numbers, or expressions in t.
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
+    pub centre: Vec<Scalar>,
+    /// Its radius.
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1.0)]
+    pub radius: f64,
+    /// Whether the obstacle is all outside of the sphere, with the body inside.
+    #[serde(default)]
+    pub hollow: bool,
+    /// Angular velocity at which the sphere turns about its centre, counterclockwise, in 3D seen from where `axis` points: a
+    /// number, or an expression in t. Only friction feels it. Absent: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
+    pub rotation: Option<Scalar>,
+    /// What the sphere turns about in 3D, a vector of any length; absent in 2D.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = [0.0, 1.0, 0.0])]
+    pub axis: Option<Vec<f64>>,
+}
+
+impl Sphere {
+    /// The axis of rotation; in the plane it is always z.
+    pub(super) fn axis(&self) -> Vector<3> {
+        match self.axis.as_deref() {
+            None | Some([]) => [0.0, 0.0, 1.0],
+            Some(axis) => std::array::from_fn(|i| axis.get(i).copied().unwrap_or(0.0)),
+        }
+    }
+}
+
+impl Default for Gap {
+    fn default() -> Self {
+        Self::Distance(Scalar::default())
+    }
+}
+
+impl Gap {
+    /// Gap in m at `time` of the point that was at `place` at first, along its unit `normal`; infinite where there is
+    /// nothing to touch.
+    pub fn at<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<f64> {
+        let gap = self.measure(time, place, normal);
+        if gap > f64::NEG_INFINITY {
+            return Ok(gap);
+        }
+        let cause = match self {
+            Self::Distance(_) => "correct the expression of the gap in the job",
+            Self::Plane(_) => {
+                "the plane's normal vanishes or a component is not finite: correct [contact.obstacle.plane]"
+            }
+            Self::Sphere(_) => "a component of the centre is not finite: correct [contact.obstacle.sphere]",
+        };
+        Err(Error::Failed(format!(
+            "contact: the gap is {gap} at t = {time} s, position {place:?} m; {cause}"
+        )))
+    }
+
+    /// The expressions that may depend on time.
+    pub fn expressions(&self) -> Vec<&[Scalar]> {
+        match self {
+            Self::Distance(gap) => vec![std::slice::from_ref(gap)],
+            Self::Plane(Plane { point, normal, rotation }) => vec![point, normal, rotation.as_slice()],
+            Self::Sphere(Sphere { centre, rotation, .. }) => vec![centre, rotation.as_slice()],
+        }
+    }
+
+    /// How deep in m a place lies in the obstacle at `time`, negative outside; `None` where only the gap is known.
+    pub fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> Option<f64> {
+        match self {
+            Self::Distance(_) => None,
+            Self::Plane(Plane { point, normal, .. }) => {
+                let (point, facing) = (vector::<D>(point, time), vector::<D>(normal, time));
+                Some(dot(&add_scaled(&point, -1.0, place), &facing) / norm(&facing))
+            }
+            Self::Sphere(Sphere { centre, radius, hollow, .. }) => {
+                let away = norm(&add_scaled(place, -1.0, &vector::<D>(centre, time)));
+                Some(if *hollow { away - radius } else { radius - away })
+            }
+        }
+    }
+
+    /// The gap; NaN where the obstacle is undefined.
+    fn measure<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> f64 {
+        match self {
+            Self::Distance(gap) => gap.evaluate(time, place),
+            Self::Plane(Plane { point, normal: facing, .. }) => {
+                let (point, facing) = (vector::<D>(point, time), vector::<D>(facing, time));
+                let length = norm(&facing);
+                let toward: Vector<D> = std::array::from_fn(|i| point[i] - place[i]);
+                let (height, cosine) = (dot(&toward, &facing) / length, dot(normal, &facing) / length);
+                if height.is_finite() && cosine >= -PARALLEL { f64::INFINITY } else { height / cosine }
+            }
+            Self::Sphere(Sphere { centre, radius, hollow, .. }) => {
+                let centre = vector::<D>(centre, time);
+                let offset: Vector<D> = std::array::from_fn(|i| place[i] - centre[i]);
+                to_sphere(&offset, normal, *radius, *hollow)
+            }
+        }
+    }
+}
+
+pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
+    std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
+}
+
+fn to_sphere<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, radius: f64, hollow: bool) -> f64 {
+    let along = dot(offset, normal);
+    // Distance of the centre from the ray, rather than a difference of squares, keeps all digits near the surface.
+    let across: Vector<D> = std::array::from_fn(|i| offset[i] - along * normal[i]);
+    let half = (radius - norm(&across)) * (radius + norm(&across));
+    let outside = norm(offset) >= radius;
+    match (hollow, outside) {
+        _ if half.is_nan() => f64::NAN,
+        // The ray passes by, or leads away from the obstacle.
+        _ if half < 0.0 => f64::INFINITY,
+        (false, true) if along >= 0.0 => f64::INFINITY,
+        (true, true) if along <= 0.0 => f64::INFINITY,
+        (false, _) => -along - half.sqrt(),
+        (true, _) => -along + half.sqrt(),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    pub fn numbers(values: &[f64]) -> Vec<Scalar> {
+        values.iter().map(|&value| Scalar::Number(value)).collect()
+    }
+
+    pub fn expression(text: &str) -> Scalar {
+        Scalar::Expression(crate::laws::expression::Expression::parse(text).unwrap())
+    }
+
+    fn plane(point: Vec<Scalar>, normal: Vec<Scalar>) -> Gap {
+        Gap::Plane(Plane { point, normal, rotation: None })
+    }
+
+    fn sphere(centre: Vec<Scalar>, radius: f64, hollow: bool) -> Gap {
+        Gap::Sphere(Sphere { centre, radius, hollow, rotation: None, axis: None })
+    }
+
+    fn floor(height: f64) -> Gap {
+        plane(numbers(&[7.0, height]), numbers(&[0.0, 3.0]))
+    }
+
+    fn disc(centre: [f64; 2], hollow: bool) -> Gap {
+        sphere(numbers(&centre), 2.0, hollow)
+    }
+
+    const DOWN: Vector<2> = [0.0, -1.0];
+
+    #[test]
+    fn a_floor_is_as_far_below_as_it_lies() {
+        assert_eq!(floor(-0.5).at(0.0, &[1.0, 0.25], &DOWN).unwrap(), 0.75);
+        assert_eq!(floor(0.5).at(0.0, &[1.0, 0.25], &DOWN).unwrap(), -0.25);
+        // Along a normal at 60 degrees the way to the floor is twice as long.
+        let slanted = [0.75f64.sqrt(), -0.5];
+        assert!((floor(-0.5).at(0.0, &[1.0, 0.0], &slanted).unwrap() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn boundaries_that_face_away_or_stand_square_to_a_floor_never_touch_it() {
+        for normal in [[0.0, 1.0], [1.0, 0.0], [1.0, -1e-9], [0.6, 0.8]] {
+            assert_eq!(floor(-0.5).at(0.0, &[1.0, 0.0], &normal).unwrap(), f64::INFINITY, "{normal:?}");
+        }
+    }
+
+    #[test]
+    fn obstacles_move_with_time() {
+        let rising = plane(vec![Scalar::default(), expression("-1 + t")], numbers(&[0.0, 1.0]));
+        assert_eq!(rising.at(0.25, &[0.0, 0.0], &DOWN).unwrap(), 0.75);
+        let turning = plane(numbers(&[0.0, -1.0]), vec![expression("-t"), Scalar::Number(1.0)]);
+        assert_eq!(turning.at(1.0, &[0.5, 0.0], &DOWN).unwrap(), 0.5);
+    }
+
+    #[test]
+    fn a_disc_below_is_felt_where_the_ray_meets_it() {
+        let below = disc([0.0, -3.0], false);
+        assert_eq!(below.at(0.0, &[0.0, 0.0], &DOWN).unwrap(), 1.0);
+        let beside = below.at(0.0, &[1.2, 0.0], &DOWN).unwrap();
+        assert!((beside - 1.4).abs() < 1e-15, "{beside}");
+        assert_eq!(below.at(0.0, &[2.1, 0.0], &DOWN).unwrap(), f64::INFINITY, "it passes by");
+        assert_eq!(below.at(0.0, &[0.0, 0.0], &[0.0, 1.0]).unwrap(), f64::INFINITY, "it is behind");
+        assert_eq!(below.at(0.0, &[0.0, -1.5], &DOWN).unwrap(), -0.5, "the point is inside");
+        assert_eq!(below.at(0.0, &[0.0, -1.0], &DOWN).unwrap(), 0.0, "the point touches");
+        assert_eq!(below.at(0.0, &[2.0, 0.0], &DOWN).unwrap(), 3.0, "the ray grazes");
+    }
+
+    #[test]
+    fn a_hollow_disc_is_touched_from_inside() {
+        let around = disc([0.0, 0.0], true);
+        assert_eq!(around.at(0.0, &[0.0, -0.5], &DOWN).unwrap(), 1.5);
+        assert_eq!(around.at(0.0, &[0.0, -2.5], &DOWN).unwrap(), -0.5, "the point is in the shell");
+        assert_eq!(around.at(0.0, &[0.0, 2.5], &DOWN).unwrap(), f64::INFINITY, "the shell is on this side");
+        assert_eq!(around.at(0.0, &[3.0, 0.0], &DOWN).unwrap(), f64::INFINITY);
+    }
+
+    #[test]
+    fn depths_are_distances_to_the_surface_from_inside() {
+        let depths = |place| {
+            [floor(-0.5), disc([1.0, 0.0], false), disc([1.0, 0.0], true)].map(|gap| gap.depth(0.0, &place))
+        };
+        assert_eq!(depths([1.0, -1.5]), [Some(1.0), Some(0.5), Some(-0.5)]);
+        assert_eq!(depths([4.0, 0.0]), [Some(-0.5), Some(-1.0), Some(1.0)]);
+        assert_eq!(Gap::default().depth(0.0, &[0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn gaps_that_are_no_numbers_fail_with_time_and_place() {
+        let bad = [
+            Gap::Distance(expression("sqrt(0.5 - t)")),
+            Gap::Distance(expression("-1/(t - 1)^2")),
+            plane(numbers(&[0.0, 0.0]), vec![Scalar::default(), expression("t - 1")]),
+            plane(vec![Scalar::default(), expression("sqrt(t - 2)")], numbers(&[0.0, 1.0])),
+            plane(vec![Scalar::default(), expression("1/(t - 1)")], numbers(&[0.0, -1.0])),
+            sphere(vec![expression("sqrt(0.5 - t)")], 1.0, false),
+        ];
+        for gap in bad {
+            let error = gap.at(1.0, &[0.25, 0.0], &DOWN).unwrap_err().to_string();
+            assert!(error.contains("t = 1 s") && error.contains("[0.25, 0.0]"), "{gap:?}: {error}");
+        }
+        assert_eq!(Gap::Distance(expression("1/t")).at(0.0, &[0.0, 0.0], &DOWN).unwrap(), f64::INFINITY);
+    }
+
+    proptest! {
+        #[test]
+        fn the_end_of_the_gap_lies_on_the_sphere(
+            place in prop::array::uniform3(-3.0f64..3.0), direction in prop::array::uniform3(-1.0f64..1.0),
+            radius in 0.1f64..4.0, hollow in any::<bool>(),
+        ) {
+            prop_assume!(norm(&direction) > 0.1);
+            let normal = direction.map(|x| x / norm(&direction));
+            let centre = [0.3, -0.2, 0.1];
+            let gap = sphere(numbers(&centre), radius, hollow).at(0.0, &place, &normal).unwrap();
+            prop_assume!(gap.is_finite());
+            let end: Vector<3> = std::array::from_fn(|i| place[i] + gap * normal[i] - centre[i]);
+            prop_assert!((norm(&end) - radius).abs() < 1e-12 * (1.0 + gap.abs()));
+            let offset: Vector<3> = std::array::from_fn(|i| place[i] - centre[i]);
+            prop_assert_eq!(gap < 0.0, (norm(&offset) < radius) != hollow);
+            // Beyond the gap the obstacle begins.
+            prop_assert_eq!(dot(&end, &normal) > 0.0, hollow);
+        }
+
+        #[test]
+        fn the_end_of_the_gap_lies_on_the_plane(
+            place in prop::array::uniform3(-3.0f64..3.0), direction in prop::array::uniform3(-1.0f64..1.0),
+            facing in prop::array::uniform3(-1.0f64..1.0),
+        ) {
+            prop_assume!(norm(&direction) > 0.1 && norm(&facing) > 0.1);
+            let normal = direction.map(|x| x / norm(&direction));
+            let point = [0.3, -0.2, 0.1];
+            let gap = plane(numbers(&point), numbers(&facing)).at(0.0, &place, &normal).unwrap();
+            prop_assert_eq!(gap.is_infinite(), dot(&normal, &facing) / norm(&facing) >= -PARALLEL);
+            prop_assume!(gap.abs() < 1e3);
+            let end: Vector<3> = std::array::from_fn(|i| place[i] + gap * normal[i] - point[i]);
+            prop_assert!(dot(&end, &facing).abs() < 1e-11 * (1.0 + gap.abs()));
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! The velocity of the material of an obstacle, relative to which friction acts.
+//!
+//! An obstacle is a rigid body. With `x` the plane's point or the sphere's centre and `y` a place on its surface, its material
+//! there has the velocity
+//!
+//! ```text
+//! w = x' + omega x (y - x),    omega = rotation axis          of a sphere; in 2D the axis is z
+//!                              omega = rotation m + m x m'    of a plane with the unit normal m
+//! ```
+//!
+//! A plane's rotation leaves it where it is, as that of a brake disc; a normal that changes tilts it, with the least rotation
+//! that does. `x'` and `m'` are the rates by which a step changes displacements: what sticks in a step of implicit Euler moves
+//! as far as the obstacle does, `x' = (x_n - x_{n-1}) / k`. Everything else is taken at the end of the step, as the gap is.
+
+use super::obstacle::{Gap, Plane, Sphere, vector};
+use crate::{
+    error::{Error, Result},
+    laws::expression::Scalar,
+    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
+};
+
+/// How a scheme makes a rate at the end of a step from values at this time and at times before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    /// End of the step in s.
+    pub time: f64,
+    /// Times in s and weights in 1/s: the rate of `x` is the sum of `weight (x(time) - x(before))`. Those without weight
+    /// don't count.
+    pub before: [[f64; 2]; 2],
+}
+
+impl Rate {
+    /// That of implicit Euler, for a step of this length in s.
+    pub fn euler(time: f64, length: f64) -> Self {
+        Self { time, before: [[time - length, 1.0 / length], [0.0; 2]] }
+    }
+
+    fn of<const D: usize>(&self, value: impl Fn(f64) -> Vector<D>) -> Vector<D> {
+        let now = value(self.time);
+        let mut rate = [0.0; D];
+        for [time, weight] in self.before.into_iter().filter(|[_, weight]| *weight != 0.0) {
+            let before = value(time);
+            (0..D).for_each(|i| rate[i] += weight * (now[i] - before[i]));
+        }
+        rate
+    }
+}
+
+/// The rigid motion of an obstacle at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObstacleMotion<const D: usize> {
+    /// Velocity in m/s of the centre.
+    velocity: Vector<D>,
+    centre: Vector<D>,
+    /// Angular velocity in rad/s.
+    spin: Vector<3>,
+}
+
+impl<const D: usize> ObstacleMotion<D> {
+    /// Whether the motion is a translation.
+    fn is_translation(&self) -> bool {
+        self.spin == [0.0; 3]
+    }
+
+    /// Velocity in m/s of the obstacle's material at a place.
+    fn at(&self, place: &Vector<D>) -> Vector<D> {
+        let arm = add_scaled(place, -1.0, &self.centre);
+        add_scaled(&self.velocity, 1.0, &in_plane(&cross(&self.spin, &in_space(&arm))))
+    }
+}
+
+impl Gap {
+    /// Whether the obstacle's material may move; false for a distance, whose motion is part of the gap.
+    pub fn may_drag(&self) -> bool {
+        let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
+        let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());
+        match self {
+            Self::Distance(_) => false,
+            Self::Plane(Plane { point, normal, rotation }) => {
+                moves(point) || moves(normal) || turns(rotation)
+            }
+            Self::Sphere(Sphere { centre, rotation, .. }) => moves(centre) || turns(rotation),
+        }
+    }
+
+    /// Velocity in m/s, in a `motion` of the obstacle at `time`, of its material where the ray from `place` along the unit `normal`
+    /// meets it; where that misses it, as if it were at the place.
+    pub fn velocity_along<const D: usize>(
+        &self,
+        motion: &ObstacleMotion<D>,
+        time: f64,
+        place: &Vector<D>,
+        normal: &Vector<D>,
+    ) -> Result<Vector<D>> {
+        if motion.is_translation() {
+            return Ok(motion.velocity);
+        }
+        let reach = self.at(time, place, normal)?;
+        let reach = if reach.is_finite() { reach } else { 0.0 };
+        Ok(motion.at(&add_scaled(place, reach, normal)))
+    }
+
+    /// The motion of the obstacle at the end of a step; at rest without one.
+    pub fn motion<const D: usize>(&self, rate: Rate) -> Result<ObstacleMotion<D>> {
+        let time = rate.time;
+        let spinning = |rotation: &Option<Scalar>| rotation.as_ref().map_or(0.0, |r| r.evaluate(time, &[]));
+        let motion = match self {
+            Self::Distance(_) => {
+                return Ok(ObstacleMotion { velocity: [0.0; D], centre: [0.0; D], spin: [0.0; 3] });
+            }
+            Self::Plane(Plane { point, normal, rotation }) => {
+                let unit = |time| {
+                    let normal = in_space(&vector::<D>(normal, time));
+                    normal.map(|x| x / norm(&normal))
+                };
+                let (facing, rotation) = (unit(time), spinning(rotation));
+                let tilt = cross(&facing, &rate.of(unit));
+                ObstacleMotion {
+                    velocity: rate.of(|time| vector(point, time)),
+                    centre: vector(point, time),
+                    spin: add_scaled(&tilt, rotation, &facing),
+                }
+            }
+            Self::Sphere(sphere) => {
+                let (centre, axis, rotation) = (&sphere.centre, sphere.axis(), spinning(&sphere.rotation));
+                let spin = if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
+                ObstacleMotion {
+                    velocity: rate.of(|time| vector(centre, time)),
+                    centre: vector(centre, time),
+                    spin,
+                }
+            }
+        };
+        if motion.velocity.iter().chain(&motion.spin).all(|x| x.is_finite()) {
+            return Ok(motion);
+        }
+        Err(Error::Failed(format!(
+            "contact: the obstacle moves at {:?} m/s and turns at {:?} rad/s at t = {time} s; correct [contact.obstacle]",
+            motion.velocity, motion.spin
+        )))
+    }
+}
+
+fn in_space<const D: usize>(vector: &Vector<D>) -> Vector<3> {
+    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+}
+
+fn in_plane<const D: usize>(vector: &Vector<3>) -> Vector<D> {
+    std::array::from_fn(|i| vector[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::obstacle::tests::{expression, numbers};
+
+    const STEP: Rate = Rate { time: 0.5, before: [[0.25, 4.0], [0.0; 2]] };
+
+    #[test]
+    fn rates_are_those_of_the_schemes() {
+        assert_eq!(Rate::euler(0.5, 0.25), STEP);
+        let parabola = |t: f64| [3.0 * t * t, 7.0];
+        // 3 (0.5^2 - 0.25^2) / 0.25 = 2.25
+        assert_eq!(STEP.of(parabola), [2.25, 0.0]);
+        // Two steps of 0.25 s: (x_n - 4/3 x_{n-1} + 1/3 x_{n-2}) / (2/3 0.25), the slope 6 t of the parabola.
+        let second = Rate { time: 0.5, before: [[0.25, 8.0], [0.0, -2.0]] };
+        assert_eq!(second.of(parabola), [3.0, 0.0]);
+        // Times without weight are not looked at.
+        assert_eq!(STEP.of(|t| [if t == 0.0 { f64::NAN } else { t }]), [1.0]);
+    }
+
+    #[test]
+    fn a_belt_moves_along_itself_and_so_do_all_its_places() {
+        let point = vec![expression("2*t"), Scalar::Number(-1.0)];
+        let belt = Gap::Plane(Plane { point, normal: numbers(&[0.0, 3.0]), rotation: None });
+        let motion = belt.motion::<2>(STEP).unwrap();
+        assert!(belt.may_drag() && motion.is_translation());
+        assert_eq!([motion.at(&[0.0, -1.0]), motion.at(&[9.0, -1.0])], [[2.0, 0.0]; 2]);
+    }
+
+    #[test]
+    fn a_line_that_tilts_lifts_its_places_square_to_itself() {
+        // Unit normal (-sin t, cos t): the line turns to the left by 1 rad/s about its point.
+        let tilting = Gap::Plane(Plane {
+            point: numbers(&[1.0, 2.0]),
+            normal: vec![expression("-sin(t)"), expression("cos(t)")],
+            rotation: None,
+        });
+        let fine = Rate::euler(0.5, 1e-6);
+        let along = [0.5f64.cos(), 0.5f64.sin()];
+        let found = tilting.motion::<2>(fine).unwrap().at(&[1.0 + 3.0 * along[0], 2.0 + 3.0 * along[1]]);
+        assert!(
+            (found[0] + 3.0 * along[1]).abs() < 1e-5 && (found[1] - 3.0 * along[0]).abs() < 1e-5,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_disc_turns_to_the_left_about_its_normal_through_its_point() {
+        let disc = Gap::Plane(Plane {
+            point: numbers(&[1.0, 1.0, 0.0]),
+            normal: numbers(&[0.0, 0.0, 5.0]),
+            rotation: Some(expression("6*t")),
+        });
+        let motion = disc.motion::<3>(STEP).unwrap();
+        assert!(disc.may_drag() && !motion.is_translation());
+        assert_eq!(motion.at(&[1.5, 1.0, 0.0]), [0.0, 1.5, 0.0]);
+        assert_eq!(motion.at(&[1.0, 1.5, 0.0]), [-1.5, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_roller_that_rolls_rests_where_it_touches() {
+        // To the right on a floor below, and so clockwise.
+        let roller = |axis: &[f64], centre: Vec<Scalar>| {
+            Gap::Sphere(Sphere {
+                centre,
+                radius: 0.5,
+                hollow: false,
+                rotation: Some(Scalar::Number(-4.0)),
+                axis: Some(axis.to_vec()),
+            })
+        };
+        let flat = roller(&[], vec![expression("2*t"), Scalar::Number(0.5)]).motion::<2>(STEP).unwrap();
+        assert_eq!([flat.at(&[1.0, 0.0]), flat.at(&[1.0, 1.0])], [[0.0, 0.0], [4.0, 0.0]]);
+        let ball =
+            roller(&[0.0, -2.0, 0.0], vec![expression("2*t"), Scalar::Number(7.0), Scalar::Number(0.5)]);
+        let ball = ball.motion::<3>(STEP).unwrap();
+        assert_eq!([ball.at(&[1.0, 7.0, 0.0]), ball.at(&[1.0, 7.0, 1.0])], [[0.0; 3], [4.0, 0.0, 0.0]]);
+    }
+
+    #[test]
+    fn what_rests_drags_nothing_and_what_has_no_velocity_is_refused() {
+        let floor =
+            Gap::Plane(Plane { point: numbers(&[0.0, 0.0]), normal: numbers(&[0.0, 1.0]), rotation: None });
+        assert!(!floor.may_drag() && !Gap::Distance(expression("0.1*t")).may_drag());
+        assert_eq!(floor.motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
+        assert_eq!(Gap::Distance(expression("0.1*t")).motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
+        let bad = Gap::Sphere(Sphere {
+            centre: numbers(&[0.0, 0.0]),
+            radius: 1.0,
+            hollow: false,
+            rotation: Some(expression("1/(t - 0.5)")),
+            axis: None,
+        });
+        let words = bad.motion::<2>(STEP).unwrap_err().to_string();
+        assert!(words.contains("t = 0.5 s") && words.contains("[contact.obstacle]"), "{words}");
+    }
+}

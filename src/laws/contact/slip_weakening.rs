@@ -1,0 +1,64 @@
+//! Slip weakening: a friction coefficient that falls with the sliding velocity, as in the friction of rocks.
+//!
+//! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact
+//! pressure; it falls by at most `(static - dynamic) / decay_velocity p`.
+
+use super::friction_law::FrictionBound;
+use crate::laws::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Friction whose coefficient falls from static to dynamic with the sliding velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SlipWeakening {
+    /// Coefficient at rest; not below the dynamic one.
+    #[serde(rename = "static")]
+    #[schemars(range(min = 0), example = 0.5)]
+    pub at_rest: f64,
+    /// Coefficient when sliding fast.
+    #[schemars(range(min = 0), example = 0.3)]
+    pub dynamic: f64,
+    /// Sliding velocity over which the coefficient falls.
+    #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 0.01)]
+    pub decay_velocity: f64,
+}
+
+impl FrictionBound for SlipWeakening {
+    fn coefficient(&self, speed: f64) -> f64 {
+        self.dynamic + (self.at_rest - self.dynamic) * (-speed / self.decay_velocity).exp()
+    }
+
+    fn slope(&self, speed: f64, pressure: f64) -> f64 {
+        -self.steepest_fall() * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
+    }
+
+    fn steepest_fall(&self) -> f64 {
+        (self.at_rest - self.dynamic) / self.decay_velocity
+    }
+
+    fn corner_velocity(&self) -> f64 {
+        self.decay_velocity
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        if self.at_rest >= self.dynamic {
+            return Vec::new();
+        }
+        let help = format!("it must be at least {}", self.dynamic);
+        vec![LawFault::at_value("static", "the static coefficient is below the dynamic one", help)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_coefficient_falls_by_hand() {
+        let law = SlipWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
+        assert!((law.bound(0.0, 10.0) - 6.0).abs() < 1e-15);
+        assert!((law.bound(0.5, 10.0) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
+        assert!((law.steepest_fall() - 0.8).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,60 @@
+//! Faults of the laws of one `[[contact]]` table, each alone and in combination.
+
+use super::{adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory};
+use crate::laws::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where on a facet the contact laws hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Quadrature {
+    /// At its nodes (trapezoidal rule): each node has its own law.
+    #[default]
+    Nodal,
+    /// At Gauss points.
+    Gauss,
+}
+
+/// The contents of a `[[contact]]` table, as far as they can be read.
+#[derive(Debug, Clone)]
+pub struct ContactTable {
+    /// Normal law, friction law and obstacle.
+    pub interface: Interface,
+    /// Where on a facet the laws hold.
+    pub quadrature: Quadrature,
+    /// Bonds to the obstacle.
+    pub adhesion: Option<Adhesion>,
+    /// Memory of the foundation.
+    pub memory: Option<Memory>,
+}
+
+impl ContactTable {
+    /// The faults of its laws, each alone and in combination; keys are those of the table.
+    pub fn faults(&self) -> Vec<LawFault> {
+        let Interface { normal, friction, has_obstacle, .. } = &self.interface;
+        let mut faults = Vec::new();
+        if let Some(law) = normal {
+            faults.extend(law.own_faults().into_iter().map(|fault| fault.within(&law.table())));
+            faults.extend(has_obstacle.then(|| law.faults_beside_obstacle()).into_iter().flatten());
+        }
+        if let Some(law) = friction {
+            faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
+        }
+        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.interface)));
+        faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
+        if self.quadrature == Quadrature::Gauss {
+            let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);
+            let not_there = [
+                (friction.is_some(), "friction does not act at Gauss points"),
+                (self.adhesion.is_some(), "adhesion does not act at Gauss points"),
+                (self.memory.is_some(), "memory does not act at Gauss points"),
+                (nodal, "this contact law does not act at Gauss points"),
+            ];
+            let help = "use \"nodal\", or leave the key out";
+            let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
+            faults.extend(not_there.map(|(_, message)| LawFault::at_value("quadrature", message, help)));
+        }
+        faults
+    }
+}

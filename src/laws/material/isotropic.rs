@@ -1,0 +1,85 @@
+//! Linear isotropic tensors.
+
+use crate::linear_algebra::tensor::{Mandel, normal_components, trace};
+
+/// `T(e) = volumetric tr(e) I + shear e`, where `tr` and `I` run over the stored normal components.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Isotropic {
+    /// Factor of the trace, in Pa or Pa s.
+    pub volumetric: f64,
+    /// Factor of the tensor itself (twice the shear modulus), in Pa or Pa s.
+    pub shear: f64,
+}
+
+impl Isotropic {
+    /// `T(e)`.
+    #[inline(always)]
+    pub fn apply<const S: usize>(&self, e: &Mandel<S>) -> Mandel<S> {
+        let pressure = self.volumetric * trace(e);
+        let mut out = [0.0; S];
+        for c in 0..S {
+            out[c] = self.shear * e[c];
+        }
+        for value in out.iter_mut().take(normal_components::<S>()) {
+            *value += pressure;
+        }
+        out
+    }
+
+    /// The `e` with `T(e) = t`.
+    #[inline(always)]
+    pub fn solve<const S: usize>(&self, t: &Mandel<S>) -> Mandel<S> {
+        let n = normal_components::<S>();
+        let pressure = self.volumetric / (self.shear + n as f64 * self.volumetric) * trace(t);
+        let mut out = *t;
+        for value in out.iter_mut().take(n) {
+            *value -= pressure;
+        }
+        for value in &mut out {
+            *value /= self.shear;
+        }
+        out
+    }
+
+    /// `t : T^-1(t)`.
+    #[inline(always)]
+    pub fn inverse_square<const S: usize>(&self, t: &Mandel<S>) -> f64 {
+        let (n, trace) = (normal_components::<S>() as f64, trace(t));
+        let pressure = self.volumetric / (self.shear + n * self.volumetric) * trace;
+        (crate::linear_algebra::tensor::dot(t, t) - pressure * trace) / self.shear
+    }
+
+    /// Smallest eigenvalue over the stored components, `m_A` of assumption H(A)(iv) for a viscosity.
+    pub fn smallest_modulus<const S: usize>(&self) -> f64 {
+        self.shear.min(self.shear + normal_components::<S>() as f64 * self.volumetric)
+    }
+
+    /// Largest eigenvalue over the stored components.
+    pub(super) fn largest_modulus<const S: usize>(&self) -> f64 {
+        self.shear.max(self.shear + normal_components::<S>() as f64 * self.volumetric)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_algebra::tensor::dot;
+
+    #[test]
+    fn solve_inverts_apply() {
+        let tensor = Isotropic { volumetric: 25.0, shear: 50.0 };
+        let e: Mandel<6> = [0.1, -0.2, 0.3, 0.4, -0.5, 0.6];
+        let back = tensor.solve(&tensor.apply(&e));
+        for c in 0..6 {
+            assert!((back[c] - e[c]).abs() < 1e-15);
+        }
+        let t = tensor.apply(&e);
+        assert!((tensor.inverse_square(&t) - dot(&t, &e)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_papers_viscosity_has_modulus_fifty() {
+        assert_eq!(Isotropic { volumetric: 25.0, shear: 50.0 }.smallest_modulus::<3>(), 50.0);
+        assert_eq!(Isotropic { volumetric: -10.0, shear: 50.0 }.smallest_modulus::<6>(), 20.0);
+    }
+}

@@ -1,0 +1,122 @@
+//! The contract of viscoplastic laws.
+
+use super::tangent::Tangent;
+use crate::{
+    laws::{
+        law::LawFault,
+        material::{Elasticity, Hypothesis, Isotropic},
+    },
+    linear_algebra::{
+        simd::{LANES, Pack},
+        tensor::Mandel,
+    },
+};
+
+/// The parameters of a law.
+pub trait Parameters {
+    /// The type that evaluates the law.
+    type Flow: Flow;
+
+    /// For laws that plane stress does not support: the reason, and what to do instead.
+    const NOT_IN_PLANE_STRESS: Option<[&'static str; 2]> = None;
+
+    /// The law in a material of this elasticity.
+    fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Self::Flow;
+
+    /// The fault of parameters each of which is in its range, if there is one.
+    fn fault(&self) -> Option<LawFault> {
+        None
+    }
+
+    /// Whether the flow preserves volume.
+    fn keeps_volume(&self) -> bool;
+}
+
+/// The evaluation of a law at a point. The defaults are those of a law without yield surface and without hardening.
+pub trait Flow {
+    /// The elastic tensor `E` in Pa.
+    fn elasticity(&self) -> &Isotropic;
+
+    /// `X(s)`, the viscoplastic strain rate in 1/s, and the growth in 1/s of the accumulated viscoplastic strain, after so much of
+    /// it. The stress rate is `-E X(s)`, the dissipation `s : X(s)` without what hardening stores.
+    fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64);
+
+    /// The strain rates of a pack of stresses, as [`rate`](Self::rate) gives them one by one; `None` if all are zero. Writes the
+    /// growths of laws that harden.
+    #[inline(always)]
+    fn rates<const S: usize>(
+        &self,
+        stresses: &Pack<S>,
+        accumulated: &[f64; LANES],
+        growths: &mut [f64; LANES],
+    ) -> Option<Pack<S>> {
+        Some(one_by_one(self, stresses, accumulated, growths))
+    }
+
+    /// Flow `k X(s)` of a step of `length` s that ends in `s = s* - k E X(s)`, and growth of the accumulated strain, from the stress
+    /// `trial` that would be there without flow; `None` where nothing flows. Where the caller wants it, the tangent `ds/ds*` is
+    /// written.
+    fn flow_to_end<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        tangent: Option<&mut Tangent<S>>,
+    ) -> Option<(Mandel<S>, f64)>;
+
+    /// Whether the tangent times `E` is symmetric, as it is where flow is associated.
+    fn has_symmetric_tangent<const S: usize>(&self) -> bool {
+        true
+    }
+
+    /// The fastest relaxation in 1/s of stress and accumulated strain together; of power laws at [overstresses](Self::overstress) up
+    /// to this one. Explicit steps of more than twice its inverse make stress grow.
+    fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64;
+
+    /// Whether the rate of relaxation grows with the stress without bound.
+    fn is_power_law(&self) -> bool {
+        false
+    }
+
+    /// The argument of [`fastest_rate`](Self::fastest_rate) at a stress, for power laws: the overstress relative to the yield stress, or,
+    /// without a yield surface, the stress relative to a reference stress of the law.
+    fn overstress<const S: usize>(&self, _s: &Mandel<S>, _accumulated: f64) -> f64 {
+        0.0
+    }
+
+    /// Whether the law accumulates viscoplastic strain.
+    fn hardens(&self) -> bool {
+        false
+    }
+
+    /// The equivalent stress `g(s)` of the yield surface `g(s) = Y + h p` at an accumulated strain `p`, and its derivative; none if any
+    /// stress flows. `g` is convex, and `g(c s) = c g(s)` for positive `c`.
+    fn equivalent_stress<const S: usize>(&self, _s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
+        None
+    }
+
+    /// `Y + h p` in Pa.
+    fn strength(&self, _accumulated: f64) -> f64 {
+        0.0
+    }
+
+    /// `h` in Pa.
+    fn hardening_modulus(&self) -> f64 {
+        0.0
+    }
+}
+
+/// The strain rates of a pack of stresses under a law that evaluates one at a time, and the growths.
+#[inline(always)]
+pub(super) fn one_by_one<const S: usize>(
+    law: &(impl Flow + ?Sized),
+    stresses: &Pack<S>,
+    accumulated: &[f64; LANES],
+    growths: &mut [f64; LANES],
+) -> Pack<S> {
+    Pack::from_lanes(|lane| {
+        let (rate, growth) = law.rate(&stresses.lane(lane), accumulated[lane]);
+        growths[lane] = growth;
+        rate
+    })
+}

@@ -1,0 +1,47 @@
+//! Implicit flow: the stress at the end of a step, `s = s* - k E X(s)`, from the stress `s*` that the step would end with
+//! if nothing flowed.
+//!
+//! Each law comes down to one scalar equation, or to none ([`Flow::flow_to_end`]). The tangent `ds/ds*` is that of the mapping itself
+//! (the algorithmic or consistent one), so that Newton's method on whole bodies keeps its order. As the relaxation of laws with a yield
+//! surface tends to 0 their mappings tend to those of rate-independent plasticity.
+//!
+//! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3; E. de Souza Neto, D. Peric, D. Owen,
+//! Computational Methods for Plasticity, 2008, chapters 7 to 11.)
+
+mod extrapolated;
+
+pub use extrapolated::Extrapolated;
+
+use super::{flow::Flow, law::FlowLaw, tangent::Tangent};
+use crate::linear_algebra::tensor::{Mandel, add_scaled};
+
+/// How a step ends where stress flows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Returned<const S: usize> {
+    /// `s`, the stress at the end in Pa.
+    pub stress: Mandel<S>,
+    /// `k X(s)`, the viscoplastic strain of the step.
+    pub flow: Mandel<S>,
+    /// Accumulated viscoplastic strain at the end.
+    pub accumulated: f64,
+}
+
+impl FlowLaw {
+    /// Flows for `length` s from the stress `trial` that would be there without flow; `accumulated` is the viscoplastic
+    /// strain of hardening before. `None` where nothing flows, the tangent being the identity. Where the caller wants it, the
+    /// tangent `ds/ds*` is written.
+    pub fn return_stress<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        tangent: Option<&mut Tangent<S>>,
+    ) -> Option<Returned<S>> {
+        let (flow, growth) = self.flow_to_end(trial, length, accumulated, tangent)?;
+        let stress = add_scaled(trial, -1.0, &self.elasticity().apply(&flow));
+        Some(Returned { stress, flow, accumulated: accumulated + growth })
+    }
+}
+
+#[cfg(test)]
+mod tests;

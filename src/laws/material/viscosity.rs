@@ -1,0 +1,56 @@
+//! Linear viscosity `A(e) = volumetric tr(e) I + shear e`, section 5 of Wang and Cheng (2022).
+
+use super::isotropic::Isotropic;
+use crate::laws::law::LawFault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Viscous stress `volumetric tr(e) I + shear e` of the strain rate e.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Viscosity {
+    /// Factor of the strain rate's trace; may be negative as long as d volumetric + shear stays positive.
+    #[schemars(extend("unit" = "Pa s"), example = 25.0)]
+    pub volumetric: f64,
+    /// Factor of the strain rate itself.
+    #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
+    pub shear: f64,
+}
+
+impl Viscosity {
+    /// `A` in Pa s.
+    pub fn tensor(&self) -> Isotropic {
+        Isotropic { volumetric: self.volumetric, shear: self.shear }
+    }
+
+    /// What is wrong with the parameters in this dimension: the tensor must be positive.
+    pub fn fault(&self, dimension: usize) -> Option<LawFault> {
+        let Self { volumetric, shear } = *self;
+        let modulus = dimension as f64 * volumetric + shear;
+        (modulus <= 0.0 && shear > 0.0).then(|| {
+            let message = format!("this viscosity adds energy: {dimension} volumetric + shear is {modulus}");
+            LawFault::at_value(
+                "volumetric",
+                message,
+                format!("volumetric must be above {}", -shear / dimension as f64),
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_viscosity_is_positive_where_all_of_its_moduli_are() {
+        let law = |volumetric| Viscosity { volumetric, shear: 50.0 };
+        assert_eq!(law(25.0).tensor().smallest_modulus::<3>(), 50.0, "the paper's");
+        assert_eq!((law(25.0).fault(2), law(-24.9).fault(2)), (None, None));
+        let fault = law(-20.0).fault(3).expect("3 x -20 + 50 is negative");
+        assert_eq!(
+            (&*fault.key, &*fault.help),
+            ("volumetric", "volumetric must be above -16.666666666666668")
+        );
+    }
+}

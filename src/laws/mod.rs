@@ -1,0 +1,7 @@
+//! Constitutive laws at a point, with their keys in the job file: no mesh, no MPI.
+
+pub mod nearest;
+pub mod expression;
+pub mod law;
+pub mod contact;
+pub mod material;

@@ -1,0 +1,195 @@
+use super::{
+    BlockRows, DistributedVector, block_product::BlockProduct, check, index, library::communicator,
+    reference::Reference, shell::Shell, sys,
+};
+use crate::error::{Error, Result};
+use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
+
+/// A sparse matrix spread over the ranks by rows.
+#[derive(Debug)]
+pub struct Matrix {
+    pub(super) raw: Reference<sys::_p_Mat>,
+    /// A copy with faster products.
+    blocks: Option<Rc<Shell>>,
+    /// Bytes of this rank that a product moves at the least.
+    bytes: u64,
+    products: Cell<u64>,
+}
+
+impl Matrix {
+    /// A symmetric positive definite matrix of `block x block` blocks. Collective.
+    pub fn symmetric(block: usize, rows: &BlockRows) -> Result<Self> {
+        let owned = rows.offsets.len() - 1;
+        let (starts, columns, values) = scalar_rows(block, rows)?;
+        let bytes = bytes_of_a_product(values.len(), block, [owned * block; 2]);
+        let local = index(owned * block, "unknowns of a rank")?;
+        let (starts, columns, values) = (starts.as_ptr(), columns.as_ptr(), values.as_ptr());
+        // SAFETY: PETSc copies the row arrays, which describe `local` rows with ascending global columns.
+        let raw = unsafe {
+            let matrix = Reference::new(|raw| sys::MatCreate(communicator(), raw))?;
+            let raw = matrix.get();
+            check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
+            check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
+            check(sys::MatSetType(raw, c"aij".as_ptr()))?;
+            check(sys::MatSeqAIJSetPreallocationCSR(raw, starts, columns, values))?;
+            check(sys::MatMPIAIJSetPreallocationCSR(raw, starts, columns, values))?;
+            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
+            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
+            matrix
+        };
+        Ok(Self { raw, blocks: None, bytes, products: Cell::new(0) })
+    }
+
+    /// Another handle of the same matrix.
+    pub(super) fn share(&self) -> Result<Self> {
+        // SAFETY: live matrix.
+        let raw = unsafe { Reference::to(self.raw.get())? };
+        Ok(Self { raw, blocks: self.blocks.clone(), bytes: self.bytes, products: Cell::new(0) })
+    }
+
+    /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
+    pub fn attach_rigid_motions(&mut self, block: usize, coordinates: &[f64]) -> Result<()> {
+        let (mut rows, mut columns, mut size) = (0, 0, 0);
+        // SAFETY: live matrix and live numbers.
+        unsafe {
+            check(sys::MatGetLocalSize(self.raw.get(), &mut rows, &mut columns))?;
+            check(sys::MatGetBlockSize(self.raw.get(), &mut size))?;
+        }
+        if usize::try_from(rows) != Ok(coordinates.len()) || usize::try_from(size) != Ok(block) {
+            return Err(Error::Internal(format!("{} coordinates for {rows} unknowns", coordinates.len())));
+        }
+        let (block, all) = (index(block, "block size")?, sys::PETSC_DETERMINE);
+        // SAFETY: the coordinate vector borrows `coordinates` and is dropped before this returns; the matrix takes its own
+        // reference to the null space.
+        unsafe {
+            let points = Reference::new(|raw| {
+                sys::VecCreateMPIWithArray(communicator(), block, rows, all, coordinates.as_ptr(), raw)
+            })?;
+            let motions = Reference::new(|raw| sys::MatNullSpaceCreateRigidBody(points.get(), raw))?;
+            check(sys::MatSetNearNullSpace(self.raw.get(), motions.get()))
+        }
+    }
+
+    /// Makes later products faster with a copy of half the size of the matrix. Collective.
+    pub fn multiply_often(&mut self) -> Result<()> {
+        self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
+        self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
+        Ok(())
+    }
+
+    /// The matrix that products use.
+    pub(super) fn operator(&self) -> sys::Mat {
+        self.blocks.as_ref().map_or(self.raw.get(), |shell| shell.raw.get())
+    }
+
+    /// `result = self * x`. Collective.
+    pub fn multiply(&self, x: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
+        self.products.set(self.products.get() + 1);
+        // SAFETY: live objects of matching layout; `x` and `result` differ.
+        check(unsafe { sys::MatMult(self.operator(), x.raw.get(), result.raw.get()) })
+    }
+
+    /// Restarts the count of products.
+    pub fn restart_products(&self) {
+        self.products.set(0);
+    }
+
+    /// Least number of bytes that [`Matrix::multiply`] moved on this rank since [`Matrix::restart_products`].
+    pub fn product_bytes(&self) -> u64 {
+        self.products.get() * self.bytes
+    }
+
+    /// Least number of bytes that one product moves on this rank.
+    pub fn bytes_of_a_product(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The largest sum of the absolute values of a row's entries, over all ranks. Collective.
+    pub fn norm(&self) -> Result<f64> {
+        let mut norm = 0.0;
+        // SAFETY: live matrix and a live number.
+        check(unsafe { sys::MatNorm(self.raw.get(), sys::NORM_INFINITY, &mut norm) })?;
+        Ok(norm)
+    }
+
+    /// Stored scalar entries over all ranks. Collective.
+    pub fn stored_entries(&self) -> Result<f64> {
+        let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
+        // SAFETY: PETSc fills the struct of numbers.
+        unsafe {
+            check(sys::MatGetInfo(self.raw.get(), sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
+            Ok(counts.assume_init().nz_used)
+        }
+    }
+}
+
+/// Bytes that a product with a matrix moves at the least: entries, a column index for those of each column of a block (PETSc reads
+/// rows of one pattern together), and the two vectors once.
+pub(super) fn bytes_of_a_product(entries: usize, block: usize, sizes: [usize; 2]) -> u64 {
+    let indices = entries / block.max(1) * size_of::<sys::PetscInt>();
+    (entries * size_of::<f64>() + indices + (sizes[0] + sizes[1]) * size_of::<f64>()) as u64
+}
+
+type ScalarRows = (Vec<sys::PetscInt>, Vec<sys::PetscInt>, Vec<f64>);
+
+/// Expands blocks to scalar rows with ascending columns.
+fn scalar_rows(block: usize, rows: &BlockRows) -> Result<ScalarRows> {
+    let entries = rows.columns.len() * block * block;
+    index(entries, "matrix entries of a rank")?;
+    let mut starts = Vec::with_capacity((rows.offsets.len() - 1) * block + 1);
+    let mut columns = Vec::with_capacity(entries);
+    let mut values = Vec::with_capacity(entries);
+    starts.push(0);
+    for range in rows.offsets.windows(2) {
+        for row in 0..block {
+            for at in range[0]..range[1] {
+                let first = rows.columns[at] as usize * block;
+                for column in 0..block {
+                    columns.push(index(first + column, "global unknown")?);
+                    values.push(rows.values[(at * block + row) * block + column]);
+                }
+            }
+            starts.push(index(columns.len(), "matrix entries of a rank")?);
+        }
+    }
+    Ok((starts, columns, values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_expand_to_ascending_scalar_rows() {
+        let rows = BlockRows {
+            offsets: vec![0, 2],
+            columns: vec![0, 3],
+            values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
+        };
+        let (starts, columns, values) = scalar_rows(2, &rows).unwrap();
+        assert_eq!(starts, [0, 4, 8]);
+        assert_eq!(columns, [0, 1, 6, 7, 0, 1, 6, 7]);
+        assert_eq!(values, [1.0, 2.0, 5.0, 6.0, 3.0, 4.0, 7.0, 8.0]);
+    }
+
+    #[test]
+    fn a_product_reads_entries_indices_and_vectors() {
+        // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
+        let index = size_of::<sys::PetscInt>() as u64;
+        assert_eq!(bytes_of_a_product(8, 2, [2, 2]), 8 * 8 + 4 * index + 4 * 8);
+    }
+
+    #[test]
+    fn columns_beyond_32_bits_need_64_bit_indices() {
+        let rows = BlockRows { offsets: vec![0, 1], columns: vec![u32::MAX], values: vec![1.0; 4] };
+        match scalar_rows(2, &rows) {
+            Ok((_, columns, _)) => {
+                let columns: Vec<u64> = columns.into_iter().map(|c| u64::try_from(c).unwrap()).collect();
+                assert_eq!(columns[..2], [8_589_934_590, 8_589_934_591]);
+            }
+            Err(error) => assert!(
+                crate::linear_algebra::sparse::INDEX_BITS == 32 && error.to_string().contains("32-bit")
+            ),
+        }
+    }
+}

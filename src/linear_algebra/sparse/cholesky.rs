@@ -1,0 +1,388 @@
+use super::{
+    BlockRows, analysis::Analysis, double_factor::DoubleFactor, lower_half::Lower,
+    single_factor::SingleFactor,
+};
+use crate::error::{Error, Result};
+
+/// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last: by CHOLMOD, or
+/// in single precision after CHOLMOD's symbolic analysis.
+///
+/// A solve is a [`forward`](Self::forward) and a [`backward`](Self::backward) substitution; between them the part of the vector that
+/// belongs to the last unknowns can be read and replaced. PETSc's own interface to CHOLMOD offers neither separate substitutions
+/// nor a given order of elimination.
+#[derive(Debug)]
+pub struct Cholesky {
+    analysis: Analysis,
+    numbers: Numbers,
+    last: usize,
+}
+
+#[derive(Debug)]
+enum Numbers {
+    Double(DoubleFactor),
+    Single(SingleFactor),
+}
+
+/// Precision of the entries of a factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// Of 32 bits.
+    Single,
+    /// Of 64 bits.
+    Double,
+}
+
+impl Precision {
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+        }
+    }
+}
+
+impl Cholesky {
+    /// Factors the whole matrix of these block rows, in a known order of elimination or in one with these unknowns last. Where the
+    /// matrix is not positive definite in single precision the factor is in double precision. `None` where the unknowns can't all be
+    /// last: the other unknowns do not couple them.
+    pub fn new(
+        block: usize,
+        rows: &BlockRows,
+        last: &[usize],
+        known: Option<&[u32]>,
+        precision: Precision,
+    ) -> Result<Option<Self>> {
+        rows.check(block, rows.offsets.len().saturating_sub(1))?;
+        let mut lower = Lower::of(block, rows)?;
+        let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
+        let Some(mut analysis) = analysed else { return Ok(None) };
+        let single = match precision {
+            Precision::Single => SingleFactor::new(&analysis, &lower, last.len()),
+            Precision::Double => None,
+        };
+        let numbers = match single {
+            Some(single) => Numbers::Single(single),
+            None => Numbers::Double(DoubleFactor::new(&mut analysis, &mut lower.view())?),
+        };
+        Ok(Some(Self { analysis, numbers, last: last.len() }))
+    }
+
+    /// The precision of the factor.
+    pub fn precision(&self) -> Precision {
+        match self.numbers {
+            Numbers::Double(_) => Precision::Double,
+            Numbers::Single(_) => Precision::Single,
+        }
+    }
+
+    /// Forward substitution: solves `L y = b`.
+    pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
+        self.fits(right_hand_side)?;
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.forward(&mut self.analysis, right_hand_side),
+            Numbers::Single(factor) => {
+                factor.forward(&self.analysis, right_hand_side);
+                Ok(())
+            }
+        }
+    }
+
+    /// The part of `y` of the last unknowns, in the order of [`last_unknowns`](Self::last_unknowns).
+    pub fn last_mut(&mut self) -> &mut [f64] {
+        let first = self.order().len() - self.last;
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.tail_mut(&self.analysis, first),
+            Numbers::Single(factor) => &mut factor.last,
+        }
+    }
+
+    /// The order of elimination.
+    pub fn order(&self) -> &[u32] {
+        &self.analysis.order
+    }
+
+    /// The last unknowns in the order in which they are eliminated.
+    pub fn last_unknowns(&self) -> &[u32] {
+        &self.order()[self.order().len() - self.last..]
+    }
+
+    /// Backward substitution: solves `L^T x = y`.
+    pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
+        self.fits(solution)?;
+        match &mut self.numbers {
+            Numbers::Double(factor) => factor.backward(&mut self.analysis, solution),
+            Numbers::Single(factor) => {
+                factor.backward(&self.analysis, solution);
+                Ok(())
+            }
+        }
+    }
+
+    fn fits(&self, values: &[f64]) -> Result<()> {
+        if values.len() == self.order().len() {
+            return Ok(());
+        }
+        Err(Error::Internal(format!("{} values for a factor of {} rows", values.len(), self.order().len())))
+    }
+
+    /// Least number of bytes that one substitution reads: the entries of the factor, and the row indices of each supernode once.
+    pub fn bytes(&self) -> u64 {
+        let [entries, rows] = self.analysis.supernodes().counts();
+        let number = match self.precision() {
+            Precision::Double => size_of::<f64>(),
+            Precision::Single => size_of::<f32>(),
+        };
+        number as u64 * entries + size_of::<super::sys::PetscInt>() as u64 * rows
+    }
+
+    /// The diagonal block `L_c` of the last unknowns, whose product `L_c L_c^T` is their Schur complement: column after column, each
+    /// from the diagonal down.
+    pub fn last_factor(&self) -> Vec<f64> {
+        let (size, last) = (self.order().len(), self.last);
+        let first = size - last;
+        let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
+        let value = |at: usize, row: usize| match &self.numbers {
+            Numbers::Double(_) => DoubleFactor::values(&self.analysis)[at],
+            Numbers::Single(factor) => f64::from(factor.values[at]) / factor.scales[row],
+        };
+        let mut columns = vec![0.0; last * (last + 1) / 2];
+        let nodes = self.analysis.supernodes();
+        for node in (0..nodes.len()).rev() {
+            let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
+            if own.end <= first {
+                break;
+            }
+            for column in own.clone().filter(|&column| column >= first) {
+                let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
+                for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
+                    columns[to + row as usize - column] = value(from + at, row as usize);
+                }
+            }
+        }
+        columns
+    }
+}
+
+impl Drop for Cholesky {
+    fn drop(&mut self) {
+        if let Numbers::Double(factor) = &mut self.numbers {
+            factor.free(&mut self.analysis.common);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_algebra::tensor::larger;
+    use Precision::{Double, Single};
+
+    /// A chain of masses between springs, the last one held by one: 2 on the diagonal, -1 beside it.
+    fn chain(length: usize) -> BlockRows {
+        let mut rows = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        for i in 0..length {
+            for j in i.saturating_sub(1)..(i + 2).min(length) {
+                rows.columns.push(j as u32);
+                rows.values.push(if i == j { 2.0 } else { -1.0 });
+            }
+            rows.offsets.push(rows.columns.len());
+        }
+        rows
+    }
+
+    fn solve(cholesky: &mut Cholesky, b: &[f64]) -> Vec<f64> {
+        let mut x = vec![0.0; b.len()];
+        cholesky.forward(b).unwrap();
+        cholesky.backward(&mut x).unwrap();
+        x
+    }
+
+    #[test]
+    fn both_halves_together_solve() {
+        let rows = chain(5);
+        for (precision, error) in [(Double, 1e-13), (Single, 1e-5)] {
+            let mut cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            assert_eq!(cholesky.precision(), precision);
+            // A parabola has the second difference 2.
+            let x = solve(&mut cholesky, &[2.0; 5]);
+            for (found, known) in x.iter().zip([5.0, 8.0, 9.0, 8.0, 5.0]) {
+                assert!((found - known).abs() < error, "{x:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn vectors_of_another_length_are_refused() {
+        for precision in [Double, Single] {
+            let mut cholesky = Cholesky::new(1, &chain(5), &[2], None, precision).unwrap().unwrap();
+            for length in [4, 6, 1_000_000] {
+                assert!(cholesky.forward(&vec![2.0; length]).is_err());
+                cholesky.forward(&[2.0; 5]).unwrap();
+                assert!(cholesky.backward(&mut vec![2.0; length]).is_err());
+            }
+        }
+    }
+
+    #[test]
+    fn a_half_that_nothing_came_before_is_an_error_or_the_start_from_zero() {
+        for precision in [Double, Single] {
+            let mut cholesky = Cholesky::new(1, &chain(5), &[2], None, precision).unwrap().unwrap();
+            let mut x = [1.0; 5];
+            assert!(cholesky.backward(&mut x).is_err() || x == [0.0; 5]);
+        }
+    }
+
+    #[test]
+    fn rows_and_orders_that_dont_fit_are_refused() {
+        let refused = |rows: &BlockRows, last: &[usize], known: Option<&[u32]>| {
+            Cholesky::new(1, rows, last, known, Double).is_err()
+        };
+        let rows = chain(3);
+        for known in [&[0_u32, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 3]] {
+            assert!(refused(&rows, &[2], Some(known)), "{known:?}");
+        }
+        assert!(
+            refused(&rows, &[3], None)
+                && refused(&rows, &[2, 2], None)
+                && refused(&rows, &[2, 1, 0, 1], None)
+        );
+        let broken = |change: &dyn Fn(&mut BlockRows)| {
+            let mut rows = chain(3);
+            change(&mut rows);
+            refused(&rows, &[2], None)
+        };
+        assert!(broken(&|rows| rows.columns[6] = 3), "a column that is not there");
+        assert!(broken(&|rows| rows.columns.swap(0, 1)), "columns that don't ascend");
+        assert!(broken(&|rows| rows.values.truncate(6)), "missing values");
+        assert!(broken(&|rows| rows.offsets[3] = 9), "an end beyond the entries");
+        assert!(broken(&|rows| rows.offsets.swap(1, 2)), "starts that don't ascend");
+        assert!(broken(&|rows| rows.offsets.clear()), "no starts");
+    }
+
+    #[test]
+    fn a_full_matrix_has_the_bytes_of_a_triangle() {
+        let mut rows = chain(3);
+        (rows.offsets, rows.columns) = (vec![0, 3, 6, 9], vec![0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        rows.values = vec![4.0, 1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 4.0];
+        let index = size_of::<super::super::sys::PetscInt>() as u64;
+        for (precision, number) in [(Double, 8), (Single, 4)] {
+            let cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            assert_eq!(cholesky.bytes(), 6 * number + 3 * index);
+        }
+    }
+
+    #[test]
+    fn the_last_block_is_the_factor_of_the_schur_complement() {
+        let rows = chain(3);
+        for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
+            let cholesky = Cholesky::new(1, &rows, &[0, 2], None, precision).unwrap().unwrap();
+            // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
+            let l = cholesky.last_factor();
+            let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
+            for (found, known) in schur.iter().zip([1.5, -0.5, 1.5]) {
+                assert!((found - known).abs() < error, "{schur:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_set_halfway_is_that_of_the_last_unknown() {
+        let rows = chain(3);
+        for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
+            let mut cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
+            cholesky.forward(&[0.0; 3]).unwrap();
+            let along = cholesky.last_factor()[0];
+            cholesky.last_mut()[0] = 3.0 * along;
+            let mut x = [0.0; 3];
+            cholesky.backward(&mut x).unwrap();
+            for (found, known) in x.iter().zip([1.0, 2.0, 3.0]) {
+                assert!((found - known).abs() < error, "{x:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn unknowns_that_the_rest_does_not_tie_together_cant_all_be_last() {
+        let rows = BlockRows {
+            offsets: vec![0, 2, 4, 6, 8],
+            columns: vec![0, 1, 0, 1, 2, 3, 2, 3],
+            values: vec![2.0, -1.0, -1.0, 2.0, 2.0, -1.0, -1.0, 2.0],
+        };
+        let both = Cholesky::new(1, &rows, &[1, 3], None, Double).unwrap();
+        assert!(both.is_none_or(|cholesky| cholesky.last_unknowns().iter().all(|u| [1, 3].contains(u))));
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_an_error_in_words() {
+        let mut rows = chain(3);
+        rows.values[0] = -2.0;
+        for precision in [Double, Single] {
+            let error = Cholesky::new(1, &rows, &[1], None, precision).unwrap_err();
+            assert!(error.to_string().contains("not positive definite"));
+        }
+    }
+
+    /// Springs between the nodes of a square grid, each also held a little: supernodes of many columns.
+    fn grid(length: usize, held: f64) -> BlockRows {
+        let mut rows = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        let near = |a: usize, b: usize| a.abs_diff(b) <= 1;
+        for node in 0..length * length {
+            let first = rows.columns.len();
+            let (x, y) = (node % length, node / length);
+            let others =
+                (0..length * length).filter(|other| near(x, other % length) && near(y, other / length));
+            rows.columns.extend(others.map(|other| other as u32));
+            let count = (rows.columns.len() - first - 1) as f64;
+            let value = |&other: &u32| if other as usize == node { count + held } else { -1.0 };
+            let values: Vec<f64> = rows.columns[first..].iter().map(value).collect();
+            rows.values.extend(values);
+            rows.offsets.push(rows.columns.len());
+        }
+        rows
+    }
+
+    #[test]
+    fn single_precision_is_near_double_on_panels_of_all_sizes() {
+        let rows = grid(60, 0.1);
+        let last: Vec<usize> = (0..60).collect();
+        let b: Vec<f64> = (0..3600).map(|i| 1e30 * f64::from(i % 17 - 8)).collect();
+        let [double, single] = [Double, Single].map(|precision| {
+            let mut cholesky = Cholesky::new(1, &rows, &last, None, precision).unwrap().unwrap();
+            (solve(&mut cholesky, &b), cholesky.last_factor(), cholesky.order().to_vec())
+        });
+        assert_eq!(double.2, single.2);
+        let worst = |a: &[f64], b: &[f64]| {
+            let largest = a.iter().fold(0.0, |m, x| larger(m, x.abs()));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, larger) / largest
+        };
+        let errors = [worst(&double.0, &single.0), worst(&double.1, &single.1)];
+        assert!(errors.iter().all(|error| (1e-9..1e-5).contains(error)), "{errors:?}");
+    }
+
+    #[test]
+    fn entries_may_be_as_far_apart_as_double_precision_allows() {
+        let mut rows = chain(3);
+        let units = [1e60, 1.0, 1e-60];
+        for (row, range) in rows.offsets.windows(2).enumerate() {
+            for at in range[0]..range[1] {
+                rows.values[at] *= units[row] * units[rows.columns[at] as usize];
+            }
+        }
+        let mut cholesky = Cholesky::new(1, &rows, &[2], None, Single).unwrap().unwrap();
+        assert_eq!(cholesky.precision(), Single);
+        let x = solve(&mut cholesky, &[2e60, 2.0, 2e-60]);
+        for ((found, unit), known) in x.iter().zip(units).zip([3.0, 4.0, 3.0]) {
+            assert!((found * unit - known).abs() < 1e-5, "{x:?}");
+        }
+    }
+
+    #[test]
+    fn what_single_precision_cant_factor_is_factored_in_double() {
+        let off = 1.0 - 1e-9;
+        let rows =
+            BlockRows { offsets: vec![0, 2, 4], columns: vec![0, 1, 0, 1], values: vec![1.0, off, off, 1.0] };
+        let cholesky = Cholesky::new(1, &rows, &[0], None, Single).unwrap().unwrap();
+        assert_eq!(cholesky.precision(), Double);
+    }
+}

@@ -1,0 +1,26 @@
+//! Sparse matrices on one rank: symmetric and rectangular matrices of small dense blocks and their products, Cholesky factors by
+//! CHOLMOD in double precision and on its analysis in single precision.
+#![allow(unsafe_code)]
+
+mod analysis;
+mod block_rows;
+mod cholesky;
+mod cholmod;
+mod double_factor;
+mod large_pages;
+mod lower_half;
+mod panel;
+mod rectangular_blocks;
+mod single_blas;
+mod single_factor;
+mod symmetric_blocks;
+mod threads;
+
+pub(crate) use block_rows::index;
+pub use block_rows::{BlockRows, INDEX_BITS};
+pub use cholesky::{Cholesky, Precision};
+pub(crate) use rectangular_blocks::{Transfer, transfer};
+pub(crate) use symmetric_blocks::{Product, ScalarRows, Stored, product};
+pub(crate) use threads::one_unless_chosen;
+
+use crate::linear_algebra::bindings as sys;

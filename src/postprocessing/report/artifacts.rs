@@ -1,0 +1,124 @@
+//! What a run left in its folder, as far as it can be read.
+
+use super::table::Table;
+use crate::{
+    error::{Error, Result},
+    io::output::field_snapshot::Snapshot,
+    job::{Job, Loaded},
+};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Files that only a run leaves; a folder with none of them is none of a run.
+const SIGNS: [&str; 5] = ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv"];
+
+/// A file that is not there or cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Gap {
+    /// Its name.
+    pub file: &'static str,
+    /// Why, in words.
+    pub why: String,
+    /// What the page lacks without it.
+    pub lacking: &'static str,
+}
+
+/// The files, read.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Text of the effective job.
+    pub text: Option<String>,
+    /// The effective job.
+    pub job: Option<Job>,
+    /// `summary.json`.
+    pub summary: Option<Value>,
+    /// `history.csv`.
+    pub history: Option<Table>,
+    /// `probes.csv`.
+    pub probes: Option<Table>,
+    /// `profiles.csv`.
+    pub profiles: Option<Table>,
+    /// `fields.vtkhdf` at its last time.
+    pub snapshot: Option<Snapshot>,
+    /// What is not there.
+    pub gaps: Vec<Gap>,
+}
+
+impl Found {
+    /// Reads what is there. A folder that is none of a run is refused.
+    pub fn read(folder: &Path) -> Result<Self> {
+        refuse_what_is_no_run(folder)?;
+        let mut found = Self { folder: folder.to_owned(), ..Self::default() };
+        found.text = found.take("job.toml", "the job, its contact laws and tolerances", |path| {
+            std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))
+        });
+        if found.text.is_some() {
+            let loaded = found.take("job.toml", "contact laws and tolerances", |path| Job::load(path, &[]));
+            found.job = loaded.map(|loaded: Loaded| loaded.job);
+        }
+        found.summary = found.take("summary.json", "status, sizes, certificates and seconds", |path| {
+            let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
+            let value: Value = serde_json::from_str(&text).map_err(|error| Error::unreadable(path, error))?;
+            value.is_object().then_some(value).ok_or_else(|| Error::unreadable(path, "it is no JSON object"))
+        });
+        found.history =
+            found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
+        let wants = |there: fn(&Job) -> bool, job: &Option<Job>| job.as_ref().is_none_or(there);
+        if folder.join("probes.csv").exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
+            found.probes = found.take("probes.csv", "probes over time", |path| Table::read(path, "probe"));
+        }
+        if folder.join("profiles.csv").exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
+            found.profiles = found
+                .take("profiles.csv", "what happens along boundaries", |path| Table::read(path, "profile"));
+        }
+        found.snapshot = found.take("fields.vtkhdf", "pictures of the body", Snapshot::read);
+        Ok(found)
+    }
+
+    /// 2 or 3, as far as it is known.
+    pub fn dimension(&self) -> Option<usize> {
+        let summary = self.summary.as_ref().and_then(|summary| summary.get("dimension")?.as_u64());
+        summary.map(|d| d as usize).or_else(|| self.snapshot.as_ref().map(Snapshot::dimension))
+    }
+
+    fn take<T>(
+        &mut self,
+        file: &'static str,
+        lacking: &'static str,
+        read: impl FnOnce(&Path) -> Result<T>,
+    ) -> Option<T> {
+        let path = self.folder.join(file);
+        let why = if path.exists() {
+            match read(&path) {
+                Ok(value) => return Some(value),
+                Err(error) => error.to_string(),
+            }
+        } else {
+            "it is not there".into()
+        };
+        self.gaps.push(Gap { file, why, lacking });
+        None
+    }
+}
+
+fn refuse_what_is_no_run(folder: &Path) -> Result<()> {
+    let shown = folder.display();
+    let refuse = |words: String| Err(Error::Refused(words));
+    if !folder.exists() {
+        return refuse(format!("{shown} is not there; give the output folder of a run"));
+    }
+    if !folder.is_dir() {
+        let remedy = if folder.extension().is_some_and(|extension| extension == "toml") {
+            "that is a job; give the folder that its run left, [output] folder (by default out/ and the job's name beside it)"
+        } else {
+            "it is no folder; give the output folder of a run"
+        };
+        return refuse(format!("{shown}: {remedy}"));
+    }
+    if SIGNS.iter().any(|name| folder.join(name).exists()) {
+        return Ok(());
+    }
+    refuse(format!("{shown} is not the output folder of a run: it holds none of {}", SIGNS.join(", ")))
+}

@@ -1,0 +1,395 @@
+//! Pictures of what happens along a boundary, at the last time of its profile.
+
+use super::{
+    arc::along_curve,
+    body::{Body, Coloured},
+    chart::{Axis, Band, Chart, Look, Series},
+    colour::{BANDS, CIVIDIS, Colour, LINES},
+    friction::{self, Rubbing},
+    law::Law,
+    markup::table,
+    picture::Picture,
+    scale::{extent, number},
+    table::Table,
+};
+use crate::{
+    error::Result,
+    io::output::{field_list::VELOCITY, field_snapshot::Snapshot},
+    laws::contact::FrictionLaw,
+};
+use std::collections::HashMap;
+
+/// Bands behind a chart beyond which they would only confuse.
+const MOST_BANDS: usize = 12;
+/// Nodes beyond which the dots of a curve merge.
+const MOST_DOTS: usize = 150;
+/// Arrows beyond which they would hide each other.
+const MOST_ARROWS: usize = 70;
+
+/// A boundary at the last time in `profiles.csv`.
+pub(super) struct Boundary<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// When, in s.
+    pub time: f64,
+    law: Option<&'a Law>,
+    friction: Option<FrictionLaw>,
+    /// Length in s of the step that ended then.
+    step: Option<f64>,
+    table: Table,
+    points: Vec<[f64; 3]>,
+    arc: Vec<f64>,
+    dimension: usize,
+    behind: Option<Behind<'a>>,
+}
+
+/// The body at the same time, with the numbers of the boundary's nodes and normals out of it there.
+struct Behind<'a> {
+    snapshot: &'a Snapshot,
+    nodes: Vec<usize>,
+    normals: Vec<[f64; 3]>,
+}
+
+/// What acts on a boundary.
+pub(super) struct Laws {
+    /// Along the normal.
+    pub normal: Law,
+    /// In sliding.
+    pub friction: Option<FrictionLaw>,
+    /// Times in s at the ends of the steps, and their lengths in s.
+    pub steps: Vec<[f64; 2]>,
+}
+
+impl<'a> Boundary<'a> {
+    /// The profile of this name, with the laws that act there.
+    pub fn new(
+        profiles: &Table,
+        name: &'a str,
+        laws: Option<&'a Laws>,
+        snapshot: Option<&'a Snapshot>,
+    ) -> Self {
+        let (law, friction) = (laws.map(|laws| &laws.normal), laws.and_then(|laws| laws.friction));
+        let table = profiles.of(name).last("time");
+        let dimension = if table.header().iter().any(|column| column == "z") { 3 } else { 2 };
+        let axes = ["x", "y", "z"].map(|axis| table.column(axis).unwrap_or_else(|| vec![0.0; table.len()]));
+        let points: Vec<[f64; 3]> = (0..table.len()).map(|n| [0, 1, 2].map(|axis| axes[axis][n])).collect();
+        let time = table.column("time").and_then(|times| times.last().copied()).unwrap_or(0.0);
+        let steps = laws.iter().flat_map(|laws| &laws.steps);
+        let step = steps.into_iter().find(|[end, _]| *end == time).map(|[_, length]| *length);
+        let mut boundary =
+            Self { name, time, law, friction, step, table, points, arc: vec![], dimension, behind: None };
+        if dimension == 2 {
+            let (order, arc) = along_curve(&boundary.points);
+            boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
+            (boundary.table, boundary.arc) = (boundary.table.picked(&order), arc);
+        }
+        if let Some(snapshot) = snapshot.filter(|snapshot| snapshot.time == time) {
+            boundary.behind = boundary.nodes_of(snapshot).map(|nodes| {
+                let normals = super::view::normals(snapshot, &nodes);
+                Behind { snapshot, nodes, normals }
+            });
+        }
+        boundary
+    }
+
+    /// The numbers of the boundary's nodes in the body, if all are there.
+    fn nodes_of(&self, snapshot: &Snapshot) -> Option<Vec<usize>> {
+        let bits = |p: &[f64; 3]| p.map(f64::to_bits);
+        let nodes: HashMap<[u64; 3], usize> =
+            snapshot.nodes.iter().enumerate().map(|(n, p)| (bits(p), n)).collect();
+        self.points.iter().map(|p| nodes.get(&bits(p)).copied()).collect()
+    }
+
+    /// All pictures: quantities along the boundary (on its surface in space), and its nodes on the law.
+    pub fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Vec<Picture>> {
+        let mut out = Vec::new();
+        let columns: Vec<&String> = self.table.header().iter().filter(|name| is_quantity(name)).collect();
+        for column in ["normal_velocity", "contact_pressure", "normal_displacement"] {
+            if columns.iter().any(|name| *name == column) {
+                out.extend(self.quantity(column, snapshot)?);
+            }
+        }
+        let first = ["normal_velocity", "contact_pressure", "normal_displacement"];
+        for column in columns.into_iter().filter(|name| !first.contains(&name.as_str())) {
+            out.extend(self.quantity(column, snapshot)?);
+        }
+        out.extend(self.on_law()?);
+        out.extend(self.on_friction()?);
+        Ok(out)
+    }
+
+    /// How many nodes sit on which part of the law, as a table.
+    pub fn branch_table(&self) -> String {
+        let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return String::new() };
+        let rows = law.branches().into_iter().enumerate().map(|(at, branch)| {
+            let count = on.iter().filter(|other| **other == at).count();
+            let where_ = extent(self.arc.iter().zip(&on).filter(|(_, other)| **other == at).map(|(s, _)| *s));
+            let place = where_.map_or("–".into(), |(a, b)| format!("{} to {}", number(a), number(b)));
+            let mut row = vec![branch.name, branch.range, branch.slope, count.to_string()];
+            if self.dimension == 2 {
+                row.push(place);
+            }
+            row
+        });
+        let quantity = law.quantity().0;
+        let words = format!(
+            "Nodes of {} on the branches of the contact law at t = {} s",
+            self.name,
+            number(self.time)
+        );
+        let mut header = vec!["branch", quantity, "slope", "nodes"];
+        if self.dimension == 2 {
+            header.push("arc length / m");
+        }
+        table(&words, &header, &rows.collect::<Vec<_>>())
+    }
+
+    fn quantity(&self, column: &str, snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
+        let values = self.table.column(column).unwrap_or_default();
+        let (quantity, unit) = (column.replace('_', " "), unit_of(column));
+        let name = format!("{}_{column}", self.name);
+        if self.dimension == 3 {
+            return self.map(&name, &quantity, unit, &values, snapshot);
+        }
+        let points: Vec<[f64; 2]> = self.arc.iter().zip(&values).map(|(s, v)| [*s, *v]).collect();
+        let place =
+            ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
+        let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
+        let series = Series::new(place, "", look, points);
+        let x = Axis { quantity: "arc length", unit: "m" };
+        let mut chart = Chart::new(x, Axis { quantity: &quantity, unit }, vec![series]);
+        chart.bands = self.bands();
+        let (low, high) = extent(values.into_iter()).unwrap_or((0.0, 0.0));
+        let figures = format!("from {} to {} {unit}", number(low), number(high));
+        let bands = if chart.bands.is_empty() { "" } else { " Backgrounds: branches of the contact law." };
+        Ok(Some(Picture::new(
+            &name,
+            format!("Chart of the {quantity} along {} at {} s, {figures}", self.name, number(self.time)),
+            format!(
+                "{} along {} at t = {} s, {figures}, over the arc length of the undeformed boundary{}.{bands}",
+                capital(&quantity),
+                self.name,
+                number(self.time),
+                self.start()
+            ),
+            chart.svg()?,
+        )))
+    }
+
+    fn start(&self) -> String {
+        let from = |p: &[f64; 3]| format!(" from ({}, {}) m", number(p[0]), number(p[1]));
+        self.points.first().map(from).unwrap_or_default()
+    }
+
+    /// The quantity on the boundary's own faces, seen along the axis that shows most of them.
+    fn map(
+        &self,
+        name: &str,
+        quantity: &str,
+        unit: &str,
+        values: &[f64],
+        snapshot: Option<&Snapshot>,
+    ) -> Result<Option<Picture>> {
+        let Some(snapshot) = snapshot else { return Ok(None) };
+        let bits = |p: &[f64; 3]| p.map(f64::to_bits);
+        let places: HashMap<[u64; 3], u32> = (0..).zip(&self.points).map(|(n, p)| (bits(p), n)).collect();
+        let here: Vec<Option<u32>> = snapshot.nodes.iter().map(|p| places.get(&bits(p)).copied()).collect();
+        let mut cells = Vec::new();
+        for face in super::view::faces(snapshot) {
+            if let [Some(a), Some(b), Some(c)] = face.nodes.map(|node| here[node as usize]) {
+                cells.extend([a, b, c]);
+            }
+        }
+        if cells.is_empty() {
+            return Ok(None);
+        }
+        let along = super::view::widest_along(&self.points, &cells);
+        let [first, second] = [[1, 2], [0, 2], [0, 1]][along];
+        let nodes = self.points.iter().map(|p| [p[first], p[second], 0.0]).collect();
+        let flat = Snapshot { time: self.time, nodes, cells, corners: 3, ..Snapshot::default() };
+        let look = Coloured { name, quantity, unit, shades: CIVIDIS };
+        let axes = ["x", "y", "z"];
+        let body = Body::new(&flat).with_axes([axes[first], axes[second]]);
+        let (low, high) = extent(values.iter().copied()).unwrap_or((0.0, 0.0));
+        let figures = format!("from {} to {} {unit}", number(low), number(high));
+        let mut picture = body.nodal(look, values)?;
+        picture.alt = format!("Map of the {quantity} on {} at {} s, {figures}", self.name, number(self.time));
+        picture.caption = format!(
+            "{} on {} at t = {} s, {figures}, on the undeformed boundary seen along {}.",
+            capital(quantity),
+            self.name,
+            number(self.time),
+            axes[along]
+        );
+        Ok(Some(picture))
+    }
+
+    /// The nodes in the plane of the law, and the branch of each.
+    fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<usize>)> {
+        let law = self.law?;
+        let column = |name: &str| self.table.column(name);
+        let (u, v, p) =
+            (column("normal_displacement")?, column("normal_velocity")?, column("contact_pressure")?);
+        if law.needs_normals() && self.behind.is_none() {
+            return None;
+        }
+        let normal = |n: usize| self.behind.as_ref().map_or([0.0; 3], |behind| behind.normals[n]);
+        let node = |n: usize| [law.abscissa(self.time, (&self.points[n], &normal(n)), u[n], v[n]), p[n]];
+        let nodes: Vec<[f64; 2]> = (0..self.points.len()).map(node).collect();
+        let on = law.branches_of(&nodes);
+        (!nodes.is_empty()).then_some((nodes, on))
+    }
+
+    fn on_law(&self) -> Result<Option<Picture>> {
+        let (Some(law), Some((nodes, on))) = (self.law, self.on_branches()) else { return Ok(None) };
+        let line = Series { colour: [0x55; 3], ..Series::new(0, "", Look::Line, law.line(&nodes)) };
+        let mut series = vec![line];
+        let mut counts = Vec::new();
+        for (at, branch) in law.branches().iter().enumerate() {
+            let mine = nodes.iter().zip(&on).filter(|(_, other)| **other == at);
+            let mine: Vec<[f64; 2]> = mine.map(|(node, _)| *node).collect();
+            if !mine.is_empty() {
+                let plural = if mine.len() == 1 { "node" } else { "nodes" };
+                let label = format!("{}: {} {plural}", branch.name, mine.len());
+                counts.push(label.clone());
+                let dots = Series::new(series.len(), label, Look::Dots, mine);
+                series.push(Series { colour: branch_colour(at), ..dots });
+            }
+        }
+        let (quantity, unit) = law.quantity();
+        let y = Axis { quantity: "contact pressure", unit: "Pa" };
+        let chart = Chart::new(Axis { quantity, unit }, y, series);
+        let counted = counts.join(", ");
+        Ok(Some(Picture::new(
+            &format!("{}_on_law", self.name),
+            format!(
+                "Nodes of {} on the graph of the contact law at {} s: {counted}",
+                self.name,
+                number(self.time)
+            ),
+            format!(
+                "The contact law (grey) and the nodes of {} at t = {} s: {counted}.",
+                self.name,
+                number(self.time)
+            ),
+            chart.svg()?,
+        )))
+    }
+
+    /// Which parts of the boundary are on which branch; borders lie half way between nodes.
+    fn bands(&self) -> Vec<Band> {
+        let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return Vec::new() };
+        let names = law.branches();
+        let mut bands: Vec<Band> = Vec::new();
+        let mut at = 0;
+        for same in on.chunk_by(|a, b| a == b) {
+            let middle = |n: usize| 0.5 * (self.arc[n - 1] + self.arc[n]);
+            let end = at + same.len();
+            let from = if at == 0 { self.arc[0] } else { middle(at) };
+            let to = if end == self.arc.len() { self.arc[end - 1] } else { middle(end) };
+            let name = names.get(same[0]).map(|branch| branch.name.clone()).unwrap_or_default();
+            bands.push(Band { span: [from, to], colour: BANDS[same[0] % BANDS.len()], label: name });
+            at = end;
+        }
+        if bands.len() > MOST_BANDS || bands.len() < 2 { Vec::new() } else { bands }
+    }
+
+    /// The nodes on the graph of friction.
+    fn on_friction(&self) -> Result<Option<Picture>> {
+        let (Some(law), Some(Behind { snapshot, nodes, normals })) = (&self.friction, &self.behind) else {
+            return Ok(None);
+        };
+        let Some(velocity) = snapshot.vectors(&VELOCITY) else { return Ok(None) };
+        let pressure = self.table.column("contact_pressure").unwrap_or_default();
+        let tractions: Vec<Vec<f64>> = ["x", "y", "z"]
+            .iter()
+            .filter_map(|axis| self.table.column(&format!("friction_traction_{axis}")))
+            .collect();
+        if tractions.is_empty() || pressure.len() != nodes.len() {
+            return Ok(None);
+        }
+        let sliding = |n: usize| {
+            let (v, normal) = (velocity[nodes[n]], normals[n]);
+            let beside = (&self.points[n], &normal);
+            let obstacle =
+                self.law.zip(self.step).map(|(law, step)| law.obstacle_velocity(self.time, step, beside));
+            let v = obstacle.map_or(v, |obstacle| std::array::from_fn(|i| v[i] - obstacle[i]));
+            let along: f64 = (0..3).map(|i| v[i] * normal[i]).sum();
+            (0..3).map(|i| (v[i] - along * normal[i]).powi(2)).sum::<f64>().sqrt()
+        };
+        let size = |n: usize| tractions.iter().map(|t| t[n] * t[n]).sum::<f64>().sqrt();
+        let rubbing: Vec<Rubbing> = (0..nodes.len())
+            .map(|n| Rubbing { speed: sliding(n), traction: size(n), pressure: pressure[n] })
+            .collect();
+        friction::picture(self.name, self.time, law, &rubbing)
+    }
+
+    /// The deformed mesh of a plane body with the boundary's normal velocity and contact pressure as arrows.
+    pub fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
+        let Some(Behind { nodes, normals, .. }) =
+            self.behind.as_ref().filter(|behind| behind.nodes.len() > 1)
+        else {
+            return Ok(Vec::new());
+        };
+        if self.dimension != 2 {
+            return Ok(Vec::new());
+        }
+        let feet: Vec<[f64; 2]> = nodes.iter().map(|node| body.place(*node)).collect();
+        let mut out = Vec::new();
+        for (column, words, colour, inward) in [
+            ("normal_velocity", "normal velocity", LINES[0], false),
+            ("contact_pressure", "contact pressure", LINES[1], true),
+        ] {
+            let values = self.table.column(column).unwrap_or_default();
+            let largest = values.iter().fold(0.0, |m, v| f64::max(m, v.abs()));
+            if largest == 0.0 || values.len() != feet.len() {
+                continue;
+            }
+            let longest = 0.2 * body.size();
+            let arrow = |n: usize| {
+                let length = longest * values[n] / largest;
+                let tip = [0, 1].map(|i| feet[n][i] + length.abs() * normals[n][i]);
+                if (length < 0.0) != inward { [tip, feet[n]] } else { [feet[n], tip] }
+            };
+            let arrows: Vec<[[f64; 2]; 2]> =
+                (0..feet.len()).step_by(feet.len().div_ceil(MOST_ARROWS)).map(arrow).collect();
+            let unit = unit_of(column);
+            let heading = format!("longest arrow {} {unit}, {}", number(largest), body.magnified());
+            let time = number(self.time);
+            out.push(Picture::new(
+                &format!("{}_{column}_arrows", self.name),
+                format!("Deformed mesh with the {words} on {} as arrows at {time} s", self.name),
+                format!(
+                    "Deformed mesh ({}) with the {words} on {} at t = {time} s; the longest arrow is {} {unit}.",
+                    body.magnified(),
+                    self.name,
+                    number(largest)
+                ),
+                body.arrows(&heading, colour, &arrows)?,
+            ));
+        }
+        Ok(out)
+    }
+}
+
+/// The colour of a branch's nodes, that of its background in strong.
+fn branch_colour(branch: usize) -> Colour {
+    [LINES[0], LINES[1], LINES[6]][branch % BANDS.len()]
+}
+
+fn is_quantity(column: &str) -> bool {
+    !["time", "profile", "x", "y", "z"].contains(&column)
+}
+
+/// The unit of a column, by its name.
+pub(super) fn unit_of(column: &str) -> &'static str {
+    let known =
+        [("displacement", "m"), ("velocity", "m/s"), ("pressure", "Pa"), ("traction", "Pa"), ("gap", "m")];
+    known.iter().find(|(word, _)| column.contains(word)).map_or("", |(_, unit)| unit)
+}
+
+/// With a capital letter in front.
+pub(super) fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}

@@ -1,0 +1,277 @@
+//! The numbers of a run in words: status, sizes, certificates, seconds.
+
+use super::{
+    artifacts::Found,
+    colour::{LINES, hex},
+    markup::{escape, facts, paragraph, table},
+    picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
+    scale::{number, size},
+};
+use crate::{
+    io::output::field_list::FIELDS,
+    solver::certificate::{Accepted, Certificates},
+};
+use serde_json::Value;
+use std::fmt::Write;
+
+/// Members of `summary.json` with their words and units, in the order of the page: those before the figures of fields.
+const MEMBERS: [(&str, &str, &str); 10] = [
+    ("status", "status", ""),
+    ("error", "error", ""),
+    ("time", "time reached", "s"),
+    ("steps", "steps", ""),
+    ("rejected_steps", "steps taken back", ""),
+    ("newton_iterations", "Newton iterations", ""),
+    ("linear_iterations", "linear iterations", ""),
+    ("final_von_mises", "largest von Mises stress at the end", "Pa"),
+    ("max_von_mises", "largest von Mises stress of the run", "Pa"),
+    ("max_strain", "largest strain of the run", ""),
+];
+
+/// Those behind the figures of fields.
+const MORE_MEMBERS: [(&str, &str, &str); 13] = [
+    ("max_inclusion_residual", "largest inclusion residual", ""),
+    ("max_energy_imbalance", "largest energy imbalance", ""),
+    ("max_slip_pressure", "largest contact pressure under slip weakening", "Pa"),
+    ("effects", "effects simulated", ""),
+    ("scheme", "time scheme", ""),
+    ("preconditioner", "preconditioner", ""),
+    ("dimension", "dimensions", ""),
+    ("cells", "cells", ""),
+    ("nodes", "nodes", ""),
+    ("unknowns", "unknowns", ""),
+    ("ranks", "ranks", ""),
+    ("version", "version of the solver", ""),
+    ("petsc_version", "version of PETSc", ""),
+];
+
+/// Status in one sentence, and the table of everything that `summary.json` says about the run.
+pub(super) fn summary(summary: &Value) -> String {
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
+    for &(member, words, unit) in MEMBERS.iter().chain(figures).chain(&MORE_MEMBERS) {
+        match summary.get(member) {
+            None | Some(Value::Null) => {}
+            Some(value) => rows.push((words.into(), with_unit(value, unit))),
+        }
+    }
+    if let Some(Value::String(file)) = summary.get("restarted_from") {
+        rows.push(("went on from".into(), file.clone()));
+    }
+    if let Some(bytes) = summary.get("peak_memory_bytes").and_then(Value::as_f64) {
+        rows.push(("peak memory of all ranks".into(), format!("{:.0} MB", bytes / 1e6)));
+    }
+    let partition = summary.get("partition");
+    if let Some(cut) = partition.and_then(|p| p.get("edge_cut")) {
+        rows.push(("facets between ranks".into(), plain(cut)));
+    }
+    if let Some(most) = partition.and_then(|p| p.get("imbalance")).and_then(Value::as_f64) {
+        rows.push(("cells of the fullest rank over the average".into(), number(most)));
+    }
+    facts("The run", &rows)
+}
+
+/// How the run ended, in a sentence.
+pub(super) fn ending(summary: &Value) -> String {
+    let status = summary.get("status").and_then(Value::as_str).unwrap_or("unknown");
+    let value = |name: &str| summary.get(name).map_or_else(|| "?".into(), plain);
+    let seconds =
+        summary.get("wall_seconds").and_then(|seconds| seconds.get("total")).and_then(Value::as_f64);
+    let took = seconds.map(|s| format!(" in {} s", size(s))).unwrap_or_default();
+    let ranks = if value("ranks") == "1" { "1 rank" } else { &format!("{} ranks", value("ranks")) };
+    let ended = match status {
+        "completed" => "Completed",
+        "stopped" => "Stopped on request",
+        "failed" => "Failed",
+        _ => "Ended",
+    };
+    format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
+}
+
+/// What the run warned of, if it did.
+pub(super) fn warnings(summary: &Value) -> String {
+    let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let items: String =
+        warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(&plain(warning)))).collect();
+    if items.is_empty() {
+        return items;
+    }
+    format!("<div class=\"missing\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</div>\n")
+}
+
+/// The certificates and what they mean for the run.
+pub(super) fn certificates(found: &Found) -> String {
+    let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
+        return paragraph("No certificates: they are in summary.json.");
+    };
+    let Ok(known) = serde_json::from_value::<Certificates>(object.clone()) else {
+        return paragraph("The certificates in summary.json cannot be read.");
+    };
+    let growth = |which: usize| known.growth_constants.map(|constants| constants[which]);
+    let rows = [
+        ("theta", known.theta, "", "uniqueness of the continuous problem, if below 1"),
+        ("theta of a step", known.theta_step, "", "uniqueness of each step, if below 1"),
+        ("viscosity modulus m_A", known.viscosity_modulus, "Pa s", "smallest eigenvalue of the viscosity"),
+        (
+            "monotonicity constant m_j",
+            known.monotonicity_constant,
+            "Pa s/m",
+            "steepest fall of the contact law",
+        ),
+        ("growth at rest c₀", growth(0), "Pa", "contact pressures are at most c₀ + c₁ |velocity|"),
+        ("growth constant c₁", growth(1), "Pa s/m", "slope of that bound"),
+        ("trace norm |γ|²", known.trace_norm_squared, "m", "of the normal trace on the contact boundary"),
+        (
+            "pressure bound of slip weakening",
+            known.slip_pressure_bound,
+            "Pa",
+            "uniqueness of each step, for given pressures up to this",
+        ),
+        ("largest stable step", known.explicit_step_bound, "s", "bound of the explicit parts of the scheme"),
+    ];
+    let rows = rows.into_iter().filter_map(|(name, value, unit, meaning)| {
+        let value = format!("{} {unit}", number(value?));
+        Some(vec![name.to_owned(), value.trim_end().to_owned(), meaning.to_owned()])
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    if rows.is_empty() {
+        return paragraph("This problem has no certificates: nothing in it is bounded by one.");
+    }
+    let mut out = table("Constants of the problem", &["certificate", "value", "what for"], &rows);
+    let steps = found.history.as_ref().and_then(|history| history.column("dt"));
+    let longest = steps.and_then(|steps| steps.into_iter().reduce(f64::max));
+    if let Some(step) = longest.or_else(|| found.job.as_ref().map(|job| job.time.step)) {
+        let verdict = known.verdict(step, None, Accepted { uniqueness: true, explicit_stability: true });
+        let _ = writeln!(out, "<h3>Verdict for steps of {} s</h3>\n<ul>", number(step));
+        for words in &verdict.words {
+            let _ = writeln!(out, "<li>{}</li>", escape(words));
+        }
+        out.push_str("</ul>\n");
+        if verdict.warnings.iter().any(|warning| warning.ends_with("accepted by the job")) {
+            out += &paragraph("The job accepted to run beyond a certificate.");
+        }
+    }
+    out
+}
+
+/// The seconds of each phase as bars.
+pub(super) fn phases(summary: &Value) -> Option<Picture> {
+    let seconds = summary.get("wall_seconds")?.as_object()?;
+    let total = seconds.get("total").and_then(Value::as_f64);
+    let named = seconds.iter().filter(|(name, _)| *name != "total");
+    let mut bars: Vec<(&str, f64)> =
+        named.filter_map(|(name, s)| Some((name.as_str(), s.as_f64()?))).collect();
+    let rest = total.unwrap_or(0.0) - bars.iter().map(|bar| bar.1).sum::<f64>();
+    if rest > 0.0 {
+        bars.push(("the rest", rest));
+    }
+    let longest = bars.iter().map(|bar| bar.1).fold(0.0, f64::max);
+    if longest <= 0.0 {
+        return None;
+    }
+    let row = 1.9 * LETTERS;
+    let left = 16.0 + bars.iter().map(|bar| text_width(bar.0)).fold(0.0, f64::max);
+    let room = WIDTH - left - 190.0;
+    let mut svg = open_svg(12.0 + row * bars.len() as f64);
+    for (at, (name, value)) in bars.iter().enumerate() {
+        let (y, length) = (8.0 + row * at as f64, (room * value / longest).max(1.0));
+        svg += &text(left - 8.0, y + 1.2 * LETTERS, "end", name);
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{left:.1}\" y=\"{y:.1}\" width=\"{length:.1}\" height=\"{:.1}\" fill=\"{}\"/>",
+            row - 6.0,
+            hex(LINES[0])
+        );
+        let words = format!("{} s{}", size(*value), rate(summary, name, *value));
+        svg += &text(left + length + 8.0, y + 1.2 * LETTERS, "start", &words);
+    }
+    svg += "</svg>";
+    let words: Vec<String> = bars.iter().map(|(name, value)| format!("{name} {} s", size(*value))).collect();
+    let total = total.map(|total| format!(" Together {} s.", size(total))).unwrap_or_default();
+    let caption = format!(
+        "Wall time of each phase, of the slowest rank, with the memory traffic that it needs at the least, where that is counted.{total}"
+    );
+    Some(Picture::new(
+        "wall_seconds",
+        format!("Bars of wall time by phase: {}", words.join(", ")),
+        caption,
+        svg,
+    ))
+}
+
+/// The traffic of a phase over its seconds, if it is known.
+fn rate(summary: &Value, phase: &str, seconds: f64) -> String {
+    let bytes = summary.get("traffic_bytes").and_then(|all| all.get(phase)).and_then(Value::as_f64);
+    match bytes {
+        Some(bytes) if bytes > 0.0 && seconds > 0.0 && phase != "output" => {
+            format!(", {} GB/s", size(bytes / seconds / 1e9))
+        }
+        _ => String::new(),
+    }
+}
+
+fn with_unit(value: &Value, unit: &str) -> String {
+    let words = plain(value);
+    if unit.is_empty() { words } else { format!("{words} {unit}") }
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(words) => words.clone(),
+        Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
+        Value::Number(n) if n.is_f64() => number(n.as_f64().unwrap_or(f64::NAN)),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn row(name: &str, value: &str) -> String {
+        format!("<th scope=\"row\">{name}</th><td>{value}</td>")
+    }
+
+    #[test]
+    fn facts_come_with_their_units() {
+        let page = summary(&json!({
+            "time": 0.5, "max_von_mises": 2500.0, "final_von_mises": 2400.0, "max_strain": 0.03, "cells": 72,
+            "peak_memory_bytes": 53_600_000, "partition": { "edge_cut": 4, "imbalance": 1.25 }
+        }));
+        for (name, value) in [
+            ("time reached", "0.5 s"),
+            ("largest von Mises stress of the run", "2500 Pa"),
+            ("largest von Mises stress at the end", "2400 Pa"),
+            ("largest strain of the run", "0.03"),
+            ("cells", "72"),
+            ("peak memory of all ranks", "54 MB"),
+            ("facets between ranks", "4"),
+            ("cells of the fullest rank over the average", "1.25"),
+        ] {
+            assert!(page.contains(&row(name, value)), "{name}: {value}\n{page}");
+        }
+    }
+
+    #[test]
+    fn traffic_is_a_rate_where_bytes_and_seconds_are_known() {
+        let summary =
+            json!({ "traffic_bytes": { "solve": 6e9, "output": 6e9, "history": null, "balance": 0 } });
+        assert_eq!(rate(&summary, "solve", 1.5), ", 4 GB/s");
+        for (phase, seconds) in
+            [("output", 1.5), ("history", 1.5), ("balance", 1.5), ("setup", 1.5), ("solve", 0.0)]
+        {
+            assert_eq!(rate(&summary, phase, seconds), "", "{phase}");
+        }
+    }
+
+    #[test]
+    fn warnings_stand_in_a_list_and_nothing_where_there_are_none() {
+        assert_eq!(warnings(&json!({ "warnings": [] })) + &warnings(&json!({})), "");
+        let list = warnings(&json!({ "warnings": ["strain < 1", "b"] }));
+        assert!(
+            list.contains("<h2>Warnings</h2>") && list.contains("<li>strain &lt; 1</li>\n<li>b</li>"),
+            "{list}"
+        );
+    }
+}

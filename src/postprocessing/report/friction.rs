@@ -1,0 +1,117 @@
+//! The nodes of a boundary on the graph of its friction law.
+
+use super::{
+    chart::{Axis, Chart, Look, Series},
+    colour::{Colour, LINES},
+    picture::Picture,
+    scale::{extent, number},
+};
+use crate::{error::Result, laws::contact::FrictionLaw};
+
+/// Points of a curved law that are joined by straight lines.
+const SAMPLES: usize = 120;
+/// A node that slides slower than this share of the fastest sticks.
+const STICKING: f64 = 1e-6;
+const GREY: Colour = [0x55; 3];
+
+/// What rubs at a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rubbing {
+    /// Sliding velocity in m/s, not negative.
+    pub speed: f64,
+    /// Friction traction in Pa, not negative.
+    pub traction: f64,
+    /// Contact pressure in Pa.
+    pub pressure: f64,
+}
+
+/// The law over the sliding velocity, and the nodes: their traction, or that over their pressure where the law follows it.
+pub(super) fn picture(
+    name: &str,
+    time: f64,
+    law: &FrictionLaw,
+    nodes: &[Rubbing],
+) -> Result<Option<Picture>> {
+    let touching: Vec<&Rubbing> =
+        nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
+    if touching.is_empty() {
+        return Ok(None);
+    }
+    let ordinate = |node: &Rubbing| node.traction / if law.follows_pressure() { node.pressure } else { 1.0 };
+    let fastest = extent(touching.iter().map(|node| node.speed)).map_or(0.0, |range| range.1);
+    let (sticking, slipping): (Vec<&Rubbing>, Vec<&Rubbing>) =
+        touching.iter().partition(|node| node.speed <= STICKING * fastest);
+    let along = if fastest > 0.0 { 1.1 * fastest } else { 1.0 };
+    let graph = (0..=SAMPLES).map(|n| along * n as f64 / SAMPLES as f64);
+    let line = std::iter::once([0.0, 0.0]).chain(graph.map(|v| [v, law.bound(v, 1.0)])).collect();
+    let mut series = vec![Series { colour: GREY, ..Series::new(0, "", Look::Line, line) }];
+    let mut counts = Vec::new();
+    for (place, words, group) in [(1, "stick", &sticking), (2, "slip", &slipping)] {
+        if group.is_empty() {
+            continue;
+        }
+        let count = if group.len() == 1 { "1 node".into() } else { format!("{} nodes", group.len()) };
+        let label = format!("{words}: {count}");
+        counts.push(label.clone());
+        let points = group.iter().map(|node| [node.speed, ordinate(node)]).collect();
+        series.push(Series { colour: LINES[place - 1], ..Series::new(place, label, Look::Dots, points) });
+    }
+    let apart = nodes.len() - touching.len();
+    if apart > 0 {
+        counts.push(format!("without pressure: {apart}"));
+    }
+    let (quantity, unit) =
+        if law.follows_pressure() { ("friction over pressure", "") } else { ("friction traction", "Pa") };
+    let chart = Chart {
+        from_zero: true,
+        ..Chart::new(Axis { quantity: "sliding velocity", unit: "m/s" }, Axis { quantity, unit }, series)
+    };
+    let counted = counts.join(", ");
+    let when = number(time);
+    Ok(Some(Picture::new(
+        &format!("{name}_on_friction"),
+        format!("Nodes of {name} on the graph of the friction law at {when} s: {counted}"),
+        format!("The friction law (grey) and the nodes of {name} at t = {when} s: {counted}."),
+        chart.svg()?,
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::contact::{Coulomb, Tresca};
+
+    fn node(speed: f64, traction: f64, pressure: f64) -> Rubbing {
+        Rubbing { speed, traction, pressure }
+    }
+
+    #[test]
+    fn nodes_stick_slip_or_bear_no_pressure() {
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
+        let nodes = [node(0.0, 1.0, 10.0), node(0.1, 3.0, 10.0), node(0.2, 6.0, 20.0), node(0.5, 0.0, 0.0)];
+        let drawn = picture("bottom", 0.5, &law, &nodes).expect("drawn").expect("a picture");
+        assert!(
+            drawn.caption.contains("stick: 1 node, slip: 2 nodes, without pressure: 1"),
+            "{}",
+            drawn.caption
+        );
+        assert!(drawn.svg.contains("friction over pressure") && drawn.name == "bottom_on_friction");
+    }
+
+    #[test]
+    fn nodes_that_all_rest_stick() {
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
+        let drawn = picture("bottom", 0.5, &law, &[node(0.0, 1.0, 10.0), node(0.0, 0.0, 3.0)]);
+        let caption = drawn.expect("drawn").expect("a picture").caption;
+        assert!(caption.contains("stick: 2 nodes") && !caption.contains("slip:"), "{caption}");
+    }
+
+    #[test]
+    fn given_bounds_are_drawn_in_their_own_unit_and_a_boundary_in_the_air_not_at_all() {
+        let given = FrictionLaw::Tresca(Tresca { bound: 2.0 });
+        let drawn = picture("left", 0.0, &given, &[node(0.1, 2.0, 0.0)]).expect("drawn").expect("a picture");
+        assert!(drawn.svg.contains("friction traction / Pa"));
+        let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
+        assert!(picture("left", 0.0, &law, &[node(0.1, 0.0, 0.0)]).expect("drawn").is_none());
+    }
+}

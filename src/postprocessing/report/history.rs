@@ -1,0 +1,169 @@
+//! Pictures of what happened over time: probes, energies, steps.
+
+use super::{
+    boundary::{capital, unit_of},
+    chart::{Axis, Chart, Look, Series},
+    picture::Picture,
+    scale::{extent, number},
+    table::Table,
+};
+use crate::{
+    error::Result,
+    fem::effect::{Energy, Role},
+};
+
+const TIME: Axis = Axis { quantity: "t", unit: "s" };
+/// Probes in one chart beyond which lines are not told apart.
+const MOST_PROBES: usize = 7;
+
+/// Each quantity of the probes over time, a line a probe.
+pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
+    let names = table.names();
+    let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
+    let mut out = Vec::new();
+    for column in table.header().iter().filter(|name| !["step", "time", "probe"].contains(&name.as_str())) {
+        let series = names.iter().zip(&tables).enumerate().map(|(place, (name, table))| {
+            Series::new(place, name.clone(), Look::Line, table.curve("time", column))
+        });
+        let (vector, axis) = column.rsplit_once('_').unwrap_or((column, ""));
+        let quantity = format!("{} {axis}", vector.replace('_', " "));
+        let unit = unit_of(column);
+        let ends = names.iter().zip(&tables).map(|(name, table)| {
+            let last = table.column(column).and_then(|values| values.last().copied()).unwrap_or(0.0);
+            format!("{name} {} {unit}", number(last))
+        });
+        let ends = ends.collect::<Vec<_>>().join(", ");
+        let left_out = if names.len() > MOST_PROBES {
+            format!(" The first {MOST_PROBES} of {} probes.", names.len())
+        } else {
+            String::new()
+        };
+        let chart = Chart::new(TIME, Axis { quantity: quantity.trim_end(), unit }, series.collect());
+        out.push(Picture::new(
+            &format!("probes_{column}"),
+            format!("Chart of {} of the probes over time; at the end {ends}", quantity.trim_end()),
+            format!("{} of the probes. At the end: {ends}.{left_out}", capital(quantity.trim_end())),
+            chart.svg()?,
+        ));
+    }
+    Ok(out)
+}
+
+/// Energies, dissipations with work, and what is missing in their balance. `unit` is that of energies.
+pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
+    let columns = |roles: &[Role]| -> Vec<&str> {
+        let all = Energy::COLUMNS.into_iter().zip(Energy::ROLES);
+        all.filter(|(_, role)| roles.contains(role)).map(|(column, _)| column).collect()
+    };
+    let spent = [columns(&[Role::Work]), columns(&[Role::Dissipated, Role::Numerical])].concat();
+    let mut out = Vec::new();
+    for (name, quantity, columns) in [
+        ("energies", "energy", columns(&[Role::Stored])),
+        ("dissipation", "work and dissipation since t = 0", spent),
+    ] {
+        out.extend(sums(table, name, quantity, unit, &columns)?);
+    }
+    out.extend(over_time(
+        table,
+        Curve {
+            column: "energy_imbalance",
+            quantity: "energy imbalance",
+            unit: "",
+            caption: "Energy imbalance of each step: what is missing in its balance over the energy turned over",
+            is_logarithmic: true,
+            tolerance: None,
+        },
+    )?);
+    Ok(out)
+}
+
+fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str]) -> Result<Option<Picture>> {
+    let mut series = Vec::new();
+    let (mut ends, mut zero) = (Vec::new(), Vec::new());
+    for column in columns {
+        let Some(values) = table.column(column) else { continue };
+        let words = column.replace('_', " ");
+        if values.iter().all(|value| *value == 0.0) {
+            zero.push(words);
+            continue;
+        }
+        ends.push(format!("{words} {} {unit}", number(values.last().copied().unwrap_or(0.0))));
+        series.push(Series::new(series.len(), words, Look::Line, table.curve("time", column)));
+    }
+    if series.is_empty() {
+        return Ok(None);
+    }
+    let ends = ends.join(", ");
+    let zero =
+        if zero.is_empty() { String::new() } else { format!(" Zero throughout: {}.", zero.join(", ")) };
+    let svg = Chart::new(TIME, Axis { quantity, unit }, series).svg()?;
+    let alt = format!("Chart of {quantity} over time; at the end {ends}");
+    Ok(Some(Picture::new(name, alt, format!("{}. At the end: {ends}.{zero}", capital(quantity)), svg)))
+}
+
+/// How the steps went: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
+pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
+    let mut out = Vec::new();
+    for (column, quantity, unit, caption) in [
+        ("newton_iterations", "Newton iterations", "", "Newton iterations of each step"),
+        ("linear_iterations", "linear iterations", "", "Iterations of the linear solver in each step"),
+        ("dt", "step", "s", "Length of the steps"),
+        ("active_changes", "nodes", "", "Contact points that changed their branch in each step"),
+    ] {
+        let curve = Curve { column, quantity, unit, caption, is_logarithmic: false, tolerance: None };
+        out.extend(over_time(table, curve)?);
+    }
+    out.extend(over_time(
+        table,
+        Curve {
+            column: "inclusion_residual",
+            quantity: "inclusion residual",
+            unit: "",
+            caption: "Inclusion residual of each step: scaled distance of velocity and pressure to the contact law",
+            is_logarithmic: true,
+            tolerance,
+        },
+    )?);
+    Ok(out)
+}
+
+/// A column of the history, and how it is drawn.
+struct Curve<'a> {
+    column: &'a str,
+    quantity: &'a str,
+    unit: &'a str,
+    caption: &'a str,
+    is_logarithmic: bool,
+    /// A level that is drawn as a line.
+    tolerance: Option<f64>,
+}
+
+/// A column over time; nothing where all its values are 0.
+fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
+    let Curve { column, quantity, unit, caption, is_logarithmic, tolerance } = curve;
+    let points = table.curve("time", column);
+    let Some((low, high)) = extent(points.iter().map(|p| p[1])) else { return Ok(None) };
+    if low == 0.0 && high == 0.0 {
+        return Ok(None);
+    }
+    let unseen = points.iter().filter(|p| is_logarithmic && p[1] <= 0.0).count();
+    let look = if points.len() <= 200 { Look::Dotted } else { Look::Line };
+    let series = Series::new(0, "", look, points);
+    let levels =
+        tolerance.map(|level| vec![(level, format!("tolerance {}", number(level)))]).unwrap_or_default();
+    let chart = Chart {
+        logarithmic: is_logarithmic,
+        from_zero: !is_logarithmic,
+        levels,
+        ..Chart::new(TIME, Axis { quantity, unit }, vec![series])
+    };
+    let space = if unit.is_empty() { "" } else { " " };
+    let most = format!("at least {}, at most {}{space}{unit}", number(low), number(high));
+    let unseen = if unseen > 0 {
+        format!(" {unseen} steps with exactly 0 have no place here.")
+    } else {
+        String::new()
+    };
+    let alt = format!("Chart over time. {caption}; {most}");
+    Ok(Some(Picture::new(column, alt, format!("{caption}; {most}.{unseen}"), chart.svg()?)))
+}

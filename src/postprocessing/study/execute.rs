@@ -1,0 +1,77 @@
+//! The runs of a study, one after the other, each as an ordinary run in its own folder.
+
+use super::{
+    plan::Planned,
+    record::{Record, digest},
+};
+use crate::{
+    error::{Exit, Result},
+    linear_algebra::petsc::clear_option,
+    parallel::{agreement::Agreed, session::Session},
+    run::{self, Clock, Start},
+};
+use std::time::{Duration, Instant};
+
+/// The outcome of a run.
+pub(super) enum Outcome {
+    /// It was run now, or found as an earlier study left it.
+    Ran {
+        /// Its record.
+        record: Box<Record>,
+        /// Whether it was found.
+        found: bool,
+    },
+    /// It was requested to stop.
+    Stopped,
+}
+
+/// Runs a planned run, unless its folder holds it already. A run that fails is an outcome, not an error. Collective.
+pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Result<Outcome> {
+    let folder = planned.loaded.job.output_folder();
+    let mut digests = Ok(String::new());
+    if session.is_first() {
+        digests = digest(planned, session.ranks());
+    }
+    let digest = session.agree(digests)?;
+    let found = if session.is_first() { Record::of_finished(folder, &digest, repetitions) } else { None };
+    if let Some(record) = Record::share(session, found)? {
+        return Ok(Outcome::Ran { record: Box::new(record), found: true });
+    }
+    let mut record = Record::new(digest);
+    for _ in 0..repetitions {
+        let finished = match run_once(session, planned) {
+            Ok(Exit::Stopped) => return Ok(Outcome::Stopped),
+            Ok(_) => {
+                let mine = if session.is_first() { record.add_summary(folder) } else { Ok(()) };
+                session.agree(mine)
+            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = finished {
+            record.error = Some(error.to_string());
+            break;
+        }
+    }
+    let mut written = Ok(());
+    if session.is_first() {
+        if record.error.is_none() {
+            written = record.complete(folder);
+        }
+        written = written.and_then(|()| record.write(folder));
+    }
+    session.agree(written)?;
+    match Record::share(session, Some(record))? {
+        Some(record) => Ok(Outcome::Ran { record: Box::new(record), found: false }),
+        None => Ok(Outcome::Stopped),
+    }
+}
+
+/// One run. Its PETSc options are cleared afterwards, so that they do not affect the next run. Collective.
+fn run_once(session: &Session, planned: &Planned) -> Result<Exit, Agreed> {
+    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let ended = run::run(session, planned.loaded.clone(), &Start::Over, clock);
+    for name in planned.loaded.job.solver.petsc.keys() {
+        session.agree(clear_option(name))?;
+    }
+    ended
+}

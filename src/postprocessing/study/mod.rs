@@ -1,0 +1,215 @@
+//! Accuracy against cost: a job on several meshes, with several steps and schemes, held against a reference.
+//!
+//! Every run is an ordinary run in a folder of its own; a study that is started again finds those that are finished.
+//! Each rank reads the fields of a run and of the reference whole and integrates over its share of the cells.
+
+mod ablate;
+mod check;
+mod compare;
+mod convergence;
+mod difference;
+mod document;
+mod exact;
+mod execute;
+mod measure;
+mod orders;
+mod overlap;
+mod part;
+mod plan;
+mod plot;
+mod record;
+mod results;
+mod split;
+mod squares;
+mod stored;
+mod table;
+mod targets;
+mod write;
+
+pub use part::Part;
+pub use plan::Plan;
+pub use results::Results;
+
+use crate::{
+    error::{Exit, Result},
+    job::describe_kind,
+    parallel::session::Session,
+    run::VERSION,
+};
+use compare::Compared;
+use document::Take;
+use execute::{Outcome, execute};
+use plan::{Planned, PlannedReference};
+use record::{Ran, seconds_of};
+use results::RunResult;
+use std::io::Write;
+
+/// The reference of the study's keys: of all tables, or of one table or key.
+pub fn describe(table: Option<&str>) -> Result<String> {
+    describe_kind(document::kind(), table)
+}
+
+/// The JSON Schema (draft 2020-12) of a study.
+pub fn describe_json() -> String {
+    format!("{:#}", document::kind().schema)
+}
+
+/// Runs the study and writes its tables; with `with_ablation` the base job is run without each of its effects as well.
+/// Collective.
+pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit> {
+    let say = |words: &str| {
+        if session.is_first() {
+            let _ = writeln!(std::io::stdout(), "{words}");
+        }
+    };
+    let repetitions = plan.study.timing.repetitions as usize;
+    let mut reference = None;
+    if let Some(PlannedReference::Run(planned)) = &plan.reference {
+        match announced(session, planned, 1, "reference", &say)? {
+            Some(ran) => reference = Some(ran),
+            None => return stopped(&say),
+        }
+    }
+    let mut ran = Vec::new();
+    for (index, planned) in plan.runs.iter().enumerate() {
+        let count = format!("{}/{}", index + 1, plan.runs.len());
+        match announced(session, planned, repetitions, &count, &say)? {
+            Some(one) => ran.push(one),
+            None => return stopped(&say),
+        }
+    }
+    let mut on_meshes = Vec::new();
+    for planned in &plan.split {
+        match announced(session, planned, 1, "split", &say)? {
+            Some(one) => on_meshes.push(one),
+            None => return stopped(&say),
+        }
+    }
+    let mut results = assembled(session, plan, reference.as_ref(), &ran, &on_meshes)?;
+    if with_ablation {
+        match ablate::ablate(session, plan, &say)? {
+            Some(ablation) => results.ablation = Some(ablation),
+            None => return stopped(&say),
+        }
+    }
+    let written = if session.is_first() { write::all(plan, &results) } else { Ok(()) };
+    session.agree(written)?;
+    let tables = table::all(&results).iter().map(|t| t.text()).collect::<Vec<_>>().join("\n");
+    say(&format!("\n{tables}\nfiles      {}", plan.folder.display()));
+    let failed = results.runs.iter().chain(&results.reference).filter(|run| run.error.is_some()).count();
+    if failed > 0 {
+        say(&format!("{failed} of {} runs failed or could not be compared; see above", plan.runs.len()));
+        return Ok(Exit::Failed);
+    }
+    Ok(Exit::Done)
+}
+
+/// Runs a share of the study's runs, each in its own folder, and writes no tables: the study, started on as many ranks when
+/// all shares are done, finds them finished. Collective.
+pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
+    let say = |words: &str| {
+        if session.is_first() {
+            let _ = writeln!(std::io::stdout(), "{words}");
+        }
+    };
+    let repetitions = plan.study.timing.repetitions as usize;
+    let reference = match &plan.reference {
+        Some(PlannedReference::Run(planned)) => Some(&**planned),
+        _ => None,
+    };
+    let once = reference.into_iter().chain(&plan.split).map(|planned| (planned, 1));
+    let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
+    let mut failed = 0;
+    for (index, (planned, repetitions)) in all.iter().enumerate().filter(|(index, _)| part.has(*index)) {
+        let count = format!("{}/{}", index + 1, all.len());
+        match announced(session, planned, *repetitions, &count, &say)? {
+            Some(ran) => failed += usize::from(ran.record.error.is_some()),
+            None => return stopped(&say),
+        }
+    }
+    Ok(if failed > 0 { Exit::Failed } else { Exit::Done })
+}
+
+fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
+    say("stopped on request; the same command goes on with the runs that are not finished");
+    Ok(Exit::Stopped)
+}
+
+fn announced(
+    session: &Session,
+    planned: &Planned,
+    repetitions: usize,
+    count: &str,
+    say: &dyn Fn(&str),
+) -> Result<Option<Ran>> {
+    let Outcome::Ran { record, found } = execute(session, planned, repetitions)? else { return Ok(None) };
+    let words = match &record.error {
+        Some(error) => format!("failed: {error}"),
+        None if found => "found finished".into(),
+        None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
+    };
+    say(&format!("run {count:<9} {:<40} {words}", planned.name));
+    Ok(Some(Ran { record: *record, found }))
+}
+
+fn assembled(
+    session: &Session,
+    plan: &Plan,
+    reference: Option<&Ran>,
+    ran: &[Ran],
+    on_meshes: &[Ran],
+) -> Result<Results> {
+    let study = &plan.study;
+    let take = study.timing.take;
+    let mut results = Results {
+        version: VERSION,
+        ranks: session.ranks(),
+        title: study.about.title.clone().unwrap_or_else(|| plan.name.clone()),
+        source: study.about.reference.clone(),
+        notes: study.about.notes.clone(),
+        reference: None,
+        norms: table::norms(study),
+        runs: plan.runs.iter().zip(ran).map(|(planned, ran)| result(planned, ran, take)).collect(),
+        tolerances: Vec::new(),
+        targets: Vec::new(),
+        ablation: None,
+    };
+    if let (Some(PlannedReference::Run(planned)), Some(ran)) = (&plan.reference, reference) {
+        results.reference = Some(result(planned, ran, take));
+    }
+    for (at, ran) in ran.iter().enumerate().filter(|(_, ran)| ran.record.is_complete()) {
+        let run = &mut results.runs[at];
+        let added = Compared::with_reference(plan, &plan.runs[at], &ran.record, reference)
+            .and_then(|compared| compared.map_or(Ok(()), |c| compare::add_errors(session, plan, &c, run)));
+        run.error = added.err().map(|error| error.to_string());
+        run.errors.resize(results.norms.len(), None);
+    }
+    split::add_parts(session, plan, ran, on_meshes, &mut results)?;
+    convergence::add_orders(plan, ran, &mut results);
+    convergence::add_published(plan, ran, &mut results);
+    compare::add_tolerances(session, plan, ran, &mut results)?;
+    results.targets = targets::targets(study, &results);
+    Ok(results)
+}
+
+fn result(planned: &Planned, ran: &Ran, take: Take) -> RunResult {
+    let record = &ran.record;
+    RunResult {
+        name: planned.name.clone(),
+        scheme: planned.scheme.name().to_owned(),
+        cells: planned.cells.clone(),
+        step: planned.step,
+        adaptive: planned.adaptive,
+        tolerance: planned.tolerance,
+        set: planned.set.clone(),
+        status: record.status.clone(),
+        error: record.error.clone(),
+        notes: Vec::new(),
+        found: ran.found,
+        counts: record.counts,
+        seconds: seconds_of(record, take).filter(|_| record.is_complete()),
+        repetitions: record.seconds.clone(),
+        errors: Vec::new(),
+        places: Vec::new(),
+    }
+}

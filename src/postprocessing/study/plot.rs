@@ -1,0 +1,275 @@
+//! Pictures of a study: error against wall time and against unknowns times steps, errors over time, errors on the body.
+//!
+//! A mark is a run. A line joins the runs of a scheme that no cheaper one of the scheme beats.
+
+use super::{
+    document::{Quantity, Space},
+    measure::Place,
+    plan::Plan,
+    results::{NormResult, Results, RunResult},
+};
+use crate::{
+    error::Result,
+    io::output::field_snapshot::Snapshot,
+    postprocessing::drawing::{
+        body::{Body, Coloured},
+        chart::{Axis, Chart, Look, Series},
+        colour::{LINES, VIRIDIS},
+        picture::Picture,
+        scale::{number, size},
+    },
+};
+
+/// Cost and error of a run.
+type Point = [f64; 2];
+
+/// The runs of a scheme.
+#[derive(Debug, Clone, PartialEq)]
+struct Curve {
+    name: String,
+    points: Vec<Point>,
+}
+
+/// All pictures of the results.
+pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
+    let mut pictures = Vec::new();
+    for (at, norm) in results.norms.iter().enumerate() {
+        pictures.extend(costs(results, at, norm)?);
+        pictures.extend(tolerances(results, at, norm)?);
+        let of = plan.study.norm.get(at).map(|norm| (norm.of, norm.space));
+        pictures.extend(over_time(plan, results, at, norm, of)?);
+        pictures.extend(on_the_body(plan, results, at, norm, of)?);
+    }
+    Ok(pictures)
+}
+
+/// Errors against what they cost, of a norm of which two runs are known.
+fn costs(results: &Results, norm: usize, shown: &NormResult) -> Result<Vec<Picture>> {
+    let seconds = |run: &RunResult| run.seconds.map(|seconds| seconds.computing);
+    let work = |run: &RunResult| Some(run.counts.work() as f64);
+    let by_time = curves(results, norm, seconds);
+    if by_time.iter().map(|curve| curve.points.len()).sum::<usize>() < 2 {
+        return Ok(Vec::new());
+    }
+    let time = Axis { quantity: "computing time", unit: "s" };
+    let unknowns = Axis { quantity: "unknowns × steps", unit: "" };
+    Ok(vec![
+        cost(shown, &by_time, time, "time")?,
+        cost(shown, &curves(results, norm, work), unknowns, "work")?,
+    ])
+}
+
+fn cost(norm: &NormResult, curves: &[Curve], axis: Axis, ending: &str) -> Result<Picture> {
+    let mut series = Vec::new();
+    for (place, curve) in curves.iter().enumerate() {
+        let front = front(&curve.points);
+        let beaten = curve.points.iter().filter(|point| !front.contains(point)).copied().collect();
+        series.push(Series::new(place, curve.name.clone(), Look::Dotted, front));
+        series.push(Series { place, ..Series::new(place, "", Look::Dots, beaten) });
+    }
+    let chart = Chart {
+        logarithmic: true,
+        logarithmic_x: true,
+        ..Chart::new(axis, Axis { quantity: "error", unit: "" }, series)
+    };
+    let best = curves.iter().map(|curve| {
+        let error = curve.points.iter().map(|point| point[1]).fold(f64::INFINITY, f64::min);
+        format!("{} down to {}", curve.name, size(error))
+    });
+    let best = best.collect::<Vec<_>>().join(", ");
+    Ok(Picture::new(
+        &format!("work-precision-{}-{ending}", norm.name),
+        format!("Chart of errors over {}, a line a scheme: {best}", axis.quantity),
+        format!("{} over {}: {best}.", norm.meaning, axis.quantity),
+        chart.svg()?,
+    ))
+}
+
+fn curves(results: &Results, norm: usize, cost: impl Fn(&RunResult) -> Option<f64>) -> Vec<Curve> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for run in &results.runs {
+        let Some((cost, error)) = cost(run).zip(error(run, norm)).filter(|(x, y)| *x > 0.0 && *y > 0.0)
+        else {
+            continue;
+        };
+        let name = run.line();
+        match curves.iter_mut().find(|curve| curve.name == name) {
+            Some(curve) => curve.points.push([cost, error]),
+            None => curves.push(Curve { name, points: vec![[cost, error]] }),
+        }
+    }
+    curves
+}
+
+fn error(run: &RunResult, norm: usize) -> Option<f64> {
+    run.errors.get(norm)?.as_ref().map(|error| error.error)
+}
+
+/// The points that no cheaper one beats, by cost.
+fn front(points: &[Point]) -> Vec<Point> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let mut best = f64::INFINITY;
+    sorted.retain(|[_, error]| {
+        let better = *error < best;
+        best = best.min(*error);
+        better
+    });
+    sorted
+}
+
+fn unit(of: Option<(Quantity, Space)>) -> &'static str {
+    match of {
+        None | Some((Quantity::Displacement, Space::V)) => "",
+        Some((Quantity::Velocity, Space::V)) => "1/s",
+        Some((of, _)) => of.field().units[0],
+    }
+}
+
+/// What the solver's tolerance changes, over the error that is left at the tightest one.
+fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Option<Picture>> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for row in &results.tolerances {
+        let Some(run) = results.runs.iter().find(|run| run.name == row.run) else { continue };
+        let share = row.changes.get(norm).and_then(|change| change.as_ref()?.share_of_error);
+        let cells: Vec<String> = run.cells.iter().map(u32::to_string).collect();
+        let steps = run.adaptive.map_or(format!("k = {} s", size(run.step)), |_| "adaptive".into());
+        let name = format!("{}, {}, {steps}", run.scheme, cells.join(" × "));
+        let point = [row.tolerance, share.unwrap_or(0.0)];
+        match curves.iter_mut().find(|curve| curve.name == name) {
+            Some(curve) => curve.points.push(point),
+            None => curves.push(Curve { name, points: vec![point] }),
+        }
+    }
+    if curves.is_empty() {
+        return Ok(None);
+    }
+    let lines = curves.iter().take(LINES.len()).enumerate();
+    let series =
+        lines.map(|(place, c)| Series::new(place, c.name.clone(), Look::Dotted, c.points.clone())).collect();
+    let tolerance = Axis { quantity: "tolerance of the solver", unit: "" };
+    let chart = Chart {
+        logarithmic: true,
+        logarithmic_x: true,
+        levels: vec![(1.0, "as large as the error of mesh and steps".into())],
+        ..Chart::new(tolerance, Axis { quantity: "change over the error", unit: "" }, series)
+    };
+    let most = curves.iter().map(|curve| {
+        let harmless = curve.points.iter().filter(|point| point[1] <= 0.1).map(|point| point[0]);
+        format!("{} up to {}", curve.name, size(harmless.fold(0.0, f64::max)))
+    });
+    let most = most.collect::<Vec<_>>().join("; ");
+    Ok(Some(Picture::new(
+        &format!("solver-tolerance-{}", shown.name),
+        format!("Chart of changes by the solver's tolerance; below a tenth of the error: {most}"),
+        format!(
+            "What the solver's tolerance changes, {}. Below a tenth of the error: {most}.",
+            shown.meaning
+        ),
+        chart.svg()?,
+    )))
+}
+
+/// Errors over time of the runs that the study names, or of the most accurate one of each scheme.
+fn over_time(
+    plan: &Plan,
+    results: &Results,
+    norm: usize,
+    shown: &NormResult,
+    of: Option<(Quantity, Space)>,
+) -> Result<Option<Picture>> {
+    let named = &plan.study.pictures.over_time;
+    let mut chosen: Vec<&RunResult> = Vec::new();
+    let known = results.runs.iter().filter(|run| run.places.get(norm).is_some_and(|p| p.over_time.len() > 1));
+    for run in known {
+        let rival = chosen.iter().position(|other| other.line() == run.line());
+        match rival.filter(|_| named.is_empty()) {
+            _ if !named.is_empty() && !named.contains(&run.name) => {}
+            Some(at) if error(run, norm) < error(chosen[at], norm) => chosen[at] = run,
+            Some(_) => {}
+            None => chosen.push(run),
+        }
+    }
+    if chosen.is_empty() {
+        return Ok(None);
+    }
+    let series = chosen.iter().take(LINES.len()).enumerate().map(|(place, run)| {
+        Series::new(place, run.name.clone(), Look::Line, run.places[norm].over_time.clone())
+    });
+    let time = Axis { quantity: "t", unit: "s" };
+    let shown_error = Axis { quantity: "error", unit: unit(of) };
+    let chart =
+        Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
+    let worst = chosen.iter().map(|run| {
+        format!("{} ({} steps) largest at t = {} s", run.name, run.counts.steps, size(run.places[norm].worst))
+    });
+    let worst = worst.collect::<Vec<_>>().join("; ");
+    Ok(Some(Picture::new(
+        &format!("error-over-time-{}", shown.name),
+        format!("Chart of errors over time: {worst}"),
+        format!("Where the error sits in time, {}: {worst}.", shown.meaning),
+        chart.svg()?,
+    )))
+}
+
+/// Errors of cells on the body, of the runs that the study names.
+fn on_the_body(
+    plan: &Plan,
+    results: &Results,
+    norm: usize,
+    shown: &NormResult,
+    of: Option<(Quantity, Space)>,
+) -> Result<Vec<Picture>> {
+    let mut pictures = Vec::new();
+    for (run, planned) in results.runs.iter().zip(&plan.runs) {
+        let Some(Place { worst, cells, .. }) = run.places.get(norm).filter(|place| !place.cells.is_empty())
+        else {
+            continue;
+        };
+        let file = planned.loaded.job.output_folder().join("fields.vtkhdf");
+        let snapshot = Snapshot { time: *worst, ..Snapshot::read(&file)?.without_fields() };
+        let look = Coloured {
+            name: &format!("error-in-space-{}-{}", shown.name, run.name),
+            quantity: "error",
+            unit: unit(of),
+            shades: VIRIDIS,
+        };
+        let mut picture = Body::new(&snapshot).errors(look, cells)?;
+        picture.caption = format!(
+            "Where the error of {} sits in space at t = {} s, root of the mean square in each cell, {}. {}",
+            run.name,
+            number(*worst),
+            shown.meaning,
+            picture.caption
+        );
+        pictures.push(picture);
+    }
+    Ok(pictures)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_joins_runs_that_no_cheaper_one_beats() {
+        let points = [[4.0, 0.1], [1.0, 0.5], [2.0, 0.6], [3.0, 0.2], [3.0, 0.3]];
+        assert_eq!(front(&points), [[1.0, 0.5], [3.0, 0.2], [4.0, 0.1]]);
+    }
+
+    #[test]
+    fn a_picture_names_schemes_and_axes() {
+        let curves = [
+            Curve { name: "lagged_euler".into(), points: vec![[0.02, 0.3], [0.7, 0.04]] },
+            Curve { name: "bdf2".into(), points: vec![[0.03, 0.1]] },
+        ];
+        let norm = NormResult { name: "v_max".into(), meaning: "max ||v||_H".into(), is_published: false };
+        let picture =
+            cost(&norm, &curves, Axis { quantity: "computing time", unit: "s" }, "time").expect("picture");
+        for words in ["<svg", "lagged_euler", "bdf2", "computing time / s", "10⁻²"] {
+            assert!(picture.svg.contains(words), "{words}");
+        }
+        assert!(picture.caption.contains("max ||v||_H") && picture.caption.contains("bdf2 down to 0.1"));
+        assert_eq!(picture.name, "work-precision-v_max-time");
+    }
+}

@@ -1,0 +1,209 @@
+//! `run.json`: the record of a finished run, with digests of its files.
+
+use super::{document::Take, plan::Planned};
+use crate::{
+    error::{Error, Result},
+    parallel::session::Session,
+    run::VERSION,
+};
+use mpi::{topology::Communicator, traits::Root};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, io::Read, path::Path};
+use xxhash_rust::xxh3::Xxh3;
+
+/// Name of the file in the run's folder.
+const FILE: &str = "run.json";
+
+/// A run, finished or failed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Record {
+    /// Digest of job, mesh file, solver and number of ranks.
+    pub digest: String,
+    /// `completed` or `failed`.
+    pub status: String,
+    /// What went wrong.
+    pub error: Option<String>,
+    /// 2 or 3; 0 where the run did not come so far.
+    pub dimension: usize,
+    /// Cells of the mesh.
+    pub cells: u64,
+    /// What it took.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Effects that were simulated.
+    pub effects: Vec<String>,
+    /// Wall seconds of each repetition.
+    pub seconds: Vec<Seconds>,
+    /// Digests of the files that errors are computed from.
+    pub files: BTreeMap<String, String>,
+}
+
+/// What a run took, as its `summary.json` counts it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Counts {
+    /// Velocity components that are solved for.
+    pub unknowns: u64,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps taken back.
+    pub rejected_steps: u64,
+    /// Preconditioners made.
+    pub set_ups: u64,
+    /// Newton iterations.
+    pub newton_iterations: u64,
+    /// Linear iterations.
+    pub linear_iterations: u64,
+}
+
+impl Counts {
+    /// Unknowns times steps.
+    pub fn work(&self) -> u64 {
+        self.unknowns * self.steps
+    }
+}
+
+/// Wall seconds of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Seconds {
+    /// From its begin to its end.
+    pub total: f64,
+    /// Without writing files.
+    pub computing: f64,
+    /// In solving the equations of the steps.
+    pub solve: f64,
+}
+
+/// What came of a run.
+pub struct Ran {
+    /// What it left.
+    pub record: Record,
+    /// Whether an earlier study left it.
+    pub found: bool,
+}
+
+/// The repetition that counts.
+pub fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
+    let mut all = record.seconds.clone();
+    all.sort_by(|a, b| a.computing.total_cmp(&b.computing));
+    match take {
+        Take::Best => all.first().copied(),
+        Take::Median => all.get(all.len() / 2).copied(),
+    }
+}
+
+impl Record {
+    /// A run that has not been tried yet.
+    pub(super) fn new(digest: String) -> Self {
+        Self {
+            digest,
+            status: "failed".into(),
+            error: None,
+            dimension: 0,
+            cells: 0,
+            counts: Counts::default(),
+            effects: Vec::new(),
+            seconds: Vec::new(),
+            files: BTreeMap::new(),
+        }
+    }
+
+    /// Whether the run reached its end.
+    pub(super) fn is_complete(&self) -> bool {
+        self.status == "completed"
+    }
+
+    /// Adds what a repetition left in `summary.json`.
+    pub(super) fn add_summary(&mut self, folder: &Path) -> Result<()> {
+        let path = folder.join("summary.json");
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
+        let summary: serde_json::Value =
+            serde_json::from_str(&text).map_err(|error| Error::unreadable(&path, error))?;
+        let count = |key: &str| summary[key].as_u64().unwrap_or(0);
+        let seconds = |key: &str| summary["wall_seconds"][key].as_f64().unwrap_or(0.0);
+        self.dimension = count("dimension") as usize;
+        self.cells = count("cells");
+        self.counts = Counts::deserialize(&summary).map_err(|error| Error::unreadable(&path, error))?;
+        let names = summary["effects"].as_array().into_iter().flatten();
+        self.effects = names.filter_map(|name| name.as_str().map(str::to_owned)).collect();
+        let total = seconds("total");
+        self.seconds.push(Seconds { total, computing: total - seconds("output"), solve: seconds("solve") });
+        Ok(())
+    }
+
+    /// Marks the run as finished and keeps the digests of its files.
+    pub(super) fn complete(&mut self, folder: &Path) -> Result<()> {
+        for name in ["fields.vtkhdf", "probes.csv"] {
+            if folder.join(name).exists() {
+                self.files.insert(name.into(), file_digest(&folder.join(name))?);
+            }
+        }
+        self.status = "completed".into();
+        Ok(())
+    }
+
+    /// Writes the record to the run's folder, at once.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+        let (path, part) = (folder.join(FILE), folder.join("run.json.part"));
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::Internal(format!("a run's record can't be written: {error}")))?;
+        std::fs::write(&part, text + "\n").map_err(|error| Error::unwritable(&part, error))?;
+        std::fs::rename(&part, &path).map_err(|error| Error::unwritable(&path, error))
+    }
+
+    /// The record of a complete run with this digest and this many repetitions, if its files are still as it left them.
+    pub(super) fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
+        let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
+        let record: Self = serde_json::from_str(&text).ok()?;
+        let sound =
+            |(name, digest): (&String, &String)| file_digest(&folder.join(name)).is_ok_and(|d| d == *digest);
+        let good = record.is_complete()
+            && record.digest == digest
+            && record.seconds.len() >= repetitions
+            && record.files.contains_key("fields.vtkhdf")
+            && record.files.iter().all(sound);
+        good.then_some(record)
+    }
+
+    /// Gives the record of rank 0 to all ranks. Collective.
+    pub(super) fn share(session: &Session, mine: Option<Self>) -> Result<Option<Self>> {
+        let text = mine.and_then(|record| serde_json::to_string(&record).ok()).unwrap_or_default();
+        let mut length = text.len() as u64;
+        let first = session.world().process_at_rank(0);
+        first.broadcast_into(&mut length);
+        let mut bytes = text.into_bytes();
+        bytes.resize(length as usize, 0);
+        first.broadcast_into(&mut bytes[..]);
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        let read = serde_json::from_slice(&bytes);
+        read.map(Some).map_err(|error| Error::Internal(format!("a run's record can't be shared: {error}")))
+    }
+}
+
+/// Digest of all that makes a run what it is.
+pub(super) fn digest(planned: &Planned, ranks: usize) -> Result<String> {
+    let mut hash = Xxh3::new();
+    hash.update(planned.loaded.job.to_toml()?.as_bytes());
+    hash.update(VERSION.as_bytes());
+    hash.update(&(ranks as u64).to_le_bytes());
+    if let Some(file) = planned.loaded.job.mesh_file() {
+        hash.update(file_digest(file)?.as_bytes());
+    }
+    Ok(format!("{:016x}", hash.digest()))
+}
+
+fn file_digest(path: &Path) -> Result<String> {
+    let unreadable = |error| Error::unreadable(path, error);
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut hash = Xxh3::new();
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut buffer).map_err(unreadable)? {
+            0 => return Ok(format!("{:016x}", hash.digest())),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}

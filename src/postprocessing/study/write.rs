@@ -1,0 +1,135 @@
+//! The files of a study: `study.json`, `study.csv`, `study.md`, `errors.csv` and the pictures.
+
+use super::{orders::Refined, plan::Plan, plot, results::Results, table};
+use crate::{
+    error::{Error, Result},
+    postprocessing::drawing::picture::Picture,
+};
+use std::path::Path;
+
+const HEADER: &str = "run,scheme,cells,step,adaptive,tolerance,status,norm,error,relative_error,error_of_steps,\
+    error_of_mesh,order_mesh,order_step,order_both,expected_order,published,ratio,published_order,unknowns,steps,\
+    rejected_steps,set_ups,unknowns_times_steps,seconds_total,seconds_computing,seconds_solve,digits_per_second";
+/// Columns of a norm.
+const MEASURED: usize = 12;
+
+/// Writes all files. On one rank.
+pub(super) fn all(plan: &Plan, results: &Results) -> Result<()> {
+    let folder = &plan.folder;
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+    let json = serde_json::to_string_pretty(results)
+        .map_err(|error| Error::Internal(format!("the study's results can't be written: {error}")))?;
+    write(&folder.join("study.json"), (json + "\n").as_bytes())?;
+    write(&folder.join("study.csv"), csv(results).as_bytes())?;
+    write(&folder.join("errors.csv"), over_time(results).as_bytes())?;
+    let pictures = plot::all(plan, results)?;
+    for picture in &pictures {
+        write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
+        write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
+    }
+    write(&folder.join("study.md"), markdown(results, &pictures).as_bytes())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|error| Error::unwritable(path, error))
+}
+
+/// A row for each run, norm and time.
+fn over_time(results: &Results) -> String {
+    let mut out = String::from("run,norm,time,error\n");
+    for run in &results.runs {
+        for (norm, place) in results.norms.iter().zip(&run.places) {
+            for [time, error] in &place.over_time {
+                out.push_str(&format!("{},{},{time:e},{error:e}\n", run.name, norm.name));
+            }
+        }
+    }
+    out
+}
+
+/// A row for each run and norm; a run without errors has one row.
+fn csv(results: &Results) -> String {
+    let mut out = format!("{HEADER}\n");
+    for run in &results.runs {
+        let cells: Vec<String> = run.cells.iter().map(u32::to_string).collect();
+        let named = [
+            run.name.clone(),
+            run.scheme.clone(),
+            cells.join("x"),
+            run.step.to_string(),
+            number(run.adaptive),
+            format!("{:e}", run.tolerance),
+            run.status.clone(),
+        ];
+        let seconds = |pick: fn(&super::record::Seconds) -> f64| number(run.seconds.as_ref().map(pick));
+        let cost = [
+            run.counts.unknowns.to_string(),
+            run.counts.steps.to_string(),
+            run.counts.rejected_steps.to_string(),
+            run.counts.set_ups.to_string(),
+            run.counts.work().to_string(),
+            seconds(|s| s.total),
+            seconds(|s| s.computing),
+            seconds(|s| s.solve),
+        ];
+        let mut rows = 0;
+        for (norm, error) in results.norms.iter().zip(&run.errors) {
+            let Some(error) = error else { continue };
+            let order = |what: Refined| error.orders.iter().find(|order| order.refined == what);
+            let shown = |what: Refined| number(order(what).map(|order| order.observed));
+            let measured = [
+                norm.name.clone(),
+                number(Some(error.error)),
+                number(error.relative),
+                number(error.of_steps),
+                number(error.of_mesh),
+                shown(Refined::Mesh),
+                shown(Refined::Step),
+                shown(Refined::Both),
+                number(error.orders.first().and_then(|order| order.expected)),
+                number(error.published),
+                number(error.ratio),
+                number(error.published_order),
+            ];
+            let row = [&named[..], &measured, &cost, &[number(error.digits_per_second)]].concat();
+            out.push_str(&format!("{}\n", row.join(",")));
+            rows += 1;
+        }
+        if rows == 0 {
+            let empty: Vec<String> = vec![String::new(); MEASURED];
+            let row = [&named[..], &empty, &cost, &[String::new()]].concat();
+            out.push_str(&format!("{}\n", row.join(",")));
+        }
+    }
+    out
+}
+
+/// The shortest text that reads back as the number; nothing where there is none.
+fn number(value: Option<f64>) -> String {
+    value.filter(|value| value.is_finite()).map(|value| format!("{value:e}")).unwrap_or_default()
+}
+
+fn markdown(results: &Results, pictures: &[Picture]) -> String {
+    let mut out = format!("# {}\n\n", results.title);
+    if let Some(source) = &results.source {
+        out.push_str(&format!("Published numbers: {source}.\n\n"));
+    }
+    results.notes.iter().for_each(|note| out.push_str(&format!("{note}\n\n")));
+    if let Some(reference) = &results.reference {
+        let cells: Vec<String> = reference.cells.iter().map(u32::to_string).collect();
+        let steps = reference.adaptive.map_or(format!("steps of {} s", reference.step), |tolerance| {
+            format!("{} adaptive steps, tolerance {tolerance}", reference.counts.steps)
+        });
+        out.push_str(&format!(
+            "Reference: {} with {} cells and {steps}.\n\n",
+            reference.scheme,
+            cells.join(" x ")
+        ));
+    }
+    table::all(results).iter().for_each(|table| out.push_str(&table.markdown()));
+    for Picture { name, caption, .. } in pictures {
+        out.push_str(&format!("![{caption}]({name}.svg)\n\n"));
+    }
+    out.push_str(&format!("Solver {}, {} rank(s).\n", results.version, results.ranks));
+    out
+}

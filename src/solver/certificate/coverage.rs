@@ -1,0 +1,47 @@
+//! Cases that the certificates do not cover.
+
+use super::Certificates;
+use crate::fem::{body::Body, effect::Contact};
+
+/// Sentences on effects that depend on the unknown contact pressures, and on effects that may soften the body at the end of a step.
+pub(super) fn not_covered<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    theta_step: Option<f64>,
+    slip_pressure_bound: Option<f64>,
+) -> Vec<String> {
+    let contacts = &body.contacts;
+    let mut words = Vec::new();
+    if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
+        words.push(
+            "friction bounds follow the contact pressure: theta holds for given pressures; that they change with the \
+             solution is not covered, and beyond some coefficient there may be several solutions"
+                .into(),
+        );
+    }
+    for fall in contacts.iter().filter_map(Contact::unknown_fall) {
+        let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
+            // Where nothing else falls, theta is proportional to the pressure.
+            let each = match theta_step {
+                Some(0.0) => {
+                    let each = (1.0 - Certificates::MARGIN) / bound;
+                    format!("theta of a step is {each:.4e} for each Pa, so that ")
+                }
+                _ => String::new(),
+            };
+            format!(
+                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against"
+            )
+        });
+        words.push(format!(
+            "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
+             bound: theta does not cover it{covered}"
+        ));
+    }
+    if theta_step.is_some() {
+        let words_of = |name| {
+            format!("{name} at the end of a step may soften the body: theta of a step does not cover it")
+        };
+        words.extend(body.softening().map(words_of));
+    }
+    words
+}

@@ -1,0 +1,67 @@
+//! The quadratic forms of the certificates, applied without a matrix.
+
+use crate::{
+    error::Result,
+    fem::{body::Body, effect::Contact},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{dot, norm},
+    },
+    mesh::{Mesh, shape::facet_normal},
+};
+
+/// Adds the integral over the contact boundary of `normal x_nu w_nu + tangential x_tau . w_tau`, exactly, to `forces`; both
+/// with ghosts.
+pub(super) fn add_trace<const D: usize>(
+    mesh: &Mesh<D>,
+    contact: &Contact<D>,
+    [normal, tangential]: [f64; 2],
+    x: &[f64],
+    forces: &mut [f64],
+) {
+    for &facet in contact.facets() {
+        let nodes = mesh.facets[facet as usize];
+        let square = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+        let measure = norm(&square);
+        let unit = square.map(|c| c / measure);
+        let weighted = nodes.map(|n| {
+            let value: [f64; D] = std::array::from_fn(|i| x[n as usize * D + i]);
+            let along = dot(&value, &unit);
+            std::array::from_fn(|i| tangential * value[i] + (normal - tangential) * along * unit[i])
+        });
+        let total: [f64; D] = std::array::from_fn(|i| weighted.iter().map(|w: &[f64; D]| w[i]).sum());
+        for (a, node) in nodes.iter().enumerate() {
+            for i in 0..D {
+                forces[*node as usize * D + i] +=
+                    measure * (total[i] + weighted[a][i]) / (D * (D + 1)) as f64;
+            }
+        }
+    }
+}
+
+/// `y = F x` with `x` and `y` zero at held components, for a form that adds to nodal forces. Collective.
+pub(super) fn apply<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    x: &mut DistributedVector,
+    y: &mut DistributedVector,
+    add: impl FnOnce(&[f64], &mut [f64]),
+) -> Result<()> {
+    x.update_ghosts()?;
+    {
+        let (x, mut y) = (x.local()?, y.local_mut()?);
+        y.fill(0.0);
+        add(&x, &mut y);
+    }
+    y.add_ghosts_to_owners()?;
+    hold(body, y)
+}
+
+/// Zeroes the held components.
+pub(super) fn hold<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    y: &mut DistributedVector,
+) -> Result<()> {
+    let mut y = y.owned_mut()?;
+    y.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+    Ok(())
+}

@@ -1,0 +1,155 @@
+//! Certificates: bounds and constants of a problem, computed before its first step.
+//!
+//! | name | definition | meaning |
+//! |---|---|---|
+//! | `theta` | sup of `sum (m_j int w_nu^2 + m_t int w_tau^2)` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
+//! | `theta_step` | sup of `sum (m_j S_nu(w) + m_t S_tau(w))` over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
+//! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
+//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less; of power laws at an overstress of the yield stress, and in each step at the largest one | steps beyond it grow without bound |
+//! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; there if something flows | below it errors don't grow, however much flows: elastic and viscoplastic stress of the step before add up (exact without inertia, where all flows) |
+//!
+//! `S_nu(w)` and `S_tau(w)` are the integrals of `w_nu^2` and `w_tau^2` as the step sums them: over its quadrature points, with the
+//! weights and the directions with which contact and friction act there. At Gauss points `S_nu` is the integral. At nodes it is
+//! more, up to three times in the plane and four times in space where the velocity changes its sign from node to node.
+//!
+//! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
+//! which nothing flows.
+//!
+//! `growth_constants` are the `c0` and `c1` of the growth condition `|dj(r)| <= c0 + c1 |r|` that existence rests on: valid for all
+//! contact laws, the least `c1` first. A rigid obstacle has none, its graph ends in a vertical ray: there existence rests on its
+//! graph being monotone. Nor has a law of the displacement.
+//!
+//! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
+//! times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. Where the normal law has no
+//! largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1 with that fall,
+//! `1 / sup of sum fall S_tau(w)` over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))`; a run is held against it. Suprema
+//! run over velocities that the supports allow. Numerically they are approached from below, to about 1e-6 of their size: what is
+//! said of one solution keeps a margin of 1e-3 ([`Certificates::MARGIN`]). On meshes of more than 10,000 velocity
+//! components `explicit_step_bound` is the least of the bounds of single cells, which is never too large, unless a step of the
+//! run is longer than that. Where a region of the body has no
+//! viscosity, `m_A` is 0 and `theta` has no meaning.
+
+mod ascent;
+mod cells;
+mod certificates;
+mod coverage;
+mod forms;
+mod small_eigen;
+mod suprema;
+mod verdict;
+
+pub use certificates::Certificates;
+pub use verdict::{Accepted, Verdict};
+
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{Contact, Form},
+        state::State,
+    },
+    parallel::session::Session,
+    solver::stepping::Stepper,
+};
+use coverage::not_covered;
+use suprema::{Suprema, Supremum};
+
+/// Velocity components up to which the sharp bound of explicit steps costs next to nothing.
+const SMALL: usize = 10_000;
+/// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
+const RIGID: f64 = 1e10;
+
+impl Certificates {
+    /// Computes what the body and the scheme, prepared for its step, call for, where no step is longer than `longest` in s.
+    /// Collective.
+    pub fn of<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        scheme: &mut Stepper,
+        longest: f64,
+    ) -> Result<Self> {
+        let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
+        let growth = growth(&body.contacts);
+        let viscous = body.has_form_everywhere(Form::Viscosity);
+        let mut known = Self {
+            viscosity_modulus: body.smallest_viscosity(),
+            monotonicity_constant: falls.reduce(f64::max),
+            growth_constants: growth.ok().flatten(),
+            unbounded_growth: growth.err().map(str::to_owned),
+            ..Self::default()
+        };
+        let scheme_is_implicit = scheme.scheme().is_implicit();
+        let mut suprema = Suprema::new(session, body, state, scheme);
+        let mut find = |supremum| suprema.find(supremum);
+        if !body.contacts.is_empty() {
+            let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
+            known.theta_step = Some(if falling { find(Supremum::ThetaStep)? } else { 0.0 });
+            if viscous {
+                known.theta = Some(if falling { find(Supremum::Theta)? } else { 0.0 });
+            }
+            known.trace_norm_squared = Some(find(Supremum::TraceNorm)?)
+                .filter(|norm| *norm < RIGID * length(session, &body.mesh.nodes));
+        }
+        if body.contacts.iter().any(|contact| contact.unknown_fall().is_some()) {
+            let bound = if known.steps_are_unique() {
+                (1.0 - Self::MARGIN) / find(Supremum::SlipPressure)?
+            } else {
+                0.0
+            };
+            known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
+        }
+        known.not_covered = not_covered(body, known.theta_step, known.slip_pressure_bound);
+        if body.has_form(Form::Elasticity) && !scheme_is_implicit {
+            let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
+            let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
+            let is_large = body.unknowns(session) > SMALL;
+            let least = cells::explicit_step_bound(session, body).filter(|waves| is_large && decides(waves));
+            let waves = match least {
+                Some(waves) => waves,
+                None => 1.0 / find(Supremum::ExplicitStep)?,
+            };
+            let bound = flow.map_or(waves, |flow| waves.min(flow));
+            known.explicit_step_bound = Some(bound);
+            known.explicit_bound_is_least = least == Some(bound);
+            known.explicit_bound_follows_stress = body.flow_properties().any(|flow| flow.has_power_law);
+            known.flowing_step_bound = flow.map(|flow| 1.0 / (1.0 / waves + 1.0 / flow));
+        }
+        Ok(known)
+    }
+
+    /// The step at which `theta_step` is below 1 by twice the margin, so that each step up to it has one solution; `None` where
+    /// no step is small enough. Collective.
+    pub fn unique_step<const D: usize, const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        scheme: &mut Stepper,
+    ) -> Result<Option<f64>> {
+        if !body.has_form_everywhere(Form::Mass) {
+            return Ok(None);
+        }
+        Ok(Some(1.0 / Suprema::new(session, body, state, scheme).find(Supremum::UniqueStep)?))
+    }
+}
+
+/// The longest side of the box around these nodes on all ranks. Collective.
+fn length<const D: usize>(session: &Session, nodes: &[[f64; D]]) -> f64 {
+    let bound = |sign: f64| -> [f64; D] {
+        let most = |i| nodes.iter().map(|node| sign * node[i]).fold(f64::NEG_INFINITY, f64::max);
+        session.largest(std::array::from_fn(most))
+    };
+    let (high, low) = (bound(1.0), bound(-1.0));
+    (0..D).map(|i| high[i] + low[i]).fold(0.0, f64::max)
+}
+
+/// Growth constants that hold for all contacts, if there are any contacts.
+fn growth<const D: usize>(contacts: &[Contact<D>]) -> std::result::Result<Option<[f64; 2]>, &'static str> {
+    let mut all: Option<[f64; 2]> = None;
+    for contact in contacts {
+        let [rest, slope] = contact.law.growth_constants()?;
+        let [most, steepest] = all.unwrap_or_default();
+        all = Some([rest.max(most), slope.max(steepest)]);
+    }
+    Ok(all)
+}

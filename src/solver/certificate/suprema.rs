@@ -1,0 +1,194 @@
+//! Suprema of quotients of quadratic forms on the velocities that the supports allow.
+
+use super::{
+    Certificates,
+    ascent::{Limits, Quotient, climb},
+    cells::stable_step,
+    forms,
+};
+use crate::{
+    error::Result,
+    fem::{body::Body, effect::Form, state::State},
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+    solver::stepping::Stepper,
+};
+
+/// When the supremum of the explicit step counts as found.
+const OF_EXPLICIT_STEPS: Limits = Limits { tolerance: 1e-5, iterations: 60 };
+/// When a supremum over the motion of the contact boundary counts as found.
+const OF_CONTACT: Limits = Limits { tolerance: 1e-8, iterations: 200 };
+/// `theta_step` of the largest step that is suggested: its digits are rounded.
+const FAR_BELOW: f64 = 1.0 - 2.0 * Certificates::MARGIN;
+
+/// Which supremum is sought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Supremum {
+    Theta,
+    ThetaStep,
+    TraceNorm,
+    ExplicitStep,
+    /// `1/k` for the step `k` at which `theta_step` reaches `t`, 1 less twice the margin: the largest of `(W / t - A) / M`.
+    UniqueStep,
+    /// The inverse of the pressure at which `theta_step` reaches 1 where friction weakens with the pressure.
+    SlipPressure,
+}
+
+/// Finds suprema for a body and a scheme that is prepared for its step. Suprema over the motion of the contact boundary lie
+/// near each other: each ascent starts where the last one ended.
+pub(super) struct Suprema<'a, const D: usize, const S: usize> {
+    session: &'a Session,
+    body: &'a Body<D, S>,
+    state: &'a State,
+    scheme: &'a mut Stepper,
+    /// The response to a unit pull at the whole contact boundary.
+    pulled: Option<DistributedVector>,
+    /// Where the last supremum was found.
+    peak: Option<DistributedVector>,
+}
+
+impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
+    pub fn new(
+        session: &'a Session,
+        body: &'a Body<D, S>,
+        state: &'a State,
+        scheme: &'a mut Stepper,
+    ) -> Self {
+        Self { session, body, state, scheme, pulled: None, peak: None }
+    }
+
+    /// Approaches the supremum from below. Collective.
+    pub fn find(&mut self, supremum: Supremum) -> Result<f64> {
+        let (session, body, state) = (self.session, self.body, self.state);
+        let mut pencil = Pencil { body, scheme: &mut *self.scheme, supremum };
+        if supremum == Supremum::ExplicitStep {
+            let start = rough(body, state)?;
+            return Ok(climb(session, &mut pencil, start, None, OF_EXPLICIT_STEPS)?.value);
+        }
+        let pulled = match &self.pulled {
+            Some(pulled) => copy(pulled)?,
+            None => {
+                let pull = pull(body, state)?;
+                let mut pulled = pull.like()?;
+                pencil.precondition(&pull, &mut pulled)?;
+                self.pulled = Some(copy(&pulled)?);
+                pulled
+            }
+        };
+        let (start, beside) = match self.peak.take() {
+            Some(peak) => (peak, Some(pulled)),
+            None => (pulled, None),
+        };
+        let peak = climb(session, &mut pencil, start, beside, OF_CONTACT)?;
+        self.peak = Some(peak.vector);
+        Ok(peak.value)
+    }
+}
+
+fn copy(vector: &DistributedVector) -> Result<DistributedVector> {
+    let mut copy = vector.like()?;
+    copy.copy_from(vector)?;
+    Ok(copy)
+}
+
+struct Pencil<'a, const D: usize, const S: usize> {
+    body: &'a Body<D, S>,
+    scheme: &'a mut Stepper,
+    supremum: Supremum,
+}
+
+impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
+    fn forms(&self) -> usize {
+        if matches!(self.supremum, Supremum::ExplicitStep | Supremum::UniqueStep | Supremum::SlipPressure) {
+            3
+        } else {
+            2
+        }
+    }
+
+    fn apply(&mut self, form: usize, x: &mut DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let body = self.body;
+        let interior = match (self.supremum, form) {
+            (Supremum::ExplicitStep, 0) => Form::Elasticity,
+            (Supremum::ExplicitStep, 1) | (Supremum::UniqueStep, 2) => Form::Mass,
+            (Supremum::ExplicitStep, _) | (Supremum::Theta | Supremum::UniqueStep, 1) => Form::Viscosity,
+            (Supremum::TraceNorm, 1) => Form::Strain,
+            (Supremum::ThetaStep | Supremum::SlipPressure, 1) => return self.scheme.multiply(x, y),
+            (supremum, _) => {
+                return forms::apply(body, x, y, |x, y| {
+                    for contact in &body.contacts {
+                        let falls = contact.known_falls();
+                        match (supremum, form) {
+                            (Supremum::TraceNorm, _) => {
+                                forms::add_trace(&body.mesh, contact, [1.0, 0.0], x, y)
+                            }
+                            (Supremum::Theta, _) => forms::add_trace(&body.mesh, contact, falls, x, y),
+                            (Supremum::SlipPressure, 0) => {
+                                contact.add_squares([0.0, contact.unknown_fall().unwrap_or(0.0)], x, y);
+                            }
+                            _ => contact.add_squares(falls, x, y),
+                        }
+                    }
+                });
+            }
+        };
+        forms::apply(body, x, y, |x, y| body.add_form(interior, x, y))
+    }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.scheme.precondition(r, z)?;
+        forms::hold(self.body, z)
+    }
+
+    fn weights(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        match self.supremum {
+            Supremum::ExplicitStep => {
+                let k = stable_step(values[0], values[1], values[2]);
+                (vec![k * k, 0.0, 0.0], vec![0.0, 4.0, 2.0 * k])
+            }
+            Supremum::UniqueStep => (vec![1.0 / FAR_BELOW, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
+            Supremum::SlipPressure => (vec![1.0, 0.0, 0.0], vec![0.0, 1.0, -1.0]),
+            Supremum::Theta | Supremum::ThetaStep | Supremum::TraceNorm => (vec![1.0, 0.0], vec![0.0, 1.0]),
+        }
+    }
+
+    fn value(&self, values: &[f64]) -> f64 {
+        match self.supremum {
+            Supremum::ExplicitStep => 1.0 / stable_step(values[0], values[1], values[2]),
+            Supremum::UniqueStep => (values[0] / FAR_BELOW - values[1]) / values[2],
+            Supremum::SlipPressure => values[0] / (values[1] - values[2]),
+            Supremum::Theta | Supremum::ThetaStep | Supremum::TraceNorm => values[0] / values[1],
+        }
+    }
+}
+
+/// A start that pulls the whole contact boundary outward, and along where there is friction.
+fn pull<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
+    let mut out = rough(body, state)?;
+    let mut values = out.owned_mut()?;
+    values.iter_mut().for_each(|value| *value *= 1e-2);
+    for contact in &body.contacts {
+        contact.add_normals(&mut values);
+        contact.add_unit_sliding(&mut values);
+    }
+    values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+    drop(values);
+    Ok(out)
+}
+
+/// A start with a share of every mode: numbers between -1 and 1 that depend on the node's id alone.
+fn rough<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
+    let mut out = state.velocity.like()?;
+    {
+        let mut values = out.owned_mut()?;
+        for (node, target) in values.chunks_exact_mut(D).enumerate() {
+            for (i, value) in target.iter_mut().enumerate() {
+                let key = [body.mesh.node_ids[node].to_le_bytes(), (i as u32).to_le_bytes()].concat();
+                let bits = xxhash_rust::xxh3::xxh3_64(&key) >> 11;
+                *value = bits as f64 / (1u64 << 52) as f64 - 1.0;
+            }
+        }
+    }
+    forms::hold(body, &mut out)?;
+    Ok(out)
+}

@@ -1,0 +1,356 @@
+//! Steps whose lengths are chosen by their error, among powers of two times the first length (levels), so that many steps share
+//! a matrix and its preconditioner.
+//!
+//! The error of a step is the part of a quantity `x` that no straight line through its values before has, `k_n / (k_n + k_{n-1})
+//! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes of second
+//! order a bound that also holds where contact or flow set in. The velocity counts in the norm of the mass (of the viscosity,
+//! without inertia) beside the largest so far. The stress counts in the norm of the compliance beside the largest stress without
+//! viscosity so far: what the error of the velocity makes of it in the step, and the errors of viscoplastic histories, of
+//! damage, of the bonding of adhesion and of the pressure that contact remembers. The strain that hardening cells accumulate grows
+//! no faster than the flow, whose error counts with the histories.
+
+use super::{
+    Norms, StepError, StepOutcome, Stepper,
+    drives::Drives,
+    step_length::{Landing, SNAP, next_step},
+};
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::Step, state::State},
+    parallel::{agreement::Agreed, session::Session},
+};
+use serde::{Deserialize, Serialize};
+
+/// Steps of one length between two growths of it.
+const STEPS_BEFORE_GROWTH: u32 = 2;
+/// Share of the length that the tolerance allows.
+const SAFETY: f64 = 0.9;
+
+/// Settings of adaptive steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveSettings {
+    /// Accepted error of a step, relative to the largest velocity and stress.
+    pub tolerance: f64,
+    /// Length in s of the first step tried.
+    pub first: f64,
+    /// Shortest step in s.
+    pub smallest: f64,
+    /// Longest step in s.
+    pub largest: f64,
+    /// The end of the run in s.
+    pub end: f64,
+}
+
+/// The level of a run with the numbers by which it changes; saved in checkpoints.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pace {
+    /// Steps are of the first length times two to this power.
+    pub level: i32,
+    /// Steps taken at this level.
+    pub taken: u32,
+    /// Largest norm of the velocity so far.
+    pub velocity: f64,
+    /// Largest norm of the stress so far.
+    pub stress: f64,
+    /// Steps that were taken back.
+    pub rejected: u64,
+}
+
+/// Takes steps of adapted length.
+#[derive(Debug)]
+pub struct Adaptive<const D: usize> {
+    settings: AdaptiveSettings,
+    /// Loads and obstacles that change with time, from the first step on.
+    drives: Option<Drives<D>>,
+    lowest: i32,
+    highest: i32,
+    /// Its level.
+    pub pace: Pace,
+}
+
+impl<const D: usize> Adaptive<D> {
+    /// Starts at the first length.
+    pub fn new(settings: AdaptiveSettings) -> Self {
+        let level = |length: f64| (length / settings.first).log2();
+        let (lowest, highest) =
+            ((level(settings.smallest) - 1e-9).ceil(), (level(settings.largest) + 1e-9).floor());
+        Self { settings, drives: None, lowest: lowest as i32, highest: highest as i32, pace: Pace::default() }
+    }
+
+    /// Length in s of its longest steps.
+    pub fn longest(&self) -> f64 {
+        self.length(self.highest)
+    }
+
+    /// Length in s of a step at this level.
+    fn length(&self, level: i32) -> f64 {
+        self.settings.first * 2f64.powi(level)
+    }
+
+    /// Takes a step that ends at `target` at the latest, and commits it; steps with too large an error or without a solution
+    /// are taken back and tried again shorter. Collective.
+    pub fn advance<const S: usize>(
+        &mut self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        target: Landing,
+    ) -> Result<StepOutcome, Agreed> {
+        if self.drives.is_none() {
+            self.drives = Some(Drives::of(session, body, self.settings.end));
+        }
+        if self.pace.velocity == 0.0 && self.pace.stress == 0.0 {
+            self.look_ahead(session, stepper, body, state, target)?;
+        }
+        loop {
+            let (step, landing) = self.choose(session, state, target);
+            let is_shortest = self.level_of(step) <= self.lowest;
+            match self.attempt(session, stepper, body, state, step) {
+                Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
+                    session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
+                    outcome.landed_on = landing.what.filter(|_| step.time == landing.time);
+                    self.pace.velocity = self.pace.velocity.max(size.velocity);
+                    self.pace.stress = self.pace.stress.max(size.stress);
+                    self.grow(step, error);
+                    return Ok(outcome);
+                }
+                Ok((_, error, _)) => self.reject(step, self.fitting(step, error)),
+                Err(error) if error.is_failure() && !is_shortest => {
+                    self.reject(step, self.level_of(step) - 1)
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// The step to try next and the time that it must not go beyond: so short that loads and obstacles change along straight lines within
+    /// it, up to the tolerance. Collective.
+    fn choose(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
+        loop {
+            let length = self.next_length(target.time - state.time, state.step_length);
+            let landing = self.landing(session, state, target, length);
+            let length = self.next_length(landing.time - state.time, state.step_length);
+            let step = next_step(state, length, landing.time);
+            let departure = self.drives.as_ref().map_or(0.0, |drives| drives.departure(session, step));
+            if departure <= self.settings.tolerance || self.level_of(step) <= self.lowest {
+                return (step, landing);
+            }
+            self.shorten(step, self.fitting(step, departure));
+        }
+    }
+
+    /// The target, or the end of a piece of a load or an obstacle that comes before it within two steps of this length. Collective.
+    fn landing(&self, session: &Session, state: &State, target: Landing, length: f64) -> Landing {
+        let last = target.time.min(state.time + 2.0 * length);
+        let least = (1.0 - SNAP) * self.settings.smallest;
+        let drives = self.drives.as_ref();
+        let end = drives.and_then(|d| d.first_end(session, [state.time, last], [least, length]));
+        end.unwrap_or(target)
+    }
+
+    /// Solves a step without taking it; gives its relative error, and the norms at its end. A step whose error is not a number
+    /// has failed. Collective.
+    fn attempt<const S: usize>(
+        &self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<(StepOutcome, f64, Norms), Agreed> {
+        let outcome = session.agree(stepper.attempt(session, body, state, step))?;
+        let found = session.agree(stepper.error(session, body, state, step))?;
+        let error = self.relative(found);
+        let failed = || {
+            Error::Failed(format!(
+                "the error of the step to t = {:.6e} s is not a number: values of the state, the loads or the material have no \
+                 limit; see what the job makes them of",
+                step.time
+            ))
+        };
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
+    }
+
+    /// Finds the sizes of velocity and stress for a body at rest, to which errors are relative: from a step of the largest length, or one
+    /// to where the piece of a load ends, which is not committed.
+    fn look_ahead<const S: usize>(
+        &mut self,
+        session: &Session,
+        stepper: &mut Stepper,
+        body: &mut Body<D, S>,
+        state: &State,
+        target: Landing,
+    ) -> Result<(), Agreed> {
+        let landing = self.landing(session, state, target, self.longest());
+        let step = next_step(state, self.longest(), landing.time);
+        match self.attempt(session, stepper, body, state, step) {
+            Ok((_, _, size)) => {
+                (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
+                Ok(())
+            }
+            Err(error) if error.is_failure() => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The length of the next step, with so much `left` to the target, after a step of the length `last` (0 before the first): at
+    /// most twice that, and half of what is left where a whole one would leave a sliver.
+    fn next_length(&self, left: f64, last: f64) -> f64 {
+        let mut level = self.pace.level.clamp(self.lowest, self.highest);
+        while last > 0.0 && level > self.lowest && self.length(level) > 2.000_001 * last {
+            level -= 1;
+        }
+        let length = self.length(level);
+        let leaves_a_sliver = left > (1.0 + SNAP) * length && left < (2.0 - SNAP) * length;
+        if leaves_a_sliver { 0.5 * left } else { length }
+    }
+
+    /// The highest level whose steps are not longer.
+    fn level_of(&self, step: Step) -> i32 {
+        ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
+    }
+
+    /// The error beside the largest norms so far; not a number where that of either is none.
+    fn relative(&self, StepError { error, size, negligible }: StepError) -> f64 {
+        let share = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
+        let largest_velocity = self.pace.velocity.max(size.velocity);
+        let largest_stress = self.pace.stress.max(size.stress);
+        let velocity = share(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
+        let stress = share(error.stress, largest_stress.max(negligible.stress * largest_velocity));
+        (velocity * velocity + stress * stress).sqrt()
+    }
+
+    /// The level whose steps would have an error within the tolerance: it falls with the square of the length.
+    fn fitting(&self, step: Step, error: f64) -> i32 {
+        let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
+        let level = (length / self.settings.first).log2().floor();
+        if level.is_finite() { (level as i32).min(self.level_of(step) - 1) } else { self.level_of(step) - 1 }
+    }
+
+    fn reject(&mut self, step: Step, level: i32) {
+        self.pace.rejected += 1;
+        self.shorten(step, level);
+    }
+
+    fn shorten(&mut self, step: Step, level: i32) {
+        self.pace.taken = 0;
+        self.pace.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
+    }
+
+    /// Goes a level up where twice the length would do, after some steps at this one.
+    fn grow(&mut self, step: Step, error: f64) {
+        let level = self.level_of(step).clamp(self.lowest, self.highest);
+        if step.length < 0.999_999 * self.length(self.pace.level) {
+            // Cut to a time to land on, or growing again after that.
+            return;
+        }
+        self.pace.taken += 1;
+        let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
+        if self.pace.taken >= STEPS_BEFORE_GROWTH && length >= 2.0 * step.length && level < self.highest {
+            self.pace.level = level + 1;
+            self.pace.taken = 0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adaptive() -> Adaptive<2> {
+        let settings =
+            AdaptiveSettings { tolerance: 1e-2, first: 0.01, smallest: 0.001, largest: 0.1, end: 1.0 };
+        Adaptive::new(settings)
+    }
+
+    fn step(length: f64) -> Step {
+        Step { time: 1.0, length, previous_length: length }
+    }
+
+    #[test]
+    fn levels_stay_within_their_bounds() {
+        let adaptive = adaptive();
+        assert_eq!((adaptive.lowest, adaptive.highest), (-3, 3));
+        assert!((adaptive.length(-3) - 0.00125).abs() < 1e-17 && (adaptive.length(3) - 0.08).abs() < 1e-16);
+    }
+
+    #[test]
+    fn small_errors_let_steps_double_after_two_steps() {
+        let mut adaptive = adaptive();
+        adaptive.grow(step(0.01), 1e-3);
+        assert_eq!(adaptive.pace.level, 0, "one step is not enough");
+        adaptive.grow(step(0.01), 1e-3);
+        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 0));
+        adaptive.grow(step(0.02), 5e-3);
+        adaptive.grow(step(0.02), 5e-3);
+        assert_eq!(adaptive.pace.level, 1, "no room for twice the length");
+        adaptive.grow(step(0.015), 1e-9);
+        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 2), "a cut step says nothing");
+    }
+
+    #[test]
+    fn a_rejected_step_is_tried_again_as_short_as_its_error_asks_for() {
+        let mut adaptive = adaptive();
+        let level = adaptive.fitting(step(0.01), 0.05);
+        assert_eq!(level, -2, "0.01 x 0.9 / sqrt 5 = 0.004");
+        adaptive.reject(step(0.01), level);
+        assert_eq!((adaptive.pace.level, adaptive.pace.rejected), (-2, 1));
+        assert_eq!(adaptive.fitting(step(0.01), f64::NAN), -1);
+    }
+
+    #[test]
+    fn the_error_is_relative_to_the_largest_norms_and_never_hides_what_is_no_number() {
+        let norms = |[velocity, stress]: [f64; 2]| Norms { velocity, stress };
+        let found = |error: [f64; 2], size: [f64; 2]| StepError {
+            error: norms(error),
+            size: norms(size),
+            negligible: norms([1e-3, 1e-2]),
+        };
+        let mut adaptive = adaptive();
+        (adaptive.pace.velocity, adaptive.pace.stress) = (2.0, 0.5);
+        assert_eq!(adaptive.relative(found([0.6, 0.0], [1.0, 1.0])), 0.3, "the largest velocity was 2");
+        assert_eq!(adaptive.relative(found([0.0, 0.8], [1.0, 2.0])), 0.4, "the stress was never larger");
+        assert!((adaptive.relative(found([0.6, 0.8], [1.0, 2.0])) - 0.5).abs() < 1e-15);
+        assert_eq!(adaptive.relative(found([-1e-30, -0.0], [1.0, 1.0])), 0.0, "rounding below zero");
+        let [nan, infinite] = [f64::NAN, f64::INFINITY];
+        for error in [[nan, 0.1], [0.1, nan], [infinite, nan]] {
+            assert!(adaptive.relative(found(error, [1.0, 1.0])).is_nan(), "{error:?}");
+        }
+        (adaptive.pace.velocity, adaptive.pace.stress) = (0.0, 0.0);
+        assert_eq!(adaptive.relative(found([0.0, 0.0], [0.0, 0.0])), 0.0, "nothing moves");
+        assert!(
+            (adaptive.relative(found([1e-4, 0.0], [1e-9, 5.0])) - 0.02).abs() < 1e-15,
+            "held: 1e-4 of 5e-3"
+        );
+        assert!(
+            (adaptive.relative(found([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
+            "flying: 1e-4 of 5e-2"
+        );
+    }
+
+    #[test]
+    fn lengths_double_at_most_and_leave_no_sliver() {
+        let mut adaptive = adaptive();
+        adaptive.pace.level = 3;
+        assert_eq!(adaptive.next_length(100.0, 0.0), 0.08, "nothing was before the first");
+        assert_eq!(adaptive.next_length(100.0, 0.01), 0.02);
+        assert_eq!(adaptive.next_length(100.0, 0.005), 0.01);
+        assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a power of two times the first length");
+        assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the shortest length");
+        assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of what is left");
+        assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "cut by the target, not here");
+        assert_eq!(adaptive.next_length(0.16, 0.08), 0.08, "two steps are left");
+        adaptive.pace.level = -9;
+        assert_eq!(adaptive.next_length(100.0, 0.08), 0.00125);
+    }
+
+    #[test]
+    fn the_level_of_a_step_is_the_highest_that_is_not_longer() {
+        let adaptive = adaptive();
+        for (length, level) in [(0.01, 0), (0.0199, 0), (0.02, 1), (0.005, -1), (0.0049, -2), (0.08, 3)] {
+            assert_eq!(adaptive.level_of(step(length)), level, "{length}");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! A step whose contacts are bounds on velocity components, solved by PETSc's own solver for variational inequalities.
+//!
+//! `K v - b = 0` but where a velocity is at its bound, which exerts the force that is left there. It does not use the contact graphs and
+//! serves as an independent check of Newton's method on them.
+
+use super::{
+    linear_solver::SolverSettings,
+    problem::{REMEDY, StepProblem, System},
+};
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::Contact},
+    linear_algebra::petsc::{BoundedSnes, DistributedVector, Limits, NonlinearOutcome, UNBOUNDED},
+};
+
+/// PETSc's solver with its bounds.
+pub(super) struct Bounded {
+    snes: BoundedSnes,
+    settings: SolverSettings,
+    lower: DistributedVector,
+    upper: DistributedVector,
+    residual: DistributedVector,
+}
+
+impl Bounded {
+    /// A solver for velocities laid out like `like`.
+    pub fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
+        let (lower, upper, residual) = (like.like()?, like.like()?, like.like()?);
+        Ok(Self { snes: BoundedSnes::new("bounds_", like)?, settings, lower, upper, residual })
+    }
+
+    /// Solves from and into the velocity `trial`, and sets the pressures of the contacts; gives the iterations. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<usize> {
+        let solved = self.solve_here(&mut problem.body.contacts, system, trial);
+        let outcome = problem.session.agree(solved)?;
+        if !outcome.converged() {
+            return Err(problem.failed(outcome.words(), REMEDY));
+        }
+        Ok(outcome.iterations)
+    }
+
+    fn solve_here<const D: usize>(
+        &mut self,
+        contacts: &mut [Contact<D>],
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<NonlinearOutcome> {
+        self.lower.fill(-UNBOUNDED)?;
+        self.upper.fill(UNBOUNDED)?;
+        {
+            let (mut lower, mut upper) = (self.lower.owned_mut()?, self.upper.owned_mut()?);
+            contacts.iter().for_each(|contact| contact.add_bounds(&mut lower, &mut upper));
+        }
+        let bounds = [&self.lower, &self.upper];
+        let Some(matrix) = system.matrix.assembled() else {
+            return Err(Error::Internal("bounds need the entries of the matrix".into()));
+        };
+        let SolverSettings { tolerance, newton_iterations, .. } = self.settings;
+        let limits =
+            Limits { absolute: system.tolerance, relative: tolerance, iterations: newton_iterations };
+        let outcome = self.snes.solve(matrix, system.right_hand_side, bounds, trial, limits)?;
+        self.residual.copy_from(self.snes.residual())?;
+        let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);
+        for contact in contacts.iter_mut() {
+            contact.set_reactions(&velocity, &residual);
+        }
+        contacts.iter().for_each(|contact| contact.add_forces(&velocity, &mut residual));
+        Ok(outcome)
+    }
+
+    /// What is left of the equations of motion at the end of the last solve, in N.
+    pub fn residual(&self) -> &DistributedVector {
+        &self.residual
+    }
+}
+
+/// Refuses contacts on this rank that can't be solved this way.
+pub(super) fn refuse<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
+    match body.contacts.iter().find_map(Contact::more_than_bounds) {
+        None => Ok(()),
+        Some(place) => Err(Error::Refused(format!(
+            "[solver] method = \"vinewtonrsls\" bounds components of the velocity, but the normal at {place:?} m is not along \
+             an axis; use method = \"newton\""
+        ))),
+    }
+}

@@ -1,0 +1,464 @@
+//! Steps solved on the contact alone: all other velocities are eliminated by half a linear solve before Newton's method,
+//! and follow by the other half after it.
+//!
+//! With `K = L L^T` and the motions on which contact laws act last, `L y = b` leaves `S v + C(v) = L_c y_c` for them, where
+//! `S = L_c L_c^T` is the Schur complement of the others; `L^T x = y` with `y_c = L_c^T v_c` gives all velocities. A step
+//! costs one linear solve, however many iterations Newton's method needs, and the residual of these is that of the contact alone.
+//!
+//! With a factor in single precision, `K = L L^T + E`, solutions are corrected until the residual in double precision is small. The
+//! correction `d` of a velocity `v` solves `L L^T d + C(v + d) = r` with `r = b - K v`. The residual `r_c` along the motions on which
+//! laws act, where the forces of contact are large, is left as it is; half a solve takes the rest, `L y = r - r_c`, and the contact alone
+//! solves `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. What is left is `-E d`: it is measured, and corrected in the same way.
+
+use super::{
+    StepOutcome,
+    condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
+    equations::StepMatrix,
+    frames::Frames,
+    linear_solver::SolverSettings,
+    newton::Newton,
+    problem::{StepProblem, System},
+    resistance::{resistances, resistances_of_body},
+    springs::SprungRows,
+};
+use crate::{
+    error::{Error, Result},
+    fem::{
+        body::Body,
+        effect::{ContactNode, contact_nodes},
+    },
+    linear_algebra::petsc::{BlockRows, Cholesky, DistributedVector, Matrix, Precision, ProjectedKsp},
+    parallel::{
+        agreement::Agreed,
+        exchange::{Gathering, gather},
+        session::Session,
+    },
+};
+use mpi::topology::SimpleCommunicator;
+
+/// Corrections after which single precision has failed.
+const CORRECTIONS: usize = 12;
+/// A correction that leaves more than this share of the residual does not converge.
+const LARGEST_SHARE_LEFT: f64 = 0.5;
+/// Share of the tolerance to which the contact alone is solved: later corrections start so near to their solution that Newton's
+/// method would stop just below it, and velocity and pressure stay as far off their graph.
+const CONTACT_SHARE: f64 = 0.1;
+
+/// A solver for steps whose matrix is factored whole on each rank.
+pub(super) struct Condensed {
+    newton: Newton,
+    elimination: Elimination,
+    /// The precision that factors are made in: double once single was not enough.
+    pub precision: Precision,
+    nodes: ContactNodes,
+    /// Which of the unknowns of all ranks are those of this rank.
+    own: std::ops::Range<usize>,
+    /// The order of elimination, once it was found.
+    order: Option<Vec<u32>>,
+    /// Vectors of contact nodes: right-hand side, velocity, and that of the converged state.
+    right_hand_side: DistributedVector,
+    velocity: DistributedVector,
+    converged: DistributedVector,
+    /// What corrections need, where factors are in single precision.
+    refinement: Option<Refinement>,
+}
+
+/// A factored matrix.
+pub(super) struct Factored {
+    cholesky: Cholesky,
+    condensed: CondensedMatrix,
+    /// The parameters of each contact's graphs.
+    scales: Vec<[f64; 2]>,
+}
+
+/// The factor in use, and the vectors of all ranks that it solves with.
+struct Elimination {
+    factored: Option<Factored>,
+    frames: Frames,
+    /// The values of all ranks' nodes, and how they come here.
+    whole: Vec<f64>,
+    gathering: Gathering,
+    /// Where those of this rank start.
+    first: usize,
+    /// Halves of solves since traffic is counted.
+    halves: u64,
+}
+
+/// The contact nodes of this rank, in the order of vectors of contact nodes, and the motions on which laws act.
+struct ContactNodes {
+    nodes: Vec<usize>,
+    motions: Vec<Motion>,
+}
+
+/// Vectors of all nodes, and of contact nodes.
+struct Refinement {
+    /// The velocity from which the step was started.
+    start: DistributedVector,
+    residual: DistributedVector,
+    correction: DistributedVector,
+    /// The velocity of contact nodes before a correction.
+    before: DistributedVector,
+    change: DistributedVector,
+    product: DistributedVector,
+}
+
+impl Refinement {
+    fn new(nodes: &DistributedVector, contact: &DistributedVector) -> Result<Self> {
+        Ok(Self {
+            start: nodes.like()?,
+            residual: nodes.like()?,
+            correction: nodes.like()?,
+            before: contact.like()?,
+            change: contact.like()?,
+            product: contact.like()?,
+        })
+    }
+}
+
+impl Condensed {
+    /// A solver for the contacts of a body, whose unknowns it numbers; the matrix comes with [`Condensed::prepare`]. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &mut Body<D, S>,
+        settings: SolverSettings,
+        precision: Precision,
+    ) -> Result<Self> {
+        let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
+        let nodes = ContactNodes::new(&contact);
+        let number = |node: usize| nodes.nodes.partition_point(|other| *other < node);
+        body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(number));
+        let like = DistributedVector::ghosted(D, contact.len(), &[])?;
+        let mut linear_solver = ProjectedKsp::new("", &like, D)?;
+        linear_solver.linear_solver().set_method("cg")?;
+        linear_solver.precondition_by_operator()?;
+        let newton = Newton::new(&like, &body.contacts, linear_solver, settings)?;
+        let frames = Frames::new(session, &body.mesh, &contact)?;
+        let start = session.share_start(nodes.motions.len());
+        Ok(Self {
+            newton,
+            elimination: Elimination {
+                factored: None,
+                whole: vec![0.0; frames.total()],
+                frames,
+                gathering: Gathering::new(session.world(), body.mesh.owned * D)?,
+                first: body.mesh.first_node * D,
+                halves: 0,
+            },
+            precision,
+            own: start..start + nodes.motions.len(),
+            nodes,
+            order: None,
+            right_hand_side: like.like()?,
+            velocity: like.like()?,
+            converged: like.like()?,
+            refinement: None,
+        })
+    }
+
+    /// Factors the matrix that has these rows on this rank, in the order of the one in use, and chooses the parameters of contact
+    /// graphs; says whether it could. Springs in the rows are taken off products with the condensed matrix. Where there are any, that
+    /// resists rigid motions too little to choose parameters by, and `matrix` of the whole body does it, whose vectors are
+    /// laid out like `like`. Collective.
+    pub fn prepare<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        rows: SprungRows,
+        matrix: &Matrix,
+        like: &DistributedVector,
+    ) -> Result<bool> {
+        let SprungRows { rows, springs } = rows;
+        let mut rows = gather_rows(session, rows, D)?;
+        self.elimination.frames.turn_matrix(&mut rows);
+        self.elimination.factored = None;
+        let Some(cholesky) = self.factor(session, D, &rows)? else { return Ok(false) };
+        self.order.get_or_insert_with(|| cholesky.order().to_vec());
+        self.precision = cholesky.precision();
+        drop(rows);
+        let Frames { unknowns, groups, .. } = &self.elimination.frames;
+        let mut place = vec![0; self.elimination.frames.total()];
+        cholesky.last_unknowns().iter().enumerate().for_each(|(at, &unknown)| place[unknown as usize] = at);
+        let has_springs = springs.is_some();
+        let condensed = CondensedMatrix {
+            lower: cholesky.last_factor(),
+            places: unknowns.iter().map(|&unknown| place[unknown]).collect(),
+            nodes: groups.clone(),
+            own: self.own.clone(),
+            motions: self.nodes.motions.clone(),
+            springs: springs.unwrap_or_default(),
+            subspace: Subspace::whole(&self.velocity)?,
+            workspace: Workspace::new(&self.nodes.motions, unknowns.len())?,
+        };
+        let scales = if has_springs {
+            resistances_of_body(session, &body.contacts, like, matrix)?
+        } else {
+            let (mut motion, mut product) = (self.velocity.like()?, self.velocity.like()?);
+            resistances(session, &body.contacts, like, |nodal| {
+                self.nodes.restrict::<D>(nodal, &mut motion)?;
+                condensed.multiply(&motion, &mut product)?;
+                motion.dot(&product)
+            })?
+        };
+        self.newton.scales.clone_from(&scales);
+        self.elimination.factored = Some(Factored { cholesky, condensed, scales });
+        Ok(true)
+    }
+
+    /// Factors a matrix in one precision on all ranks: processors that differ may find another one enough. `None` on all where the
+    /// unknowns of contact can't be last on one. Collective.
+    fn factor(&self, session: &Session, block: usize, rows: &BlockRows) -> Result<Option<Cholesky>, Agreed> {
+        let unknowns = &self.elimination.frames.unknowns;
+        let factor = |precision| Cholesky::new(block, rows, unknowns, self.order.as_deref(), precision);
+        let found = session.agree(factor(self.precision))?;
+        let is = |precision| found.as_ref().is_some_and(|cholesky| cholesky.precision() == precision);
+        let here = [found.is_none(), is(Precision::Single), is(Precision::Double)];
+        let [none, single, double] = session.largest(here.map(|flag| f64::from(u8::from(flag))));
+        if none > 0.0 {
+            return Ok(None);
+        }
+        if single * double == 0.0 {
+            return Ok(found);
+        }
+        session.agree(if here[1] { factor(Precision::Double) } else { Ok(found) })
+    }
+
+    /// The precision of the factor in use.
+    pub fn precision_in_use(&mut self) -> Result<Precision> {
+        Ok(in_use(&mut self.elimination.factored)?.cholesky.precision())
+    }
+
+    /// Changes the factored matrix for another.
+    pub fn exchange(&mut self, other: &mut Option<Factored>) {
+        std::mem::swap(&mut self.elimination.factored, other);
+        if let Some(factored) = &self.elimination.factored {
+            self.newton.scales.clone_from(&factored.scales);
+        }
+    }
+
+    /// `x = K^-1 b`. Collective.
+    pub fn solve_linear(
+        &mut self,
+        right_hand_side: &DistributedVector,
+        solution: &mut DistributedVector,
+    ) -> Result<()> {
+        self.elimination.forward(right_hand_side)?;
+        self.elimination.backward(solution)
+    }
+
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&mut self) {
+        self.elimination.halves = 0;
+        self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
+    }
+
+    /// Bytes that this rank read since then, at the least: the factor for each half of a solve, its last block for each product.
+    pub fn traffic(&self) -> u64 {
+        let Elimination { factored, halves, .. } = &self.elimination;
+        let of = |factored: &Factored| halves * factored.cholesky.bytes() + factored.condensed.traffic();
+        factored.as_ref().map_or(0, of)
+    }
+
+    /// Solves a step from the velocity in `trial`, and leaves the new one there. Where it fails with a factor in single precision,
+    /// [`Condensed::start_again`] takes `trial` back. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        if self.precision_in_use()? == Precision::Single {
+            return self.refine(problem, system, trial);
+        }
+        let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
+        elimination.forward(system.right_hand_side)?;
+        nodes.restrict::<D>(system.converged, converged)?;
+        nodes.restrict::<D>(trial, velocity)?;
+        let Factored { cholesky, condensed, .. } = in_use(&mut elimination.factored)?;
+        condensed.write_times_lower(cholesky.last_mut(), right_hand_side)?;
+        let contact = System { matrix: condensed, right_hand_side, converged, ..system };
+        let outcome = newton.solve(problem, contact, velocity)?;
+        condensed.read_times_upper(velocity, cholesky.last_mut())?;
+        elimination.backward(trial)?;
+        nodes.prescribe::<D>(velocity, trial)?;
+        trial.update_ghosts()?;
+        Ok(outcome)
+    }
+
+    /// The same with a factor in single precision, by corrections; fails where these do not converge. Collective.
+    fn refine<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
+        let refinement = match &mut self.refinement {
+            Some(refinement) => refinement,
+            none => none.insert(Refinement::new(trial, velocity)?),
+        };
+        let Refinement { start, residual, correction, before, change, product } = refinement;
+        start.copy_from(trial)?;
+        nodes.restrict::<D>(system.converged, converged)?;
+        system.write_residual(trial, residual)?;
+        let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
+        for _ in 0..CORRECTIONS {
+            // The contact alone.
+            nodes.separate_forces::<D>(residual, change)?;
+            elimination.forward(residual)?;
+            nodes.restrict::<D>(trial, velocity)?;
+            before.copy_from(velocity)?;
+            let Factored { cholesky, condensed, .. } = in_use(&mut elimination.factored)?;
+            condensed.write_times_lower(cholesky.last_mut(), right_hand_side)?;
+            right_hand_side.add_scaled(1.0, change)?;
+            condensed.multiply(before, product)?;
+            right_hand_side.add_scaled(1.0, product)?;
+            let tolerance = CONTACT_SHARE * system.tolerance;
+            let contact = System { matrix: condensed, right_hand_side, tolerance, converged };
+            let outcome = newton.solve(problem, contact, velocity)?;
+            sum = StepOutcome {
+                newton_iterations: sum.newton_iterations + outcome.newton_iterations,
+                linear_iterations: sum.linear_iterations + outcome.linear_iterations,
+                indefinite_solves: sum.indefinite_solves + outcome.indefinite_solves,
+                ..outcome
+            };
+            // All velocities.
+            right_hand_side.add_scaled(-1.0, product)?;
+            change.copy_from(velocity)?;
+            change.add_scaled(-1.0, before)?;
+            condensed.multiply(change, product)?;
+            condensed.read_times_upper(change, cholesky.last_mut())?;
+            elimination.backward(correction)?;
+            trial.add_scaled(1.0, correction)?;
+            nodes.prescribe::<D>(velocity, trial)?;
+            // What is left of `b - K v - C(v)`, with the forces `C(v)` that Newton's method left.
+            system.write_residual(trial, residual)?;
+            change.copy_from(right_hand_side)?;
+            change.add_scaled(-1.0, product)?;
+            correction.copy_from(residual)?;
+            nodes.subtract::<D>(change, correction)?;
+            let left = correction.norm()?;
+            if left <= system.tolerance {
+                trial.update_ghosts()?;
+                return Ok(sum);
+            }
+            if left.is_nan() || left > LARGEST_SHARE_LEFT * last {
+                break;
+            }
+            last = left;
+        }
+        Err(Error::Failed("corrections with a factor in single precision do not converge".into()))
+    }
+
+    /// Takes `trial` back to where the last step with a factor in single precision was started.
+    pub fn start_again(&self, trial: &mut DistributedVector) -> Result<()> {
+        self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
+    }
+}
+
+/// The factor in use.
+fn in_use(factored: &mut Option<Factored>) -> Result<&mut Factored> {
+    factored.as_mut().ok_or_else(|| Error::Internal("a step was taken before its matrix was factored".into()))
+}
+
+impl Elimination {
+    /// Solves `L y = b`. Collective.
+    fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
+        self.gathering.gather(&SimpleCommunicator::world(), &right_hand_side.owned()?, &mut self.whole);
+        self.frames.turn(&mut self.whole, false);
+        self.halves += 1;
+        in_use(&mut self.factored)?.cholesky.forward(&self.whole)
+    }
+
+    /// Solves `L^T x = y`.
+    fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
+        self.halves += 1;
+        in_use(&mut self.factored)?.cholesky.backward(&mut self.whole)?;
+        self.frames.turn(&mut self.whole, true);
+        let mut solution = solution.owned_mut()?;
+        let count = solution.len();
+        solution.copy_from_slice(&self.whole[self.first..][..count]);
+        Ok(())
+    }
+}
+
+impl ContactNodes {
+    fn new<const D: usize>(contact: &[ContactNode<D>]) -> Self {
+        let motions = contact.iter().enumerate().flat_map(|(number, contact)| {
+            let motion = move |direction: &[f64; D]| Motion { at: number * D, direction: direction.to_vec() };
+            contact.frame[..contact.seen].iter().map(motion)
+        });
+        Self { nodes: contact.iter().map(|contact| contact.node).collect(), motions: motions.collect() }
+    }
+
+    /// Copies the values of contact nodes.
+    fn restrict<const D: usize>(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
+        let (from, mut to) = (from.owned()?, to.owned_mut()?);
+        let pairs = to.chunks_exact_mut(D).zip(&self.nodes);
+        pairs.for_each(|(to, &node)| to.copy_from_slice(&from[node * D..][..D]));
+        Ok(())
+    }
+
+    /// Subtracts values of contact nodes.
+    fn subtract<const D: usize>(
+        &self,
+        values: &DistributedVector,
+        from: &mut DistributedVector,
+    ) -> Result<()> {
+        let (values, mut from) = (values.owned()?, from.owned_mut()?);
+        for (&node, value) in self.nodes.iter().zip(values.chunks_exact(D)) {
+            from[node * D..][..D].iter_mut().zip(value).for_each(|(from, value)| *from -= value);
+        }
+        Ok(())
+    }
+
+    /// Sets the velocities along the motions on which laws act to those of contact nodes: the solve of all velocities
+    /// gives them with rounding errors.
+    fn prescribe<const D: usize>(
+        &self,
+        velocity: &DistributedVector,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        let (velocity, mut trial) = (velocity.owned()?, trial.owned_mut()?);
+        for motion in &self.motions {
+            let velocity = &velocity[motion.at..][..D];
+            let value = &mut trial[self.nodes[motion.at / D] * D..][..D];
+            let off: f64 = (0..D).map(|i| motion.direction[i] * (velocity[i] - value[i])).sum();
+            (0..D).for_each(|i| value[i] += off * motion.direction[i]);
+        }
+        Ok(())
+    }
+
+    /// Moves the forces along the motions on which laws act from a residual of all nodes into a vector of contact nodes.
+    fn separate_forces<const D: usize>(
+        &self,
+        residual: &mut DistributedVector,
+        forces: &mut DistributedVector,
+    ) -> Result<()> {
+        let (mut residual, mut forces) = (residual.owned_mut()?, forces.owned_mut()?);
+        forces.fill(0.0);
+        for motion in &self.motions {
+            let value = &mut residual[self.nodes[motion.at / D] * D..][..D];
+            let along: f64 = motion.direction.iter().zip(&*value).map(|(n, r)| n * r).sum();
+            for ((value, force), n) in value.iter_mut().zip(&mut forces[motion.at..]).zip(&motion.direction) {
+                *value -= along * n;
+                *force += along * n;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rows of all ranks. Collective.
+fn gather_rows(session: &Session, rows: BlockRows, block: usize) -> Result<BlockRows> {
+    if session.ranks() == 1 {
+        return Ok(rows);
+    }
+    let world = session.world();
+    let counts: Vec<u64> = rows.offsets.windows(2).map(|range| (range[1] - range[0]) as u64).collect();
+    let mut offsets = vec![0];
+    for count in gather(world, &counts)? {
+        offsets.push(offsets[offsets.len() - 1] + count as usize);
+    }
+    debug_assert_eq!(rows.values.len(), rows.columns.len() * block * block);
+    Ok(BlockRows { offsets, columns: gather(world, &rows.columns)?, values: gather(world, &rows.values)? })
+}

@@ -1,0 +1,336 @@
+//! The matrix of a step, condensed on the motions on which contact laws act.
+
+use super::equations::StepMatrix;
+use crate::{
+    error::Result,
+    linear_algebra::petsc::{DenseCholesky, DistributedVector, MISSING_DIRECTIONS, times_own_transpose},
+    parallel::exchange::Gathering,
+};
+use mpi::topology::SimpleCommunicator;
+use std::{cell::RefCell, ops::Range};
+
+/// A motion of one contact node on which laws act: one scalar unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    /// Where the values of its node start in vectors of contact nodes.
+    pub at: usize,
+    pub direction: Vec<f64>,
+}
+
+/// The Schur complement `S = L L^T - B` of all other motions, whole on each rank, with the springs `B` that were factored with it.
+///
+/// Vectors hold all components of the contact nodes of a rank; motions on which no law acts have no stiffness here.
+pub(super) struct CondensedMatrix {
+    /// Columns of `L` from the diagonal down.
+    pub lower: Vec<f64>,
+    /// The place of each motion of all ranks in `L`.
+    pub places: Vec<usize>,
+    /// The motions of each node of all ranks.
+    pub nodes: Vec<Range<usize>>,
+    /// Which motions are those of this rank.
+    pub own: Range<usize>,
+    pub motions: Vec<Motion>,
+    /// Stiffness along each motion of this rank that the factor has and the matrix has not, in N s/m; none, or one a motion.
+    pub springs: Vec<f64>,
+    pub subspace: RefCell<Subspace>,
+    pub workspace: RefCell<Workspace>,
+}
+
+/// Work vectors of products.
+pub(super) struct Workspace {
+    /// Amounts of the motions of this rank, and of all ranks, in the order of the motions.
+    own: Vec<f64>,
+    all: Vec<f64>,
+    gathering: Gathering,
+    /// Amounts in the order of the factor.
+    placed: [Vec<f64>; 2],
+    /// The blocks of a projection, of this rank and of all ranks, and the images of unit motions that they are made of.
+    own_blocks: Vec<f64>,
+    blocks: Vec<f64>,
+    block_gathering: Gathering,
+    images: [Vec<f64>; DIMENSIONS],
+    /// Bytes read since traffic is counted.
+    traffic: u64,
+}
+
+impl Workspace {
+    /// For these motions of this rank, and so many of all ranks. Collective.
+    pub fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
+        let world = SimpleCommunicator::world();
+        let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
+        let block_gathering = Gathering::new(&world, pairs)?;
+        Ok(RefCell::new(Self {
+            own: vec![0.0; motions.len()],
+            all: vec![0.0; total],
+            gathering: Gathering::new(&world, motions.len())?,
+            placed: [vec![0.0; total], vec![0.0; total]],
+            own_blocks: Vec::with_capacity(pairs),
+            blocks: vec![0.0; block_gathering.total()],
+            block_gathering,
+            images: Default::default(),
+            traffic: 0,
+        }))
+    }
+}
+
+/// What is made for the subspace of the solves.
+pub(super) struct Subspace {
+    room: DistributedVector,
+    /// The blocks of the projection, node after node of all ranks.
+    made_for: Vec<f64>,
+    factor: Option<DenseCholesky>,
+    in_use: bool,
+}
+
+impl Subspace {
+    /// The whole space, of vectors laid out like `like`.
+    pub fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
+        let room = like.like()?;
+        Ok(RefCell::new(Self { room, made_for: Vec::new(), factor: None, in_use: false }))
+    }
+}
+
+impl CondensedMatrix {
+    /// Writes a vector of contact nodes that moves by `L x`.
+    pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
+        let workspace = &mut *self.workspace.borrow_mut();
+        workspace.traffic += self.bytes();
+        self.times_lower(x, &mut workspace.placed[0]);
+        self.write(&workspace.placed[0], vector)
+    }
+
+    /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
+    pub fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(vector, workspace)?;
+        workspace.traffic += self.bytes();
+        self.times_upper(&workspace.placed[0], product);
+        Ok(())
+    }
+
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&self) {
+        self.workspace.borrow_mut().traffic = 0;
+    }
+
+    /// Bytes of `L`, or of the factor on a subspace, that products and solves read since then.
+    pub fn traffic(&self) -> u64 {
+        self.workspace.borrow().traffic
+    }
+
+    /// Reads the amounts of all motions in a vector of contact nodes into the first place, in the order of the factor. Collective.
+    fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
+        let Workspace { own, all, gathering, placed: [placed, _], .. } = workspace;
+        {
+            let values = vector.owned()?;
+            for (amount, motion) in own.iter_mut().zip(&self.motions) {
+                *amount = dot(&motion.direction, &values[motion.at..][..motion.direction.len()]);
+            }
+        }
+        gathering.gather(&SimpleCommunicator::world(), own, all);
+        self.places.iter().zip(all).for_each(|(&place, amount)| placed[place] = *amount);
+        Ok(())
+    }
+
+    /// Writes a vector of contact nodes that moves by these amounts, given in the order of the factor.
+    fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
+        let mut values = vector.owned_mut()?;
+        values.fill(0.0);
+        for (motion, number) in self.motions.iter().zip(self.own.clone()) {
+            let amount = amounts[self.places[number]];
+            let value = values[motion.at..].iter_mut();
+            value.zip(&motion.direction).for_each(|(value, direction)| *value += amount * direction);
+        }
+        Ok(())
+    }
+
+    /// Bytes of `L`; the factor on a subspace has as many.
+    fn bytes(&self) -> u64 {
+        size_of_val(&self.lower[..]) as u64
+    }
+
+    /// `L x`.
+    fn times_lower(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for (column, x) in columns(&self.lower, x.len()).zip(x) {
+            let first = y.len() - column.len();
+            y[first..].iter_mut().zip(column).for_each(|(y, l)| *y += l * x);
+        }
+    }
+
+    /// `L^T x`.
+    fn times_upper(&self, x: &[f64], y: &mut [f64]) {
+        for (y, column) in y.iter_mut().zip(columns(&self.lower, x.len())) {
+            *y = dot(column, &x[x.len() - column.len()..]);
+        }
+    }
+
+    /// Replaces `x` by `L^-T L^-1 x`.
+    fn solve(&self, x: &mut [f64]) {
+        let size = x.len();
+        for (at, column) in columns(&self.lower, size).enumerate() {
+            x[at] /= column[0];
+            let known = x[at];
+            x[at + 1..].iter_mut().zip(&column[1..]).for_each(|(x, l)| *x -= l * known);
+        }
+        for at in (0..size).rev() {
+            let column = column(&self.lower, size, at);
+            x[at] = (x[at] - dot(&column[1..], &x[at + 1..])) / column[0];
+        }
+    }
+
+    /// Writes the blocks of a projection that works node by node, node after node of all ranks. Collective.
+    fn write_blocks(
+        &self,
+        project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>,
+        column: &mut DistributedVector,
+        workspace: &mut Workspace,
+    ) -> Result<()> {
+        let dimension = self.motions.first().map_or(0, |motion| motion.direction.len());
+        for (i, image) in workspace.images.iter_mut().enumerate() {
+            {
+                let mut values = column.owned_mut()?;
+                values.fill(0.0);
+                if i < dimension {
+                    values.iter_mut().skip(i).step_by(dimension).for_each(|value| *value = 1.0);
+                }
+            }
+            project(column)?;
+            image.clear();
+            image.extend_from_slice(&column.owned()?);
+        }
+        workspace.own_blocks.clear();
+        for row in &self.motions {
+            for other in self.motions.iter().filter(|other| other.at == row.at) {
+                let mut entry = 0.0;
+                for (j, image) in other.direction.iter().zip(&workspace.images) {
+                    entry += j * dot(&row.direction, &image[row.at..][..dimension]);
+                }
+                workspace.own_blocks.push(entry);
+            }
+        }
+        workspace.block_gathering.gather(
+            &SimpleCommunicator::world(),
+            &workspace.own_blocks,
+            &mut workspace.blocks,
+        );
+        Ok(())
+    }
+
+    /// Factors `P S P + k (I - P)`, where `P` has these blocks; in the order of the motions.
+    fn factor_on(&self, blocks: &[f64]) -> Result<DenseCholesky> {
+        let size = self.places.len();
+        let mut full = vec![0.0; size * size];
+        for at in 0..size {
+            full[at * size + at..][..size - at].copy_from_slice(column(&self.lower, size, at));
+        }
+        let product = times_own_transpose(size, &full)?;
+        for (to, &place) in full.chunks_exact_mut(size.max(1)).zip(&self.places) {
+            let from = &product[place * size..][..size];
+            to.iter_mut().zip(&self.places).for_each(|(value, &place)| *value = from[place]);
+        }
+        let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
+        let mut first = 0;
+        for node in &self.nodes {
+            let block = &blocks[first..first + node.len() * node.len()];
+            first += block.len();
+            for line in 0..size {
+                mix(&mut full, block, node.clone().map(|at| at * size + line));
+            }
+            for line in 0..size {
+                mix(&mut full, block, node.clone().map(|at| line * size + at));
+            }
+            for (i, row) in node.clone().enumerate() {
+                for (j, column) in node.clone().enumerate() {
+                    let identity = f64::from(u8::from(i == j));
+                    full[column * size + row] += mean * (identity - block[i * node.len() + j]);
+                }
+            }
+        }
+        DenseCholesky::new(size, &full)
+    }
+}
+
+/// Most components of a node.
+const DIMENSIONS: usize = 3;
+
+impl StepMatrix for CondensedMatrix {
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(x, workspace)?;
+        workspace.traffic += 2 * self.bytes();
+        let [amounts, product] = &mut workspace.placed;
+        self.times_upper(amounts, product);
+        self.times_lower(product, amounts);
+        for ((spring, amount), number) in self.springs.iter().zip(&workspace.own).zip(self.own.clone()) {
+            amounts[self.places[number]] -= spring * amount;
+        }
+        self.write(amounts, y)
+    }
+
+    fn precondition(&self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(r, workspace)?;
+        workspace.traffic += 2 * self.bytes();
+        let [amounts, ordered] = &mut workspace.placed;
+        let mut subspace = self.subspace.borrow_mut();
+        match &mut *subspace {
+            Subspace { factor: Some(factor), in_use: true, .. } => {
+                ordered.iter_mut().zip(&self.places).for_each(|(amount, &place)| *amount = amounts[place]);
+                factor.solve(ordered)?;
+                self.places.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
+            }
+            _ => self.solve(amounts),
+        }
+        self.write(amounts, z)
+    }
+
+    fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+        let mut subspace = self.subspace.borrow_mut();
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.write_blocks(project, &mut subspace.room, workspace)?;
+        let blocks = &workspace.blocks;
+        let (mut removed, mut first) = (0.0, 0);
+        for count in self.nodes.iter().map(ExactSizeIterator::len) {
+            removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();
+            first += count * count;
+        }
+        subspace.in_use = removed.round() >= MISSING_DIRECTIONS;
+        if !subspace.in_use || (subspace.factor.is_some() && subspace.made_for == *blocks) {
+            return Ok(false);
+        }
+        subspace.factor = Some(self.factor_on(blocks)?);
+        subspace.made_for.clone_from(blocks);
+        Ok(true)
+    }
+}
+
+/// Replaces these entries by their product with a symmetric block.
+fn mix(entries: &mut [f64], block: &[f64], at: impl Iterator<Item = usize> + Clone) {
+    let mut before = [0.0; DIMENSIONS];
+    at.clone().zip(&mut before).for_each(|(at, value)| *value = entries[at]);
+    let count = block.len().isqrt();
+    for (at, row) in at.zip(block.chunks_exact(count.max(1))) {
+        entries[at] = dot(row, &before[..count]);
+    }
+}
+
+/// A column of `L` from the diagonal down.
+fn column(lower: &[f64], size: usize, at: usize) -> &[f64] {
+    let start = at * size - at * at.saturating_sub(1) / 2;
+    &lower[start..start + size - at]
+}
+
+fn columns(lower: &[f64], size: usize) -> impl Iterator<Item = &[f64]> {
+    (0..size).map(move |at| column(lower, size, at))
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (mut lanes, width) = ([0.0; 8], 8);
+    let (a_parts, b_parts) = (a.chunks_exact(width), b.chunks_exact(width));
+    let rest: f64 = a_parts.remainder().iter().zip(b_parts.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        (0..width).for_each(|i| lanes[i] += a[i] * b[i]);
+    }
+    rest + lanes.iter().sum::<f64>()
+}

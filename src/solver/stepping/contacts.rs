@@ -1,0 +1,67 @@
+//! Contacts before a step and after it.
+
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{Energy, Step},
+        state::State,
+    },
+};
+
+/// Adds what contact dissipated, lost to the scheme and gave to obstacles in a committed step.
+pub(super) fn released_by_contact<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+    step: Step,
+    energy: &mut Energy,
+) -> Result<()> {
+    let velocity = state.velocity.local()?;
+    for contact in &body.contacts {
+        let [dissipated, numerical, work] = contact.release(&velocity, step.length);
+        energy.contact += dissipated;
+        energy.numerical += numerical;
+        energy.work += work;
+    }
+    Ok(())
+}
+
+/// Prepares the points of all contacts for a step.
+pub(super) fn prepare_contacts<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+    step: Step,
+) -> Result<()> {
+    if body.contacts.is_empty() {
+        return Ok(());
+    }
+    let displacement = state.displacement.local()?;
+    for contact in &mut body.contacts {
+        contact.prepare(step.time, step.length, &displacement)?;
+    }
+    restore_pressures(body, state)
+}
+
+/// Sets the pressures of all contacts to those of the converged state.
+pub(super) fn restore_pressures<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+) -> Result<()> {
+    if let Some(traction) = &state.contact_traction {
+        let traction = traction.owned()?;
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&traction));
+    }
+    Ok(())
+}
+
+/// Copies the pressures of the step just taken into the state.
+pub(super) fn commit_tractions<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &mut State,
+) -> Result<()> {
+    let Some(traction) = &mut state.contact_traction else { return Ok(()) };
+    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
+    traction.fill(0.0);
+    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
+    Ok(())
+}

@@ -1,0 +1,391 @@
+//! The equations of one step, `K v + C(v) = b`, in the form that PETSc's SNES takes.
+
+use crate::{
+    error::{Error, Result},
+    fem::effect::Contact,
+    linear_algebra::petsc::{DistributedVector, Matrix, NonlinearProblem, ProjectedKsp, ProjectedOperator},
+    parallel::session::Session,
+};
+
+/// The constant matrix `K` of a step.
+pub trait StepMatrix {
+    /// `y = K x`. Collective.
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
+
+    /// `z` near `K^-1 r`, on the subspace last set; for matrices that PETSc makes no preconditioner of. Collective.
+    fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
+        Err(Error::Internal("a matrix that PETSc preconditions was asked to do it".into()))
+    }
+
+    /// Sets the subspace of the solves that follow, given the projection on it; says whether a preconditioner was made
+    /// for it. Collective.
+    fn set_subspace(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// The matrix itself, if its entries are at hand.
+    fn assembled(&self) -> Option<&Matrix> {
+        None
+    }
+}
+
+impl StepMatrix for Matrix {
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        Self::multiply(self, x, y)
+    }
+
+    fn assembled(&self) -> Option<&Matrix> {
+        Some(self)
+    }
+}
+
+/// Forces of the cells beyond `K v`, at velocities without ghost values.
+pub trait CellForces {
+    /// Adds the forces at a velocity.
+    fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
+
+    /// Takes a velocity as the point of linearisation.
+    fn linearise(&mut self, velocity: &DistributedVector) -> Result<()>;
+
+    /// Whether the derivative is symmetric in this rank's cells.
+    fn is_symmetric(&self) -> bool;
+
+    /// Adds the change of the forces with a change of the velocity.
+    fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
+}
+
+/// `R(x) = K v(x) + C(x) - b` with its generalised Jacobian; see [`crate::fem::effect::Contact`] for the unknown `x`.
+pub struct ContactEquations<'a, const D: usize> {
+    /// `K`.
+    pub matrix: &'a dyn StepMatrix,
+    /// What makes up `C`.
+    pub contacts: &'a mut [Contact<D>],
+    /// What cells add to `K v`, if that is not linear.
+    pub cells: Option<&'a mut dyn CellForces>,
+    /// `b` in N.
+    pub right_hand_side: &'a DistributedVector,
+    /// Work vectors of the evaluation.
+    pub scratch: &'a mut Scratch,
+    /// Solves with the Jacobian; its constant matrix is `K`.
+    pub linear_solver: &'a mut ProjectedKsp,
+    /// All ranks.
+    pub session: &'a Session,
+    /// Whether to fail when the branches of the contact graph come back.
+    pub stop_at_cycles: bool,
+    /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
+    pub equilibrated: bool,
+    /// What was done so far.
+    pub effort: Effort,
+}
+
+/// Work vectors of a contact step.
+#[derive(Debug)]
+pub struct Scratch {
+    /// The velocities of the last residual.
+    pub velocity: DistributedVector,
+    open: DistributedVector,
+    /// The change of the velocities to equilibrium, where steps are solved so.
+    correction: Option<DistributedVector>,
+    /// Ghosted values and forces, where some contact reads ghost nodes.
+    ghosted: Option<[DistributedVector; 2]>,
+}
+
+impl Scratch {
+    /// Work vectors laid out like `like`, for these contacts.
+    pub fn new<const D: usize>(like: &DistributedVector, contacts: &[Contact<D>]) -> Result<Self> {
+        let ghosts = contacts.iter().any(Contact::needs_ghosts);
+        Ok(Self {
+            velocity: like.like()?,
+            open: like.like()?,
+            correction: None,
+            ghosted: if ghosts { Some([like.like()?, like.like()?]) } else { None },
+        })
+    }
+}
+
+/// What Newton's method did in a step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Effort {
+    /// Calls of the residual.
+    pub residuals: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Linear systems in which CG met negative curvature.
+    pub indefinite: usize,
+    /// How often the preconditioner was made anew.
+    pub refreshed: usize,
+    /// Linear systems that were not symmetric: some point slides under a bound that follows the pressure.
+    pub coupled: usize,
+    /// A number for the set of branches of all points, one a linearisation; different sets have different numbers.
+    pub sets: Vec<f64>,
+}
+
+impl Effort {
+    /// Nothing done; `sets` keeps its memory.
+    pub fn restart(&mut self) {
+        self.sets.clear();
+        *self = Self { sets: std::mem::take(&mut self.sets), ..Self::default() };
+    }
+
+    /// How many iterations ago the set of branches was the same as now, if there were others in between.
+    pub fn period(&self) -> Option<usize> {
+        let (last, before) = self.sets.split_last()?;
+        let at = before.iter().rposition(|set| set == last)?;
+        (at + 1 < before.len()).then(|| before.len() - at)
+    }
+}
+
+/// That the branches came back, in words.
+pub(super) fn cycle(period: usize) -> String {
+    format!(
+        "Newton's method came back to the branches of the contact graph that it had {period} iterations before"
+    )
+}
+
+/// Adds to `out` what `add` adds to nodal values, given those of `x`.
+fn add_contact<const D: usize>(
+    ghosted: &mut Option<[DistributedVector; 2]>,
+    contacts: &[Contact<D>],
+    x: &DistributedVector,
+    out: &mut DistributedVector,
+    add: impl Fn(&Contact<D>, &[f64], &mut [f64]),
+) -> Result<()> {
+    let Some([values, forces]) = ghosted else {
+        let (x, mut out) = (x.owned()?, out.owned_mut()?);
+        contacts.iter().for_each(|contact| add(contact, &x, &mut out));
+        return Ok(());
+    };
+    values.copy_from(x)?;
+    values.update_ghosts()?;
+    {
+        let (values, mut forces) = (values.local()?, forces.local_mut()?);
+        forces.fill(0.0);
+        contacts.iter().for_each(|contact| add(contact, &values, &mut forces));
+    }
+    forces.add_ghosts_to_owners()?;
+    out.add_scaled(1.0, forces)
+}
+
+impl<const D: usize> ContactEquations<'_, D> {
+    /// Writes the residual at the mapped velocities.
+    fn write_residual(&mut self, residual: &mut DistributedVector) -> Result<()> {
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        self.matrix.multiply(velocity, residual)?;
+        residual.add_scaled(-1.0, self.right_hand_side)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_forces(velocity, residual)?;
+        }
+        add_contact(ghosted, self.contacts, velocity, residual, Contact::add_forces)
+    }
+}
+
+impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
+    fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
+        self.effort.residuals += 1;
+        self.scratch.velocity.copy_from(x)?;
+        {
+            let mut velocity = self.scratch.velocity.owned_mut()?;
+            self.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        }
+        self.write_residual(residual)?;
+        if !self.equilibrated {
+            return Ok(());
+        }
+        let Scratch { velocity, open, correction, .. } = &mut *self.scratch;
+        let correction = match correction {
+            Some(correction) => correction,
+            none => none.insert(open.like()?),
+        };
+        let mut operator = Inside { matrix: self.matrix, contacts: self.contacts };
+        open.copy_from(residual)?;
+        operator.project(open)?;
+        let outcome = self.linear_solver.solve_accurately(&mut operator, open, correction)?;
+        self.effort.linear_iterations += outcome.iterations;
+        if !outcome.converged() {
+            return Err(Error::Failed(outcome.words().into()));
+        }
+        velocity.add_scaled(-1.0, correction)?;
+        self.write_residual(residual)
+    }
+
+    fn linearise(&mut self, x: &DistributedVector) -> Result<()> {
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        velocity.copy_from(x)?;
+        {
+            let (x, mut velocity) = (x.owned()?, velocity.owned_mut()?);
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_parameters(&x, &mut velocity));
+        }
+        if let Some(cells) = &mut self.cells {
+            cells.linearise(velocity)?;
+        }
+        if let Some([values, _]) = ghosted {
+            values.copy_from(velocity)?;
+            values.update_ghosts()?;
+            let values = values.local()?;
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&values));
+        } else {
+            let velocity = velocity.owned()?;
+            self.contacts.iter_mut().for_each(|contact| contact.linearise_velocities(&velocity));
+        }
+        let digests = self.contacts.iter().map(Contact::set_digest);
+        let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
+        // Half the bits are enough for different numbers, and their sum over ranks is exact.
+        let [all] = self.session.sum([(mine >> 32) as f64]);
+        self.effort.sets.push(all);
+        match self.effort.period() {
+            Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle(period))),
+            _ => Ok(()),
+        }
+    }
+
+    fn apply_jacobian(
+        &mut self,
+        direction: &DistributedVector,
+        result: &mut DistributedVector,
+    ) -> Result<()> {
+        let Scratch { velocity, ghosted, .. } = &mut *self.scratch;
+        velocity.copy_from(direction)?;
+        {
+            let mut velocity = velocity.owned_mut()?;
+            self.contacts.iter_mut().for_each(|contact| contact.map_direction(&mut velocity));
+        }
+        self.matrix.multiply(velocity, result)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_derivative(velocity, result)?;
+        }
+        add_contact(ghosted, self.contacts, velocity, result, Contact::add_derivative)
+    }
+
+    fn solve_jacobian(
+        &mut self,
+        residual: &DistributedVector,
+        direction: &mut DistributedVector,
+    ) -> Result<()> {
+        let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
+        let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
+        let skew = cells.is_some()
+            && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
+        let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
+            && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
+        let coupled = coupled || skew;
+        let mut operator = Reduced { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
+        open.copy_from(residual)?;
+        operator.reduce(open)?;
+        if operator.may_project() {
+            let made = self.matrix.set_subspace(&mut |column| operator.project(column))?;
+            self.effort.refreshed += usize::from(made);
+        }
+        let outcome = if coupled {
+            self.effort.coupled += 1;
+            self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
+        } else {
+            self.linear_solver.solve(&mut operator, open, velocity)?
+        };
+        self.effort.linear_iterations += outcome.linear.iterations;
+        self.effort.indefinite += usize::from(outcome.indefinite);
+        self.effort.refreshed += usize::from(outcome.refreshed);
+        if !outcome.linear.converged() {
+            return Err(Error::Failed(outcome.linear.words().into()));
+        }
+        direction.copy_from(velocity)?;
+        if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction().is_some()) {
+            operator.multiply(velocity, open)?;
+            open.scale(-1.0)?;
+            open.add_scaled(1.0, residual)?;
+        }
+        let (open, mut direction) = (open.owned()?, direction.owned_mut()?);
+        self.contacts.iter().for_each(|contact| contact.unmap_direction(&open, &mut direction));
+        Ok(())
+    }
+}
+
+/// `P Q (K + F' + C') P` in velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
+/// their graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
+/// these.
+struct Reduced<'a, const D: usize> {
+    matrix: &'a dyn StepMatrix,
+    cells: Option<&'a mut dyn CellForces>,
+    contacts: &'a [Contact<D>],
+    ghosted: &'a mut Option<[DistributedVector; 2]>,
+}
+
+impl<const D: usize> Reduced<'_, D> {
+    fn multiply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        if let Some(cells) = &mut self.cells {
+            cells.add_derivative(x, y)?;
+        }
+        add_contact(self.ghosted, self.contacts, x, y, Contact::add_slopes)
+    }
+
+    /// `x = P Q x`.
+    fn reduce(&mut self, x: &mut DistributedVector) -> Result<()> {
+        {
+            let mut x = x.owned_mut()?;
+            self.contacts.iter().for_each(|contact| contact.reduce(&mut x));
+        }
+        self.project(x)
+    }
+}
+
+impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
+    fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.multiply(x, y)?;
+        self.reduce(y)
+    }
+
+    fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
+        let mut x = x.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.project(&mut x));
+        Ok(())
+    }
+
+    fn may_project(&self) -> bool {
+        self.contacts.iter().any(|contact| contact.law.has_vertical_parts() || contact.friction().is_some())
+    }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.matrix.precondition(r, z)
+    }
+}
+
+/// `P K P`, where `P` removes the motions of all contact points.
+struct Inside<'a, const D: usize> {
+    matrix: &'a dyn StepMatrix,
+    contacts: &'a [Contact<D>],
+}
+
+impl<const D: usize> ProjectedOperator for Inside<'_, D> {
+    fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix.multiply(x, y)?;
+        self.project(y)
+    }
+
+    fn project(&mut self, x: &mut DistributedVector) -> Result<()> {
+        let mut x = x.owned_mut()?;
+        self.contacts.iter().for_each(|contact| contact.remove_motions(&mut x));
+        Ok(())
+    }
+
+    fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.matrix.precondition(r, z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn branches_that_come_back_after_others_have_a_period() {
+        let period = |sets: &[f64]| Effort { sets: sets.to_vec(), ..Effort::default() }.period();
+        assert_eq!(period(&[]), None);
+        assert_eq!(period(&[1.0]), None);
+        assert_eq!(period(&[1.0, 2.0, 3.0]), None, "all of them new");
+        assert_eq!(period(&[1.0, 2.0, 2.0]), None, "they stay");
+        assert_eq!(period(&[1.0, 2.0, 1.0]), Some(2));
+        assert_eq!(period(&[5.0, 1.0, 2.0, 3.0, 1.0]), Some(3));
+        assert_eq!(period(&[1.0, 2.0, 1.0, 3.0, 1.0]), Some(2), "the last time counts");
+        assert!(cycle(2).contains("that it had 2 iterations before"));
+    }
+}

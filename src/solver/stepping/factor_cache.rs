@@ -1,0 +1,161 @@
+//! Matrices with their preconditioners, kept for when steps are of these lengths again.
+//!
+//! Step lengths are powers of two times the first one. The preconditioner of such a length is used for all lengths near it: two matrices
+//! `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
+
+use super::{
+    condensed::Factored,
+    linear_solver::Preconditioner,
+    newton::Newton,
+    solver::{Solver, linear, projected},
+};
+use crate::{
+    error::Result,
+    linear_algebra::petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
+    parallel::session::Session,
+};
+use std::mem::swap;
+
+/// Matrices that are kept at most, with the one in use.
+const MOST: usize = 8;
+/// Bytes of a rank that they may take.
+const ROOM: f64 = 512e6;
+
+/// A matrix with its preconditioner.
+pub(super) struct Cached {
+    /// Length in s of the steps that the matrix is of.
+    pub length: f64,
+    /// The matrix.
+    pub matrix: Matrix,
+    /// What solves with it.
+    pub krylov: Krylov,
+}
+
+/// A linear solver and its preconditioner; all of a run have the same kind.
+pub(super) enum Krylov {
+    /// For linear steps.
+    Linear(Ksp),
+    /// For Newton's method, with the parameters of the contact graphs.
+    Newton(Box<ProjectedKsp>, Vec<[f64; 2]>),
+    /// For Newton's method on the contact alone.
+    Condensed(Box<Option<Factored>>),
+}
+
+impl Krylov {
+    /// One like that in use, not set up.
+    pub fn another<const D: usize>(
+        used: &Solver,
+        session: &Session,
+        chosen: Preconditioner,
+        unknowns: usize,
+        like: &DistributedVector,
+    ) -> Result<Self> {
+        Ok(match used {
+            Solver::Linear(_) => Self::Linear(linear(session, chosen, unknowns)?),
+            Solver::Condensed(_) => Self::Condensed(Box::default()),
+            Solver::Newton(_) => {
+                Self::Newton(Box::new(projected::<D>(session, chosen, unknowns, like)?), Vec::new())
+            }
+        })
+    }
+
+    /// Changes places with the one in use.
+    pub fn exchange(&mut self, used: &mut Solver) {
+        match (self, used) {
+            (Self::Linear(mine), Solver::Linear(used)) => swap(mine, used),
+            (Self::Newton(mine, mine_scales), Solver::Newton(newton)) => {
+                let Newton { linear_solver, scales, .. } = &mut **newton;
+                swap(&mut **mine, linear_solver);
+                swap(mine_scales, scales);
+            }
+            (Self::Condensed(mine), Solver::Condensed(used)) => used.exchange(mine),
+            _ => {}
+        }
+    }
+}
+
+/// Matrices with their preconditioners that are not in use, the one used last at the end.
+pub(super) struct FactorCache {
+    kept: Vec<Cached>,
+    most: usize,
+}
+
+impl FactorCache {
+    /// None yet; so many are kept besides the one in use.
+    pub fn new(most: usize) -> Self {
+        Self { kept: Vec::new(), most }
+    }
+
+    /// Puts one away; gives the one that has not been used for longest where there are too many.
+    pub fn put(&mut self, cached: Cached) -> Option<Cached> {
+        self.kept.push(cached);
+        (self.kept.len() > self.most).then(|| self.kept.remove(0))
+    }
+
+    /// Takes the one of this length out.
+    pub fn take(&mut self, length: f64) -> Option<Cached> {
+        let at = self.kept.iter().position(|cached| cached.length == length)?;
+        Some(self.kept.remove(at))
+    }
+}
+
+/// The power of two times `base` that is nearest to this length.
+pub(super) fn nearest(base: f64, length: f64) -> f64 {
+    base * 2f64.powi((length / base).log2().round() as i32)
+}
+
+impl Preconditioner {
+    /// Bytes over all ranks of a factor or a hierarchy, about, given those of the matrix: nested dissection's `n log n` and
+    /// `n^(4/3)` entries, or work proportional to the unknowns.
+    pub fn bytes(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> f64 {
+        let n = unknowns as f64;
+        match self {
+            Self::Auto | Self::Cholesky => {
+                let entries = if dimension == 2 { 7.0 * n * n.log2() } else { 28.0 * n.powf(4.0 / 3.0) };
+                let copies = if self.is_redundant(ranks, unknowns) { ranks } else { 1 };
+                8.0 * entries * copies as f64
+            }
+            Self::Gamg => 2.0 * matrix,
+            Self::Boomeramg => 3.5 * matrix,
+        }
+    }
+
+    /// How many matrices of different lengths are kept, each with its preconditioner, with the one in use: as many as find
+    /// room in 512 MB of each rank, at most 8.
+    pub fn kept(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
+        let each = (matrix + self.bytes(dimension, unknowns, ranks, matrix)) / ranks as f64;
+        ((ROOM / each.max(1.0)) as usize).clamp(1, MOST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::stepping::{FactorPrecision, ProblemSize};
+
+    #[test]
+    fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
+        for (length, cached) in [(0.01, 0.01), (0.08, 0.08), (0.012, 0.01), (0.015, 0.02), (0.0072, 0.01)] {
+            assert_eq!(nearest(0.01, length), cached);
+        }
+    }
+
+    #[test]
+    fn small_problems_keep_many_lengths_and_large_ones_what_they_use() {
+        let kept = |unknowns: usize, ranks| {
+            let precision = FactorPrecision::Auto;
+            let problem = ProblemSize {
+                dimension: 3,
+                unknowns,
+                ranks,
+                steps: 2,
+                contact: true,
+                friction: false,
+                precision,
+            };
+            Preconditioner::Auto.resolve(problem).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+        };
+        assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
+        assert_eq!(kept(1_000_000, 8), 2);
+    }
+}

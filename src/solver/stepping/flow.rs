@@ -1,0 +1,108 @@
+//! The forces of cells that flow in the equations that Newton's method solves.
+
+use super::equations::CellForces;
+use crate::{
+    error::Result,
+    fem::{body::Cells, effect::Tangents},
+    linear_algebra::petsc::DistributedVector,
+};
+
+/// Work vectors and tangents.
+pub(super) struct Flow {
+    values: DistributedVector,
+    forces: DistributedVector,
+    tangents: Tangents,
+}
+
+/// The displacement at the end of a step is `displacement + length v_n`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FlowStart<'a> {
+    /// With ghosts, in m.
+    pub displacement: &'a DistributedVector,
+    /// In s.
+    pub length: f64,
+}
+
+/// Adds `B^T (s_n - s*)`, with `s*` the stress without flow.
+pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
+    flow: &'a mut Flow,
+    cells: Cells<'a, D, S>,
+    start: FlowStart<'a>,
+    symmetric: bool,
+}
+
+impl Flow {
+    /// Vectors laid out like `like`.
+    pub fn new(like: &DistributedVector) -> Result<Self> {
+        Ok(Self { values: like.like()?, forces: like.like()?, tangents: Tangents::default() })
+    }
+
+    /// For a step of these cells.
+    pub fn of<'a, const D: usize, const S: usize>(
+        &'a mut self,
+        cells: Cells<'a, D, S>,
+        start: FlowStart<'a>,
+    ) -> FlowForces<'a, D, S> {
+        let symmetric = cells.has_symmetric_tangent();
+        FlowForces { flow: self, cells, start, symmetric }
+    }
+
+    /// Adds the sum of all ranks to `out`, without held components.
+    fn add_sum_to(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
+        self.forces.add_ghosts_to_owners()?;
+        let forces = self.forces.owned()?;
+        let mut targets = out.owned_mut()?;
+        let free = targets.iter_mut().zip(forces.iter()).zip(fixed).filter(|(_, fixed)| !**fixed);
+        free.for_each(|((target, force), _)| *target += force);
+        Ok(())
+    }
+}
+
+impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
+    /// The displacement at the end of the step, with ghosts.
+    fn displace(&mut self, velocity: &DistributedVector) -> Result<()> {
+        let values = &mut self.flow.values;
+        values.copy_from(velocity)?;
+        values.update_ghosts()?;
+        let (start, mut values) = (self.start.displacement.local()?, values.local_mut()?);
+        values.iter_mut().zip(start.iter()).for_each(|(v, u)| *v = u + self.start.length * *v);
+        Ok(())
+    }
+
+    fn evaluate(&mut self, wants_tangents: bool) -> Result<()> {
+        let Flow { values, forces, tangents } = &mut *self.flow;
+        let (values, mut forces) = (values.local()?, forces.local_mut()?);
+        forces.fill(0.0);
+        self.cells.add_flow(&values, wants_tangents.then_some(tangents), &mut forces);
+        Ok(())
+    }
+}
+
+impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
+    fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
+        self.displace(velocity)?;
+        self.evaluate(false)?;
+        self.flow.add_sum_to(self.cells.fixed, forces)
+    }
+
+    fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
+        self.displace(velocity)?;
+        self.evaluate(true)
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.symmetric && self.flow.tangents.are_symmetric()
+    }
+
+    fn add_derivative(&mut self, change: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
+        let flow = &mut *self.flow;
+        flow.values.copy_from(change)?;
+        flow.values.update_ghosts()?;
+        {
+            let (values, mut forces) = (flow.values.local()?, flow.forces.local_mut()?);
+            forces.fill(0.0);
+            self.cells.add_tangents(&flow.tangents, &values, &mut forces);
+        }
+        self.flow.add_sum_to(self.cells.fixed, forces)
+    }
+}

@@ -1,0 +1,195 @@
+//! What implicit Euler and the two-step formula share: a step of length `k'` from a blend `x~` of the states before.
+//!
+//! ```text
+//! (M / k' + A + k' E) v_n + C(v_n) + B^T (s_n - s*) = f_n + M v~ / k' - B^T s~,   s~ = E e(u~) + H_{n-1},   s* = s~ + k' E e(v_n)
+//! ```
+//!
+//! Energy: tested with `k v_n`, the change of the kinetic energy `1/2 (x, x)` and what the formula makes of it differ by
+//! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`. The elastic energy differs
+//! from the work of the stress less that on the flow of the step by `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`,
+//! in the metric of the compliance. For implicit Euler only the last terms are left.
+
+use super::{contacts::released_by_contact, flow::FlowStart, outcome::over_ranks};
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{Blend, Energy, Form, Peaks, Step},
+        space::Nodal,
+        state::State,
+    },
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+
+/// Work vectors, and the energies of a step that need the state before it.
+pub(super) struct Implicit {
+    formula: fn(Step) -> Blend,
+    /// The blend of the step in hand.
+    blend: Blend,
+    /// `u~` and `v~`, with ghosts.
+    displacement: DistributedVector,
+    velocity: DistributedVector,
+    /// `u_n`, with ghosts.
+    end: DistributedVector,
+    /// Squares of the forces of this rank's cells at the start.
+    squares: f64,
+    solved: Energy,
+    /// `M v_n`, where the energy balance needs it.
+    momentum: Vec<f64>,
+}
+
+impl Implicit {
+    /// Vectors laid out like those of the state.
+    pub fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
+        let like = || state.velocity.like();
+        Ok(Self {
+            formula,
+            blend: Blend::euler(0.0),
+            displacement: like()?,
+            velocity: like()?,
+            end: like()?,
+            squares: 0.0,
+            solved: Energy::default(),
+            momentum: Vec::new(),
+        })
+    }
+
+    /// `k'`.
+    pub fn matrix_length(&self, step: Step) -> f64 {
+        (self.formula)(step).length
+    }
+
+    /// Adds `M v~ / k' - B^T s~`.
+    pub fn start<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        forces: &mut [f64],
+    ) -> Result<()> {
+        self.blend = (self.formula)(step);
+        let earlier = state.previous_displacement.as_ref().unwrap_or(&state.displacement);
+        write_blend(self.blend, &state.displacement, earlier, &mut self.displacement)?;
+        write_blend(self.blend, &state.velocity, &state.previous_velocity, &mut self.velocity)?;
+        let (displacement, velocity) = (self.displacement.local()?, self.velocity.local()?);
+        let before = state.displacement.local()?;
+        let nodal = Nodal {
+            displacement: &displacement,
+            previous_displacement: &before,
+            velocity: &velocity,
+            previous_velocity: &velocity,
+        };
+        self.squares = body.add_start_forces(self.blend, nodal, step, forces);
+        Ok(())
+    }
+
+    /// Corrects contacts that are prepared for the step for the blend from which it starts.
+    pub fn prepare_contacts<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if self.blend.earlier == 0.0 || !body.contacts.iter().any(|c| c.law.depends_on_displacement()) {
+            return Ok(());
+        }
+        {
+            let (start, before) = (self.displacement.local()?, state.displacement.local()?);
+            let mut shift = self.end.local_mut()?;
+            shift.iter_mut().zip(start.iter().zip(before.iter())).for_each(|(s, (a, b))| *s = a - b);
+        }
+        let shift = self.end.local()?;
+        body.contacts.iter_mut().try_for_each(|contact| contact.blend(step, self.blend, &shift))
+    }
+
+    /// Where the displacement starts, for cells that flow.
+    pub fn flow_start(&self) -> FlowStart<'_> {
+        FlowStart { displacement: &self.displacement, length: self.blend.length }
+    }
+
+    /// The residual norm in N that rounding errors of the forces make. Collective.
+    pub fn rounding(&self, session: &Session) -> f64 {
+        1e-13 * session.sum([self.squares])[0].sqrt()
+    }
+
+    /// Displacement, trial histories and the terms of the energy balance that need the state before. Collective.
+    pub fn finish<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        solved: &mut DistributedVector,
+        step: Step,
+    ) -> Result<()> {
+        solved.update_ghosts()?;
+        self.solved = Energy::default();
+        {
+            let (start, velocity) = (self.displacement.local()?, solved.local()?);
+            let mut end = self.end.local_mut()?;
+            let both = start.iter().zip(velocity.iter());
+            end.iter_mut().zip(both).for_each(|(end, (u, v))| *end = u + self.blend.length * v);
+        }
+        let (end, velocity) = (self.end.local()?, solved.local()?);
+        let (displacement, previous_velocity) = (state.displacement.local()?, state.velocity.local()?);
+        let nodal = Nodal {
+            displacement: &end,
+            previous_displacement: &displacement,
+            velocity: &velocity,
+            previous_velocity: &previous_velocity,
+        };
+        body.add_implicit_energy(nodal, step, &mut self.solved);
+        Ok(())
+    }
+
+    /// Takes the solved step over into the state. Collective.
+    pub fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
+        state.commit_both(solved, &self.end, step.time, step.length)
+    }
+
+    pub fn energy<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<(Energy, Peaks)> {
+        let (mut energy, peaks) = body.energy(state, step)?;
+        energy += self.solved;
+        released_by_contact(body, state, step, &mut energy)?;
+        if self.blend.earlier != 0.0 && body.has_form(Form::Mass) {
+            energy.numerical += self.beside(body, state, step)?;
+        }
+        Ok(over_ranks(session, energy, peaks))
+    }
+
+    /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells.
+    fn beside<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<f64> {
+        let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
+        let start = self.velocity.local()?;
+        let momentum = &mut self.momentum;
+        momentum.clear();
+        momentum.resize(now.len(), 0.0);
+        body.add_form(Form::Mass, &now, momentum);
+        let share = step.length / self.blend.length;
+        let terms = now.iter().zip(before.iter()).zip(start.iter()).zip(momentum.iter());
+        Ok(terms.map(|(((now, before), start), p)| p * ((now - before) - share * (now - start))).sum())
+    }
+}
+
+/// Writes the blend of two fields with ghosts.
+fn write_blend(
+    blend: Blend,
+    recent: &DistributedVector,
+    earlier: &DistributedVector,
+    out: &mut DistributedVector,
+) -> Result<()> {
+    let (recent, earlier, mut out) = (recent.local()?, earlier.local()?, out.local_mut()?);
+    let both = recent.iter().zip(earlier.iter());
+    out.iter_mut().zip(both).for_each(|(out, (recent, earlier))| *out = blend.of(*recent, *earlier));
+    Ok(())
+}

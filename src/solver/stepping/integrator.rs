@@ -1,0 +1,131 @@
+//! A time scheme at work: what is its own in a step.
+
+use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{Blend, Energy, Evaluation, Peaks, Step},
+        state::State,
+    },
+    job::Scheme,
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+
+/// The state at which laws are evaluated under a scheme, before the first step.
+pub fn evaluation(scheme: Scheme) -> Evaluation {
+    if scheme.is_implicit() { Evaluation::End(Blend::euler(0.0)) } else { Evaluation::Converged }
+}
+
+/// A scheme with what it keeps from one part of a step to the next. Implicit schemes differ in the blend of earlier states from which
+/// a step starts, and have all else in common.
+pub(super) enum Integrator {
+    LaggedEuler(LaggedEuler),
+    Implicit(Box<Implicit>),
+}
+
+impl Integrator {
+    /// The integrator of a scheme, for vectors laid out like those of the state.
+    pub fn new(scheme: Scheme, state: &State) -> Result<Self> {
+        let blend = match scheme {
+            Scheme::LaggedEuler => return Ok(Self::LaggedEuler(LaggedEuler::default())),
+            Scheme::ImplicitEuler => implicit_euler::blend,
+            Scheme::Bdf2 => bdf2::blend,
+        };
+        Ok(Self::Implicit(Box::new(Implicit::new(state, blend)?)))
+    }
+
+    /// The length for which the matrix of a step is assembled.
+    pub fn matrix_length(&self, step: Step) -> f64 {
+        match self {
+            Self::LaggedEuler(_) => step.length,
+            Self::Implicit(scheme) => scheme.matrix_length(step),
+        }
+    }
+
+    /// The same for a step after others of its length.
+    pub fn steady_length(&self, length: f64) -> f64 {
+        self.matrix_length(Step { time: 0.0, length, previous_length: length })
+    }
+
+    /// Keeps what the step starts from, and adds its known forces to `forces` (with ghosts).
+    pub fn start<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        forces: &mut [f64],
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(scheme) => scheme.start(body, state, step, forces),
+            Self::Implicit(scheme) => scheme.start(body, state, step, forces),
+        }
+    }
+
+    /// Corrects contacts that are prepared for the step for the blend from which it starts.
+    pub fn prepare_contacts<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => Ok(()),
+            Self::Implicit(scheme) => scheme.prepare_contacts(body, state, step),
+        }
+    }
+
+    /// Where the displacement starts, for cells that flow at the end of the step.
+    pub fn flow_start(&self) -> Option<FlowStart<'_>> {
+        match self {
+            Self::LaggedEuler(_) => None,
+            Self::Implicit(scheme) => Some(scheme.flow_start()),
+        }
+    }
+
+    /// The residual norm in N that rounding errors of the forces make. Collective.
+    pub fn rounding(&self, session: &Session) -> f64 {
+        match self {
+            Self::LaggedEuler(_) => 0.0,
+            Self::Implicit(scheme) => scheme.rounding(session),
+        }
+    }
+
+    /// Writes displacement, trial histories and energies of a solved step before it is committed. Collective.
+    pub fn finish<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        solved: &mut DistributedVector,
+        step: Step,
+    ) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => Ok(()),
+            Self::Implicit(scheme) => scheme.finish(body, state, solved, step),
+        }
+    }
+
+    /// Commits the solved velocity to the state. Collective.
+    pub fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
+        match self {
+            Self::LaggedEuler(_) => state.commit(solved, step.time, step.length),
+            Self::Implicit(scheme) => scheme.commit(state, solved, step),
+        }
+    }
+
+    /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks.
+    /// Collective.
+    pub fn energy<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<(Energy, Peaks)> {
+        match self {
+            Self::LaggedEuler(scheme) => scheme.energy(session, body, state, step),
+            Self::Implicit(scheme) => scheme.energy(session, body, state, step),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The scheme of Wang and Cheng (2022), (24)-(25): backward difference for inertia, implicit viscosity and contact,
+//! elastic and viscoplastic stress from the step before.
+//!
+//! ```text
+//! H_n = H_{n-1} + k G(s_{n-1}),   s_n = E e(u_{n-1}) + H_n
+//! (1/k) M (v_n - v_{n-1}) + A v_n + C(v_n) + B^T s_n = f_n
+//! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
+//! ```
+
+use super::{contacts::released_by_contact, outcome::over_ranks};
+use crate::{
+    error::{Error, Result},
+    fem::{
+        body::Body,
+        effect::{Energy, Peaks, Step},
+        state::State,
+    },
+    parallel::session::Session,
+};
+
+/// Energies that the start of a step adds to its balance.
+#[derive(Debug, Default)]
+pub(super) struct LaggedEuler {
+    explicit: Energy,
+}
+
+/// Refuses a step that is longer than explicit flow allows at the stresses for which forces were just added, if that depends on
+/// them. Collective.
+pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
+    session: &Session,
+    body: &mut Body<D, S>,
+    step: Step,
+) -> Result<()> {
+    let Some(mine) = body.take_flow_step_bound() else { return Ok(()) };
+    let [least] = session.largest([-mine]).map(|bound| -bound);
+    if step.length <= least {
+        return Ok(());
+    }
+    Err(Error::Failed(format!(
+        "the step of {} s to t = {} s is beyond {least:.4e} s, where explicit viscoplastic flow makes errors grow: the rate of a power law \
+         rises with the overstress, and this is the bound at the largest that occurs; take a shorter [time] step, \
+         scheme = \"implicit_euler\", or accept it with [solver] accept = [\"explicit_stability\"]",
+        step.length, step.time
+    )))
+}
+
+impl LaggedEuler {
+    /// Adds `M v_{n-1} / k - B^T s_n`.
+    pub fn start<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+        forces: &mut [f64],
+    ) -> Result<()> {
+        self.explicit = body.add_explicit_forces(state, step, forces)?;
+        Ok(())
+    }
+
+    pub fn energy<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<(Energy, Peaks)> {
+        let (mut energy, peaks) = body.energy(state, step)?;
+        energy += self.explicit;
+        released_by_contact(body, state, step, &mut energy)?;
+        Ok(over_ranks(session, energy, peaks))
+    }
+}

@@ -1,0 +1,220 @@
+//! Which Krylov method and preconditioner solve with the constant matrix.
+
+use crate::{
+    error::Result,
+    linear_algebra::petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
+};
+
+pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner};
+
+/// How the equations of a step are solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolverSettings {
+    /// Residual norm relative to the norm of the right-hand side.
+    pub tolerance: f64,
+    /// Largest scaled distance to a contact graph.
+    pub inclusion_tolerance: f64,
+    /// The method for steps with contact.
+    pub method: Method,
+    /// The preconditioner.
+    pub preconditioner: Preconditioner,
+    /// The precision of factors that steps with contact are solved with.
+    pub factor_precision: FactorPrecision,
+    /// Newton iterations after which a step has failed.
+    pub newton_iterations: usize,
+    /// Steps that one matrix is for, as far as is known.
+    pub steps: u64,
+    /// Where the pressure that friction bounds follow is found.
+    pub friction: FrictionIteration,
+}
+
+/// The sizes by which a preconditioner is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProblemSize {
+    /// Dimension of the space.
+    pub dimension: usize,
+    /// Velocity components over all ranks.
+    pub unknowns: usize,
+    /// Processes.
+    pub ranks: usize,
+    /// Steps that one matrix is for, as far as is known.
+    pub steps: u64,
+    /// Whether there is contact.
+    pub contact: bool,
+    /// Whether there is friction.
+    pub friction: bool,
+    /// The precision of factors that is asked for.
+    pub precision: FactorPrecision,
+}
+
+/// Bytes of a factor beyond which it is made on request only.
+const LARGEST_FACTOR: f64 = 4e9;
+/// Most unknowns whose matrix every rank factors for itself.
+const REDUNDANT: usize = 50_000;
+/// Krylov iterations after which a linear solve has failed.
+pub(super) const LINEAR_ITERATIONS: usize = 2_000;
+
+impl Preconditioner {
+    /// Replaces `Auto` by what takes less time for this problem, and says why.
+    pub fn resolve(self, problem: ProblemSize) -> (Self, String) {
+        let (chosen, why) = self.choose(problem);
+        let single = chosen == Self::Cholesky && problem.factor_precision() == Precision::Single;
+        (chosen, if single { format!("{why}; factors in single precision") } else { why })
+    }
+
+    fn choose(self, problem: ProblemSize) -> (Self, String) {
+        if self != Self::Auto {
+            return (self, "[solver] preconditioner asks for it".into());
+        }
+        let memory = problem.cost(Self::Cholesky).memory;
+        if problem.ranks > 1 && problem.unknowns > REDUNDANT {
+            let why = format!(
+                "above {REDUNDANT} velocity components several ranks don't factor all of the matrix each"
+            );
+            return (Self::Gamg, why);
+        }
+        if memory > LARGEST_FACTOR {
+            return (Self::Gamg, format!("a factor would take some {:.0} GB", memory / 1e9));
+        }
+        let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| problem.seconds(which));
+        let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
+        let why = format!(
+            "{} steps a matrix take some {} by a factorisation, {} by multigrid",
+            problem.steps,
+            seconds(factored),
+            seconds(multigrid)
+        );
+        (chosen, why)
+    }
+
+    /// Whether every rank factors the whole matrix for itself.
+    pub fn is_redundant(self, ranks: usize, unknowns: usize) -> bool {
+        matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
+    }
+
+    /// Iterations that cost as much as making it anew; in 3D that never pays (measured, see docs/contact-preconditioner.md).
+    pub(super) fn refresh_threshold(self, dimension: usize) -> usize {
+        match self {
+            _ if dimension == 3 => usize::MAX,
+            Self::Auto | Self::Cholesky => 5,
+            Self::Gamg | Self::Boomeramg => 40,
+        }
+    }
+
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Cholesky => "cholesky",
+            Self::Gamg => "gamg",
+            Self::Boomeramg => "boomeramg",
+        }
+    }
+
+    /// Sets the method and the preconditioner; PETSc options that the user gave stay.
+    ///
+    /// Cholesky of a small matrix is done by CHOLMOD on every rank at once: MUMPS on several ranks sums in the order in
+    /// which messages arrive, so that no two runs agree to the last bit. It is used where the matrix is too large for that.
+    /// The faster way to GAMG's coarse matrices sums so, too, as soon as a rank has two neighbours, and is not used then.
+    pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
+        ksp.set_method("cg")?;
+        match self {
+            Self::Auto | Self::Cholesky if ranks == 1 => ksp.set_preconditioner("cholesky", Some("cholmod")),
+            Self::Auto | Self::Cholesky if self.is_redundant(ranks, unknowns) => {
+                ksp.set_preconditioner("redundant", None)?;
+                set_default_option("redundant_ksp_type", "preonly")?;
+                set_default_option("redundant_pc_type", "cholesky")?;
+                set_default_option("redundant_pc_factor_mat_solver_type", "cholmod")
+            }
+            Self::Auto | Self::Cholesky => {
+                require(
+                    HAS_MUMPS,
+                    "[solver] preconditioner = \"cholesky\" of so many unknowns on several ranks",
+                    "MUMPS",
+                    "use \"gamg\", or one rank",
+                )?;
+                ksp.set_preconditioner("cholesky", Some("mumps"))
+            }
+            Self::Gamg => {
+                ksp.set_preconditioner("gamg", None)?;
+                if ranks > 2 {
+                    set_default_option("matptap_via", "allatonce")?;
+                }
+                set_default_option("pc_gamg_threshold", "0.01")?;
+                set_default_option("pc_gamg_agg_nsmooths", "1")?;
+                set_default_option("pc_gamg_reuse_interpolation", "true")?;
+                set_default_option("mg_levels_ksp_type", "chebyshev")?;
+                set_default_option("mg_levels_ksp_max_it", "2")?;
+                set_default_option("mg_levels_pc_type", "jacobi")
+            }
+            Self::Boomeramg => {
+                require(HAS_HYPRE, "[solver] preconditioner = \"boomeramg\"", "hypre", "use \"gamg\"")?;
+                ksp.set_preconditioner("hypre", None)?;
+                set_default_option("pc_hypre_type", "boomeramg")?;
+                set_default_option("pc_hypre_boomeramg_strong_threshold", "0.5")?;
+                set_default_option("pc_hypre_boomeramg_coarsen_type", "HMIS")?;
+                set_default_option("pc_hypre_boomeramg_interp_type", "ext+i")?;
+                set_default_option("pc_hypre_boomeramg_P_max", "4")?;
+                set_default_option("pc_hypre_boomeramg_relax_type_all", "Chebyshev")
+            }
+        }
+    }
+}
+
+fn seconds(time: f64) -> String {
+    let digits = if time < 0.1 { 3 } else { usize::from(time < 10.0) };
+    format!("{time:.digits$} s")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> ProblemSize {
+        let precision = FactorPrecision::Auto;
+        ProblemSize { dimension, unknowns, ranks, steps, contact: true, friction: false, precision }
+    }
+
+    fn chosen(problem: ProblemSize) -> Preconditioner {
+        Preconditioner::Auto.resolve(problem).0
+    }
+
+    #[test]
+    fn many_steps_pay_for_larger_factors() {
+        assert_eq!(chosen(problem(2, 500_000, 1, 64)), Preconditioner::Cholesky);
+        assert_eq!(chosen(problem(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
+        assert_eq!(chosen(problem(3, 100_000, 1, 1)), Preconditioner::Gamg);
+        assert_eq!(chosen(problem(3, 1_000_000, 1, 1_000_000)), Preconditioner::Gamg);
+    }
+
+    #[test]
+    fn factors_in_space_are_in_single_precision_where_few_steps_share_them() {
+        let precision = |problem: ProblemSize| problem.factor_precision();
+        assert_eq!(precision(problem(3, 100_000, 1, 16)), Precision::Single);
+        assert_eq!(precision(problem(3, 100_000, 1, 1000)), Precision::Double);
+        assert_eq!(precision(problem(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
+        assert_eq!(precision(problem(2, 500_000, 1, 1)), Precision::Double);
+        assert_eq!(precision(ProblemSize { contact: false, ..problem(3, 100_000, 1, 1) }), Precision::Double);
+        let asked = |steps| ProblemSize { precision: FactorPrecision::Single, ..problem(2, 1_000, 1, steps) };
+        assert_eq!(precision(asked(1000)), Precision::Single);
+        let (_, why) = Preconditioner::Cholesky.resolve(asked(1));
+        assert!(why.ends_with("; factors in single precision"), "{why}");
+    }
+
+    #[test]
+    fn friction_is_dear_for_multigrid() {
+        let gliding = problem(3, 100_000, 1, 4);
+        assert_eq!(chosen(ProblemSize { friction: true, ..gliding }), Preconditioner::Cholesky);
+    }
+
+    #[test]
+    fn ranks_factor_small_matrices_each_for_itself() {
+        assert_eq!(chosen(problem(2, 500_000, 2, 64)), Preconditioner::Gamg);
+        assert_eq!(chosen(problem(2, 40_000, 2, 64)), Preconditioner::Cholesky);
+        for steps in [1, 8, 1000] {
+            assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
+        }
+        let (asked, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
+        assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
+    }
+}

@@ -1,0 +1,92 @@
+//! A step solved from other start velocities, to see whether it has other solutions.
+
+use super::{StepOutcome, contacts::restore_pressures, problem::StepProblem, step_solver::StepSolver};
+use crate::{
+    error::{Error, Result},
+    linear_algebra::petsc::DistributedVector,
+};
+
+/// Velocities differ when they do by more than this share of the larger one.
+const DIFFERENT: f64 = 1e-6;
+/// Normal velocities of all contact points alike, over the largest velocity at which a law turns a corner; every second
+/// start has them at random instead.
+const ALIKE: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
+/// Between which random ones lie.
+const RANDOM: [f64; 2] = [-1.0, 2.0];
+
+/// Solves a step from the velocity in `trial` after it was solved from so many others, leaves the new velocity there and counts
+/// the solutions that differ. Collective.
+pub(super) fn solve_and_search<const D: usize, const S: usize>(
+    solver: &mut StepSolver,
+    problem: &mut StepProblem<'_, D, S>,
+    trial: &mut DistributedVector,
+    starts: usize,
+) -> Result<StepOutcome> {
+    let session = problem.session;
+    let mut others = Vec::new();
+    let mut velocity = trial.like()?;
+    for number in 0..starts {
+        velocity.copy_from(trial)?;
+        write_start(problem, number, &mut velocity)?;
+        match session.agree(solver.solve(problem, &mut velocity)) {
+            Ok(_) if is_new(&others, &velocity)? => {
+                let mut kept = velocity.like()?;
+                kept.copy_from(&velocity)?;
+                others.push(kept);
+            }
+            Err(error) if !error.is_failure() => return Err(error.into()),
+            _ => {}
+        }
+    }
+    restore_pressures(problem.body, problem.state)?;
+    match session.agree(solver.solve(problem, trial)) {
+        Ok(outcome) => {
+            let solutions = others.len() + usize::from(is_new(&others, trial)?);
+            Ok(StepOutcome { solutions, ..outcome })
+        }
+        Err(error) if error.is_failure() => {
+            Err(Error::Failed(format!("{error}; solutions found from other starts: {}", others.len())))
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+/// Sets the velocities of contact nodes to those of the start of this number.
+fn write_start<const D: usize, const S: usize>(
+    problem: &StepProblem<'_, D, S>,
+    number: usize,
+    velocity: &mut DistributedVector,
+) -> Result<()> {
+    let mut nodal = velocity.owned_mut()?;
+    let ids = &problem.body.mesh.node_ids;
+    for contact in &problem.body.contacts {
+        let corner = contact.corner_velocity();
+        contact.start_at(|node| corner * share(number, ids[node]), &mut nodal);
+    }
+    let fixed = nodal.iter_mut().zip(&problem.body.fixed).filter(|(_, fixed)| **fixed);
+    fixed.for_each(|(value, _)| *value = 0.0);
+    Ok(())
+}
+
+/// Whether a velocity differs from all of these. Collective.
+fn is_new(found: &[DistributedVector], velocity: &DistributedVector) -> Result<bool> {
+    for other in found {
+        let mut difference = velocity.like()?;
+        difference.copy_from(velocity)?;
+        difference.add_scaled(-1.0, other)?;
+        if difference.norm()? <= DIFFERENT * f64::max(velocity.norm()?, other.norm()?) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The velocity of a node in the start of this number, the same on any number of ranks.
+fn share(number: usize, node: u32) -> f64 {
+    if number.is_multiple_of(2) {
+        return ALIKE[number / 2 % ALIKE.len()];
+    }
+    let key = [(number as u32).to_le_bytes(), node.to_le_bytes()].concat();
+    let unit = (xxhash_rust::xxh3::xxh3_64(&key) >> 11) as f64 / (1u64 << 53) as f64;
+    RANDOM[0] + (RANDOM[1] - RANDOM[0]) * unit
+}

@@ -1,0 +1,334 @@
+//! Newton's method for the contact equations of one step.
+
+use super::{
+    StepOutcome,
+    bounded::Bounded,
+    contacts::restore_pressures,
+    equations::{CellForces, ContactEquations, Effort, Scratch, cycle},
+    fallbacks::{Conditions, Fallback, Search},
+    flow::Flow,
+    linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
+    problem::{REMEDY, StepProblem, System},
+};
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{COUNTS, Contact, Energy, Peaks, PointCount},
+    },
+    linear_algebra::{
+        petsc::{DistributedVector, NonlinearOutcome, ProjectedKsp, Snes, has_option},
+        tensor::larger,
+    },
+    parallel::session::Session,
+};
+
+/// Newton's method: PETSc's solvers, work vectors and the parameters of the contact graphs.
+pub(super) struct Newton {
+    snes: Snes,
+    settings: SolverSettings,
+    /// PETSc's solver for variational inequalities, if that solves the steps.
+    pub bounded: Option<Bounded>,
+    pub linear_solver: ProjectedKsp,
+    scratch: Scratch,
+    /// Branches of all contact points at the start of the step and at its end.
+    before: Vec<u8>,
+    after: Vec<u8>,
+    /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: as stiff as the body is
+    /// against motions of its surface alone, and along the normal above twice the steepest fall. With softer ones the residual is
+    /// so steep where points change their branch that line searches fail.
+    pub scales: Vec<[f64; 2]>,
+    /// The steepest fall of each contact's friction at the pressures of the last attempt.
+    falls: Vec<f64>,
+    /// What was done for the step.
+    effort: Effort,
+    /// The velocity from which the step was started.
+    start: DistributedVector,
+    /// Whether the user chose how to search along steps.
+    chosen_search: bool,
+    /// What cells that flow need, if there are any.
+    pub flow: Option<Flow>,
+}
+
+/// Share of the friction graph's parameter that its fall may reach while a step is solved, and the share that it has at first.
+const STEEPEST: f64 = 0.8;
+const STEEP: f64 = 0.5;
+
+/// Linear solves stop at this share of what the step needs.
+const LINEAR_SHARE: f64 = 0.3;
+/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
+const LINEAR_REDUCTION: f64 = 1e-3;
+
+/// Fixed-point iterations after which an attempt has failed.
+const FIXED_POINTS: usize = 200;
+
+const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
+
+/// How an attempt to solve a step ended.
+struct Attempt {
+    /// Newton iterations.
+    iterations: usize,
+    /// Why it failed, if it did.
+    failure: Option<String>,
+}
+
+impl Newton {
+    /// Newton's method for unknowns laid out like `like`.
+    pub fn new<const D: usize>(
+        like: &DistributedVector,
+        contacts: &[Contact<D>],
+        linear_solver: ProjectedKsp,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        let mut snes = Snes::new("", like, D)?;
+        snes.apply_options()?;
+        Ok(Self {
+            snes,
+            settings,
+            bounded: None,
+            linear_solver,
+            scratch: Scratch::new(like, contacts)?,
+            before: Vec::new(),
+            after: Vec::new(),
+            scales: Vec::new(),
+            falls: Vec::new(),
+            effort: Effort::default(),
+            start: like.like()?,
+            chosen_search: has_option("snes_linesearch_type")?,
+            flow: None,
+        })
+    }
+
+    /// Solves a step from the velocity in `trial`, and leaves the new one there: tries one fallback after the other, then checks that
+    /// velocities and pressures lie on the contact graphs. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        write_branches(problem.body, system.converged, &mut self.before)?;
+        self.effort.restart();
+        if let Some(bounded) = &mut self.bounded {
+            let iterations = bounded.solve(problem, system, trial)?;
+            return self.check_inclusion(problem, trial, iterations);
+        }
+        let tolerance = LINEAR_SHARE * system.tolerance;
+        self.linear_solver.set_tolerances(LINEAR_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
+        self.start.copy_from(trial)?;
+        write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
+        let mut fallbacks = self.conditions(&problem.body.contacts).fallbacks();
+        let mut next = fallbacks.next();
+        let (mut iterations, mut failure) = (0, String::new());
+        loop {
+            let Some(fallback) = next else { return Err(problem.failed(&failure, REMEDY)) };
+            self.set_graph_parameters(&mut problem.body.contacts, fallback);
+            let attempt = self.attempt(problem, system, fallback, trial)?;
+            iterations += attempt.iterations;
+            if let Some(why) = attempt.failure {
+                (failure, next) = (why, fallbacks.next());
+                trial.copy_from(&self.start)?;
+                restore_pressures(problem.body, problem.state)?;
+                continue;
+            }
+            // Where the pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
+            write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
+            let mut pairs = problem.body.contacts.iter().zip(&self.falls);
+            if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
+                return self.check_inclusion(problem, trial, iterations);
+            }
+        }
+    }
+
+    fn conditions<const D: usize>(&self, contacts: &[Contact<D>]) -> Conditions {
+        let follows = |contact: &Contact<D>| contact.friction().is_some_and(|f| f.follows_pressure());
+        Conditions {
+            follows_pressure: contacts.iter().any(follows),
+            friction: self.settings.friction,
+            chosen_search: self.chosen_search,
+            interior_is_linear: self.flow.is_none() && !contacts.iter().any(Contact::needs_ghosts),
+        }
+    }
+
+    /// Sets the parameters of all graphs, those of friction for its falls.
+    fn set_graph_parameters<const D: usize>(&self, contacts: &mut [Contact<D>], fallback: Fallback) {
+        let follows = fallback.iteration == FrictionIteration::Newton;
+        for ((contact, scales), fall) in contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
+            let [normal, tangential] = scales.map(|scale| fallback.stiffer * scale);
+            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
+            contact.set_friction(tangential.max(fall / STEEP), follows);
+        }
+    }
+
+    /// Tries a fallback once. A fixed-point iteration solves with friction bounds of fixed pressures, and updates these until
+    /// the bounds of the solution solve the equations, too. Collective.
+    fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        fallback: Fallback,
+        trial: &mut DistributedVector,
+    ) -> Result<Attempt> {
+        if fallback.iteration == FrictionIteration::Newton {
+            return self.iterate(problem, system, fallback.search, trial);
+        }
+        let mut sum = 0;
+        for _ in 0..FIXED_POINTS {
+            problem.body.contacts.iter_mut().for_each(Contact::take_pressures);
+            let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
+            if failure.is_some() {
+                return Ok(Attempt { iterations: sum + iterations, failure });
+            }
+            if iterations == 0 && sum > 0 {
+                // What solves the equations of the last bounds solves those of its own.
+                return Ok(Attempt { iterations: sum, failure: None });
+            }
+            sum += iterations.max(1);
+        }
+        let failure = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
+        Ok(Attempt { iterations: sum, failure: Some(failure) })
+    }
+
+    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
+    fn iterate<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        system: System<'_>,
+        search: Search,
+        trial: &mut DistributedVector,
+    ) -> Result<Attempt> {
+        let session = problem.session;
+        {
+            let mut unknowns = trial.owned_mut()?;
+            problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
+        }
+        if !self.chosen_search {
+            self.snes.search_along_steps(search != Search::FullSteps)?;
+        }
+        self.effort.sets.clear();
+        let (cells, contacts) = problem.body.cells_and_contacts();
+        let mut cells = match (&mut self.flow, problem.flow_start) {
+            (Some(flow), Some(start)) => Some(flow.of(cells, start)),
+            _ => None,
+        };
+        let mut equations = ContactEquations {
+            matrix: system.matrix,
+            cells: cells.as_mut().map(|cells| cells as &mut dyn CellForces),
+            contacts,
+            right_hand_side: system.right_hand_side,
+            scratch: &mut self.scratch,
+            linear_solver: &mut self.linear_solver,
+            session,
+            stop_at_cycles: search == Search::FullSteps,
+            equilibrated: search == Search::Equilibrated,
+            effort: std::mem::take(&mut self.effort),
+        };
+        // Small relative to the first residual is enough: the right-hand side is next to zero where only an obstacle moves the body.
+        let tolerances = (system.tolerance, self.settings.tolerance);
+        let solved = self.snes.solve(&mut equations, trial, tolerances, self.settings.newton_iterations);
+        self.effort = equations.effort;
+        let iterations = self.effort.sets.len();
+        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+        // All ranks take the same branch, whichever of them failed.
+        let [missed] = session.largest([f64::from(u8::from(missed))]);
+        let failure = if missed == 0.0 {
+            None
+        } else {
+            match session.agree(solved) {
+                Ok(outcome) => Some(explain(&outcome, &self.effort)),
+                Err(error) if error.is_failure() => Some(error.to_string()),
+                Err(error) => return Err(error.into()),
+            }
+        };
+        if search == Search::Equilibrated {
+            trial.copy_from(&self.scratch.velocity)?;
+        } else {
+            let mut velocity = trial.owned_mut()?;
+            problem.body.contacts.iter_mut().for_each(|contact| contact.map(&mut velocity));
+        }
+        Ok(Attempt { iterations, failure })
+    }
+
+    /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and sums up what the step took.
+    /// Collective.
+    fn check_inclusion<const D: usize, const S: usize>(
+        &mut self,
+        problem: &StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+        newton_iterations: usize,
+    ) -> Result<StepOutcome> {
+        let (session, body) = (problem.session, &*problem.body);
+        trial.update_ghosts()?;
+        write_branches(body, trial, &mut self.after)?;
+        let changes = self.before.iter().zip(&self.after).filter(|(a, b)| a != b).count();
+        let inclusion = self.inclusion_residual(session, body, trial)?;
+        if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
+            let found = format!("velocity and pressure are {inclusion:.1e} off the contact graph");
+            return Err(problem.failed(&found, INCLUSION_REMEDY));
+        }
+        let velocity = trial.local()?;
+        let mut points = [0.0; COUNTS];
+        for contact in &body.contacts {
+            let counts = contact.count(&velocity).to_array();
+            points.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+        Ok(StepOutcome {
+            newton_iterations,
+            linear_iterations: self.effort.linear_iterations,
+            active_changes: session.total(changes),
+            points: PointCount::from_array(session.sum(points)),
+            indefinite_solves: self.effort.indefinite,
+            inclusion_residual: inclusion,
+            solutions: 0,
+            landed_on: None,
+            energy: Energy::default(),
+            peaks: Peaks::default(),
+        })
+    }
+
+    /// The largest of all contacts over all ranks. Collective.
+    fn inclusion_residual<const D: usize, const S: usize>(
+        &self,
+        session: &Session,
+        body: &Body<D, S>,
+        velocity: &DistributedVector,
+    ) -> Result<f64> {
+        let residual = self.bounded.as_ref().map_or(self.snes.residual(), Bounded::residual);
+        let (velocity, residual) = (velocity.local()?, residual.owned()?);
+        let mut largest = 0.0;
+        for contact in &body.contacts {
+            let range = session.largest(contact.range(&velocity));
+            let distance = contact.inclusion_residual(&velocity, &residual, range);
+            largest = larger(largest, distance);
+        }
+        Ok(session.largest([largest])[0])
+    }
+}
+
+/// Why Newton's method failed, in words.
+fn explain(outcome: &NonlinearOutcome, effort: &Effort) -> String {
+    let words = outcome.words().to_owned();
+    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
+}
+
+/// Writes the steepest fall of each contact's friction at the pressures that its bounds follow, over all ranks. Collective.
+fn write_largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
+    let falls = |contact: &Contact<D>| match contact.friction() {
+        Some(law) if law.steepest_fall() > 0.0 => session.largest([contact.steepest_friction_fall()])[0],
+        _ => 0.0,
+    };
+    out.clear();
+    out.extend(contacts.iter().map(falls));
+}
+
+/// Writes the branches of all contact points at velocities with ghosts.
+fn write_branches<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    velocity: &DistributedVector,
+    out: &mut Vec<u8>,
+) -> Result<()> {
+    let velocity = velocity.local()?;
+    out.clear();
+    body.contacts.iter().for_each(|contact| contact.branches(&velocity, out));
+    Ok(())
+}

@@ -1,0 +1,37 @@
+//! Numbers of iterations, contact points and energies of a step.
+
+use crate::{
+    fem::effect::{Energy, Peaks, PointCount},
+    parallel::session::Session,
+};
+
+/// What a step cost and how well it was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepOutcome {
+    /// Newton iterations; 0 where a step is linear.
+    pub newton_iterations: usize,
+    /// Krylov iterations.
+    pub linear_iterations: usize,
+    /// Contact points that changed their branch, over all ranks.
+    pub active_changes: usize,
+    /// Contact points by what happens there, over all ranks.
+    pub points: PointCount,
+    /// Linear systems that were not positive definite, so that GMRES had to solve them.
+    pub indefinite_solves: usize,
+    /// Largest scaled distance to the contact graphs.
+    pub inclusion_residual: f64,
+    /// Different solutions that were found, where others were searched for; else 0.
+    pub solutions: usize,
+    /// What the step landed on, if the log reports it.
+    pub landed_on: Option<&'static str>,
+    /// Energies of the step, over all ranks.
+    pub energy: Energy,
+    /// Largest stress and strain at its end, over all ranks.
+    pub peaks: Peaks,
+}
+
+/// Sums and largest values over all ranks. Collective.
+pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
+    let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);
+    (Energy::from_array(session.sum(energy.to_array())), Peaks { von_mises, strain })
+}

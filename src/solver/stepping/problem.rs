@@ -1,0 +1,64 @@
+//! A step to be solved.
+
+use super::{equations::StepMatrix, flow::FlowStart};
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::Step, state::State},
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+
+/// A step whose right-hand side is known and whose contacts are prepared.
+pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
+    /// All ranks.
+    pub session: &'a Session,
+    /// The body, in whose contacts the pressures change.
+    pub body: &'a mut Body<D, S>,
+    /// The converged state that the step starts from.
+    pub state: &'a State,
+    pub step: Step,
+    /// The right-hand side in N.
+    pub forces: &'a DistributedVector,
+    /// The residual norm in N that rounding errors of the forces make.
+    pub rounding: f64,
+    /// Where the displacement starts, if stresses are those at the end of the step.
+    pub flow_start: Option<FlowStart<'a>>,
+}
+
+/// The equations `K v + C(v) = b` that Newton's method solves: of the whole body, or of its contact nodes alone.
+#[derive(Clone, Copy)]
+pub(super) struct System<'a> {
+    /// `K`.
+    pub matrix: &'a dyn StepMatrix,
+    /// `b` in N.
+    pub right_hand_side: &'a DistributedVector,
+    /// The residual norm in N at which they are solved.
+    pub tolerance: f64,
+    /// The velocity of the converged state.
+    pub converged: &'a DistributedVector,
+}
+
+impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
+    /// That the step failed, why, and what to do.
+    pub fn failed(&self, why: &str, remedy: &str) -> Error {
+        let Step { time, length, .. } = self.step;
+        Error::Failed(format!("step to t = {time:.6e} s (length {length:.3e} s) failed: {why}; {remedy}"))
+    }
+}
+
+impl System<'_> {
+    /// Writes `b - K v`. Collective.
+    pub fn write_residual(
+        &self,
+        velocity: &DistributedVector,
+        residual: &mut DistributedVector,
+    ) -> Result<()> {
+        self.matrix.multiply(velocity, residual)?;
+        residual.scale(-1.0)?;
+        residual.add_scaled(1.0, self.right_hand_side)
+    }
+}
+
+/// What to do where a solver does not converge.
+pub(super) const REMEDY: &str =
+    "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";

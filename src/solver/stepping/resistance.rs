@@ -1,0 +1,72 @@
+//! What resists motions of the contact boundaries alone.
+
+use super::equations::StepMatrix;
+use crate::{
+    error::Result, fem::effect::Contact, linear_algebra::petsc::DistributedVector, parallel::session::Session,
+};
+
+/// What resists a motion of each contact's boundary alone, along the normal and in sliding, in Pa s/m; along the normal no less
+/// than twice the law's steepest fall. `power` gives `x . K x` of a vector laid out like `like`, as velocities of the body are.
+/// Collective.
+pub(super) fn resistances<const D: usize>(
+    session: &Session,
+    contacts: &[Contact<D>],
+    like: &DistributedVector,
+    mut power: impl FnMut(&DistributedVector) -> Result<f64>,
+) -> Result<Vec<[f64; 2]>> {
+    let mut motion = like.like()?;
+    let mut against = |motion: &DistributedVector, square: f64| -> Result<f64> {
+        let [square] = session.sum([square]);
+        Ok(positive_or_one(power(motion)? / square))
+    };
+    let mut resistance = |contact: &Contact<D>| -> Result<[f64; 2]> {
+        motion.fill(0.0)?;
+        contact.add_normals(&mut motion.owned_mut()?);
+        let square = contact.normal_square(&motion.owned()?);
+        let normal = against(&motion, square)?.max(2.0 * contact.law.monotonicity_constant());
+        if contact.friction().is_none() {
+            return Ok([normal; 2]);
+        }
+        motion.fill(0.0)?;
+        contact.add_unit_sliding(&mut motion.owned_mut()?);
+        let square = contact.tangential_square(&motion.owned()?);
+        Ok([normal, against(&motion, square)?])
+    };
+    contacts.iter().map(&mut resistance).collect()
+}
+
+/// The same for the matrix of the whole body. Collective.
+pub(super) fn resistances_of_body<const D: usize>(
+    session: &Session,
+    contacts: &[Contact<D>],
+    like: &DistributedVector,
+    matrix: &dyn StepMatrix,
+) -> Result<Vec<[f64; 2]>> {
+    let mut product = like.like()?;
+    resistances(session, contacts, like, |motion| {
+        matrix.multiply(motion, &mut product)?;
+        motion.dot(&product)
+    })
+}
+
+/// Sets the reference values of the contacts from the matrix of the whole body, however steps are solved. Collective.
+pub(super) fn set_reference_values<const D: usize>(
+    session: &Session,
+    contacts: &mut [Contact<D>],
+    like: &DistributedVector,
+    matrix: &dyn StepMatrix,
+) -> Result<()> {
+    if contacts.is_empty() {
+        return Ok(());
+    }
+    let all = resistances_of_body(session, contacts, like, matrix)?;
+    for (contact, resistance) in contacts.iter_mut().zip(all) {
+        contact.reference.resistance = resistance;
+        [contact.reference.area] = session.sum([contact.area()]);
+    }
+    Ok(())
+}
+
+fn positive_or_one(stiffness: f64) -> f64 {
+    if stiffness.is_finite() && stiffness > 0.0 { stiffness } else { 1.0 }
+}

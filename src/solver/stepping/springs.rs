@@ -1,0 +1,111 @@
+//! Springs on contact nodes, for factors and preconditioners of bodies that contact alone holds.
+//!
+//! Where neither supports nor inertia resist a rigid motion, the matrix `K` of a step is singular, or so nearly that its factor
+//! is made of rounding errors. `K + B` is not, with soft springs `B` along the motions on which contact laws act. It is what is factored, or
+//! what preconditioners are made of; the equations of the step keep `K`.
+
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::contact_nodes},
+    linear_algebra::petsc::BlockRows,
+    mesh::free_motions,
+    parallel::{agreement::Agreed, session::Session},
+};
+
+/// Stiffness of a spring over that of the matrix at its node.
+const SOFTNESS: f64 = 1e-4;
+/// The resistance of a whole body against a translation, over that of one of its nodes, below which it does not count.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// The springs of a body.
+#[derive(Default)]
+pub(super) struct Springs {
+    /// The rigid motions that no support holds, in words, body by body; `None` until they are needed.
+    free: Option<Vec<String>>,
+}
+
+/// The rows of the matrix `K + B` on this rank.
+pub(super) struct SprungRows {
+    pub rows: BlockRows,
+    /// The stiffness of the springs `B` in N s/m, of every motion of the contact nodes of this rank; `None` on all ranks where no body
+    /// needs any.
+    pub springs: Option<Vec<f64>>,
+}
+
+impl Springs {
+    /// Adds to the failure of a step which motions contact has to hold, if there are any.
+    pub fn explain(&self, failure: Agreed) -> Error {
+        match &self.free {
+            Some(free) if failure.is_failure() && !free.is_empty() => Error::Failed(format!(
+                "{failure}; contact and friction alone hold these motions, and can't where the loads make a body slide away or \
+                 lift off: {}; add supports, give a density that counts, or change the loads",
+                free.join("; ")
+            )),
+            _ => failure.into(),
+        }
+    }
+
+    /// The rows of the matrix of steps of this length in s with the springs. Collective.
+    pub fn rows<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        length: f64,
+    ) -> Result<SprungRows> {
+        let rows = body.matrix(session, length)?;
+        self.add(session, body, rows)
+    }
+
+    /// Adds the springs to the rows of a matrix. Collective.
+    pub fn add<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        mut rows: BlockRows,
+    ) -> Result<SprungRows> {
+        // Points of Gauss quadrature may touch nodes of other ranks.
+        let nodes = contact_nodes(&body.contacts, &body.fixed);
+        let nodes = nodes.iter().filter(|contact| contact.node < body.mesh.owned);
+        let motions: Vec<(usize, [f64; D])> =
+            nodes.flat_map(|c| c.frame[..c.seen].iter().map(|motion| (c.node, *motion))).collect();
+        let total = body.mesh.total_nodes as f64;
+        let first = body.mesh.first_node;
+        let stiffness = |&(node, motion): &(usize, [f64; D])| {
+            let range = rows.offsets[node]..rows.offsets[node + 1];
+            let (mut own, mut together) = (0.0, 0.0);
+            for at in range {
+                let share = form::<D>(&rows.values[at * D * D..][..D * D], &motion);
+                together += share;
+                if rows.columns[at] as usize == first + node {
+                    own = share;
+                }
+            }
+            if total * together < NEGLIGIBLE * own { SOFTNESS * own } else { 0.0 }
+        };
+        let springs: Vec<f64> = motions.iter().map(stiffness).collect();
+        if session.total(springs.iter().filter(|spring| **spring > 0.0).count()) == 0 {
+            return Ok(SprungRows { rows, springs: None });
+        }
+        if self.free.is_none() {
+            self.free = Some(free_motions(session, &body.mesh, body.fixed.as_chunks().0, &[])?);
+        }
+        if self.free.as_ref().is_none_or(Vec::is_empty) {
+            return Ok(SprungRows { rows, springs: None });
+        }
+        for ((node, motion), spring) in motions.iter().zip(&springs) {
+            let range = rows.offsets[*node]..rows.offsets[node + 1];
+            let Some(at) = range.clone().find(|&at| rows.columns[at] as usize == first + node) else {
+                continue;
+            };
+            for (k, value) in rows.values[at * D * D..][..D * D].iter_mut().enumerate() {
+                *value += spring * motion[k / D] * motion[k % D];
+            }
+        }
+        Ok(SprungRows { rows, springs: Some(springs) })
+    }
+}
+
+/// `m . (B m)` with a block `B`.
+fn form<const D: usize>(block: &[f64], motion: &[f64; D]) -> f64 {
+    block.iter().enumerate().map(|(k, value)| motion[k / D] * value * motion[k % D]).sum()
+}

@@ -1,0 +1,116 @@
+//! The error of a step, for steps that are chosen by it.
+
+use super::flow::FlowStart;
+use crate::{
+    error::Result,
+    fem::{
+        body::Body,
+        effect::{Curvature, Form, Step},
+        state::State,
+    },
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+
+/// Share of the root of the kinetic energy below which that of the stress is rounding, and the other way round.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// Norms of velocity and stress.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Norms {
+    /// Of the velocity: of the mass, or of the viscosity without inertia.
+    pub velocity: f64,
+    /// Of the stress: of the compliance.
+    pub stress: f64,
+}
+
+/// The error of a step with the sizes that it is relative to.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepError {
+    /// The error.
+    pub error: Norms,
+    /// Velocity and stress at the end of the step.
+    pub size: Norms,
+    /// A velocity below this multiple of the stress is rounding, and the other way round.
+    pub negligible: Norms,
+}
+
+/// Room for nodal values with ghosts.
+#[derive(Debug, Default)]
+pub(super) struct ErrorWorkspace {
+    curved: Vec<f64>,
+    strained: Vec<f64>,
+    end: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+/// A step that was solved and not yet committed.
+#[derive(Clone, Copy)]
+pub(super) struct SolvedStep<'a> {
+    pub step: Step,
+    /// The velocity at its end, with ghosts.
+    pub velocity: &'a DistributedVector,
+    /// Where the displacement starts, if stresses are those at the end of the step.
+    pub flow_start: Option<FlowStart<'a>>,
+    /// In a step of second order, the length in s by which a velocity counts in the displacement.
+    pub second_order_length: Option<f64>,
+}
+
+impl ErrorWorkspace {
+    /// The error of a step whose trial histories are those of its solution. Collective.
+    pub fn error<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        solved: SolvedStep<'_>,
+    ) -> Result<StepError> {
+        let SolvedStep { step, velocity, flow_start, second_order_length } = solved;
+        let curvature = Curvature::of(step);
+        let trial = velocity.local()?;
+        let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
+        let values = trial.iter().zip(now.iter().zip(before.iter()));
+        let Self { curved, strained, end, forces } = self;
+        write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
+        // Displacements, and stresses with them, are one order better in the formula of second order.
+        let length = if let Some(length) = second_order_length {
+            strained.clone_from(curved);
+            length
+        } else {
+            write(strained, values.map(|(t, (v, _))| 0.5 * (t - v)));
+            step.length
+        };
+        let histories = {
+            let (start, length) =
+                flow_start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
+            write(end, start.local()?.iter().zip(trial.iter()).map(|(u, v)| u + length * v));
+            body.stress_error(curvature, end)
+        };
+        let form = [Form::Mass, Form::Viscosity].into_iter().find(|form| body.has_form(*form));
+        let mut square = |form: Option<Form>, x: &[f64]| {
+            let Some(form) = form else { return 0.0 };
+            write(forces, x.iter().map(|_| 0.0));
+            body.add_form(form, x, forces);
+            forces.iter().zip(x).map(|(f, x)| f * x).sum::<f64>()
+        };
+        let elastic = body.has_form(Form::Elasticity).then_some(Form::Elasticity);
+        let strains = length * length * square(elastic, strained);
+        let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
+        let [velocity, stress, all_velocity, all_stress] =
+            session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
+        // With mass both are roots of energies: a body that flies without stress has some from rounding, and one that is held has a
+        // velocity from rounding. The square of a velocity in the norm of the viscosity is a power.
+        let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };
+        Ok(StepError {
+            error: Norms { velocity, stress },
+            size: Norms { velocity: all_velocity, stress: all_stress },
+            negligible: Norms { velocity: NEGLIGIBLE / unit, stress: NEGLIGIBLE * unit },
+        })
+    }
+}
+
+/// Writes these values in place of the ones before.
+fn write(target: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
+    target.clear();
+    target.extend(values);
+}

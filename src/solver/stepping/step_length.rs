@@ -1,0 +1,114 @@
+//! Where a step ends.
+
+use crate::fem::{effect::Step, state::State};
+
+/// A step that ends within this share of a step of the end ends there.
+pub const SNAP: f64 = 1e-6;
+
+/// A time that a step must not go beyond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Landing {
+    /// In s.
+    pub time: f64,
+    /// What is there, if the log reports it.
+    pub what: Option<&'static str>,
+}
+
+/// The times at which steps of a run have to end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Landings {
+    /// Those that the job names, in s, sorted.
+    pub times: Vec<f64>,
+    /// Every multiple of this time in s.
+    pub interval: Option<f64>,
+    /// The end of the run in s.
+    pub end: f64,
+}
+
+impl Landings {
+    /// The first one after `time`.
+    pub fn next(&self, time: f64) -> Landing {
+        let after = time * (1.0 + 1e-12);
+        let multiple = |interval: f64| interval * ((after / interval).floor() + 1.0);
+        let last = self.interval.map_or(self.end, multiple).min(self.end);
+        match self.times.iter().find(|landing| **landing > after && **landing <= last) {
+            Some(landing) => Landing { time: *landing, what: Some("[time] land_on") },
+            None => Landing { time: last, what: None },
+        }
+    }
+
+    /// Fixed steps of this length from `time` to the end.
+    pub fn steps_after(&self, time: f64, length: f64) -> u64 {
+        let landings = self.times.iter().copied().filter(|landing| *landing > time && *landing < self.end);
+        let (mut from, mut steps) = (time, 0);
+        for to in landings.chain([self.end]) {
+            steps += ((to - from) / length - SNAP).ceil().max(0.0) as u64;
+            from = to;
+        }
+        steps
+    }
+}
+
+/// The step of `length` from here, cut or stretched to end at `end` where that is near.
+pub fn next_step(state: &State, length: f64, end: f64) -> Step {
+    let previous_length = state.step_length;
+    let time = on_the_grid(state.time + length, length);
+    if (end - time).abs() <= SNAP * length {
+        Step { time: end, length, previous_length }
+    } else if time > end {
+        Step { time: end, length: end - state.time, previous_length }
+    } else {
+        Step { time, length, previous_length }
+    }
+}
+
+/// The multiple of `length` that is meant by a time, if one is: sums of millions of lengths would drift away from it.
+fn on_the_grid(time: f64, length: f64) -> f64 {
+    let multiple = (time / length).round() * length;
+    if (time - multiple).abs() <= SNAP * length { multiple } else { time }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_million_steps_end_where_they_should() {
+        let (length, mut time) = (1e-3, 0.0);
+        for _ in 0..1_000_000 {
+            time = on_the_grid(time + length, length);
+        }
+        assert_eq!(time, 1000.0);
+    }
+
+    #[test]
+    fn landings_come_in_their_order_and_cut_fixed_steps() {
+        let landings = Landings { times: vec![0.25, 0.7], interval: None, end: 1.0 };
+        let times = |landings: &Landings| {
+            let mut times = vec![0.0];
+            while times[times.len() - 1] < landings.end {
+                times.push(landings.next(times[times.len() - 1]).time);
+            }
+            times
+        };
+        assert_eq!(times(&landings), [0.0, 0.25, 0.7, 1.0]);
+        assert_eq!(landings.next(0.0).what, Some("[time] land_on"));
+        assert_eq!(landings.next(0.7).what, None);
+        // 0.1, 0.2, 0.25; 0.35 to 0.65, 0.7; 0.8 to 1.
+        assert_eq!(landings.steps_after(0.0, 0.1), 3 + 5 + 3);
+        assert_eq!(landings.steps_after(0.7, 0.1), 3);
+        let with_output = Landings { interval: Some(0.5), ..landings };
+        assert_eq!(times(&with_output), [0.0, 0.25, 0.5, 0.7, 1.0]);
+        let named = |times: Vec<f64>, interval| Landings { times, interval, end: 1.0 }.next(0.4).what;
+        assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
+        assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
+        let none = Landings { times: Vec::new(), interval: None, end: 1.0 };
+        assert_eq!((none.next(0.3).time, none.steps_after(0.0, 0.3)), (1.0, 4));
+    }
+
+    #[test]
+    fn times_between_multiples_stay_where_they_are() {
+        assert_eq!(on_the_grid(0.65, 0.1), 0.65);
+        assert_eq!(on_the_grid(0.1 + 0.2, 0.1), 3.0 * 0.1);
+    }
+}

@@ -1,0 +1,401 @@
+//! The matrix of a step with its solver.
+
+use super::{
+    StepOutcome,
+    contacts::restore_pressures,
+    factor_cache::{Cached, FactorCache, Krylov},
+    linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
+    problem::{REMEDY, StepProblem, System},
+    resistance::{resistances_of_body, set_reference_values},
+    solver::Solver,
+    springs::{Springs, SprungRows},
+};
+use crate::{
+    error::{Error, Result},
+    fem::{body::Body, effect::Contact, state::State},
+    linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
+    parallel::{agreement::Agreed, session::Session},
+};
+
+/// The length of a step, and that of the steps for which its preconditioner is set up, both as matrices have them, in s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lengths {
+    pub matrix: f64,
+    pub cached: f64,
+}
+
+/// The matrix for steps of one length, and what solves with it.
+pub(super) struct StepSolver {
+    settings: SolverSettings,
+    /// Why the preconditioner is what it is.
+    reason: String,
+    /// The matrix that the preconditioner in use is of.
+    cached: Option<(f64, Matrix)>,
+    /// The matrix of steps of another length than that of the preconditioner.
+    between: Option<(f64, Matrix)>,
+    /// Norm of the matrix in use in N s/m.
+    matrix_norm: f64,
+    solver: Solver,
+    /// Whether a set-up failed, so that the linear solver in use can't be.
+    is_broken: bool,
+    /// Matrices with preconditioners that are not in use.
+    cache: Option<FactorCache>,
+    /// What keeps factors of bodies that contact alone holds from being singular.
+    springs: Springs,
+}
+
+impl StepSolver {
+    /// Chooses the solver; the matrix comes with [`StepSolver::prepare`]. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision);
+        let (preconditioner, reason) = settings.preconditioner.resolve(problem);
+        let settings = SolverSettings { preconditioner, ..settings };
+        let solver = Solver::new(session, body, &state.velocity, settings, problem.factor_precision())?;
+        Ok(Self {
+            settings,
+            reason,
+            cached: None,
+            between: None,
+            matrix_norm: 0.0,
+            solver,
+            is_broken: false,
+            cache: None,
+            springs: Springs::default(),
+        })
+    }
+
+    /// Whether steps are solved by Newton's method.
+    pub fn is_nonlinear(&self) -> bool {
+        !matches!(self.solver, Solver::Linear(_))
+    }
+
+    /// The preconditioner in use, and why it is that one.
+    pub fn preconditioner(&self) -> (Preconditioner, &str) {
+        (self.settings.preconditioner, &self.reason)
+    }
+
+    /// The precision of factors, where steps are solved on the contact alone.
+    pub fn factor_precision(&self) -> Option<Precision> {
+        match &self.solver {
+            Solver::Condensed(condensed) => Some(condensed.precision),
+            _ => None,
+        }
+    }
+
+    /// Whether the matrices are those of these lengths.
+    pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
+        let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
+        let cached = length(&self.cached);
+        cached == Some(self.cached_length(lengths))
+            && length(&self.between).or(cached) == Some(lengths.matrix)
+    }
+
+    /// Assembles the matrix of this length and sets its preconditioner up, unless they are there; says whether a
+    /// preconditioner was made. `like` is laid out as velocities are. Collective.
+    pub fn prepare<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        lengths: Lengths,
+        like: &DistributedVector,
+    ) -> Result<bool> {
+        self.between = None;
+        let length = self.cached_length(lengths);
+        let mut is_new = false;
+        if self.cached.as_ref().is_none_or(|(known, _)| *known != length) {
+            let kept = self.cache.as_mut().and_then(|cache| cache.take(length));
+            is_new = kept.is_none();
+            let (matrix, krylov) = kept.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
+            self.exchange_matrix_in_use(session, body, krylov, like)?;
+            let matrix = match matrix {
+                Some(matrix) => matrix,
+                None => {
+                    self.is_broken = true;
+                    self.set_up(session, body, length, like)?
+                }
+            };
+            self.is_broken = false;
+            self.cached = Some((length, matrix));
+        }
+        if lengths.matrix != length {
+            let rows = matrix_rows(session, body, lengths.matrix)?;
+            self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
+        }
+        self.matrix_norm = self.matrix()?.norm()?;
+        set_reference_values(session, &mut body.contacts, like, self.matrix()?)?;
+        if let (Solver::Linear(ksp), Some((_, cached))) = (&mut self.solver, &self.cached) {
+            ksp.set_matrices(self.between.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
+        }
+        Ok(is_new)
+    }
+
+    /// The length whose preconditioner is set up: a condensed matrix is of no use for another.
+    fn cached_length(&self, lengths: Lengths) -> f64 {
+        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
+    }
+
+    /// Brings another linear solver into use: `next`, or one that is not set up. The matrix in use, if there is one, goes with its
+    /// preconditioner to those that are kept; what a failed set-up left is dropped. Collective.
+    fn exchange_matrix_in_use<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        next: Option<Krylov>,
+        like: &DistributedVector,
+    ) -> Result<()> {
+        let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
+        let mut krylov = match next {
+            Some(krylov) => krylov,
+            None if self.cached.is_none() && !self.is_broken => return Ok(()),
+            None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+        };
+        krylov.exchange(&mut self.solver);
+        let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
+        let cache = match &mut self.cache {
+            Some(cache) => cache,
+            none => {
+                let bytes = 12.0 * matrix.stored_entries()?;
+                let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
+                none.insert(FactorCache::new(kept - 1))
+            }
+        };
+        cache.put(Cached { length, matrix, krylov });
+        Ok(())
+    }
+
+    /// Assembles the matrix of steps of this length in s and sets the preconditioner of the linear solver in use up with it. Collective.
+    fn set_up<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        length: f64,
+        like: &DistributedVector,
+    ) -> Result<Matrix> {
+        let rows = matrix_rows(session, body, length)?;
+        let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
+        let mut sprung = self.springs.add(session, body, rows)?;
+        if let Solver::Condensed(condensed) = &mut self.solver {
+            if condensed.prepare(session, body, sprung, &matrix, like)? {
+                if condensed.precision_in_use()? == Precision::Single {
+                    matrix.multiply_often()?;
+                }
+                return Ok(matrix);
+            }
+            self.solver = Solver::whole(session, body, like, self.settings)?;
+            sprung = self.springs.rows(session, body, length)?;
+        }
+        let SprungRows { rows, springs } = sprung;
+        // What the preconditioner is made of, if it is not the matrix itself.
+        let mut with_springs = None;
+        if springs.is_some() {
+            with_springs = Some(session.agree(Matrix::symmetric(D, &rows))?);
+        }
+        drop(rows);
+        if self.settings.preconditioner == Preconditioner::Gamg {
+            let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
+            with_springs.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
+        }
+        if self.settings.preconditioner != Preconditioner::Cholesky {
+            matrix.multiply_often()?;
+        }
+        match &mut self.solver {
+            Solver::Linear(ksp) => {
+                ksp.set_matrices(&matrix, &matrix)?;
+                session.agree(ksp.set_up())?;
+            }
+            Solver::Newton(newton) => {
+                let constant = with_springs.as_ref().unwrap_or(&matrix);
+                session.agree(newton.linear_solver.set_constant(constant))?;
+                newton.scales = resistances_of_body(session, &body.contacts, like, &matrix)?;
+            }
+            Solver::Condensed(_) => {}
+        }
+        Ok(matrix)
+    }
+
+    /// The matrix in use.
+    fn matrix(&self) -> Result<&Matrix> {
+        let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
+        self.between.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
+    }
+
+    /// `y = K x`. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.matrix()?.multiply(x, y)
+    }
+
+    /// Counts traffic from here on.
+    pub fn restart_traffic(&mut self) {
+        self.matrices().for_each(Matrix::restart_products);
+        match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.restart_traffic(),
+            Solver::Linear(ksp) => ksp.restart_applications(),
+            Solver::Newton(newton) => newton.linear_solver.restart_applications(),
+        }
+    }
+
+    /// Bytes that were moved on this rank since then, at the least; `None` where that is not counted: cells that flow, PETSc's solver
+    /// for variational inequalities, preconditioners whose size is not known.
+    pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
+        let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
+        match &mut self.solver {
+            Solver::Condensed(condensed) => Ok(Some(products + condensed.traffic())),
+            Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
+            Solver::Newton(newton) => {
+                let applications = newton.linear_solver.applications();
+                let applied = newton.linear_solver.linear_solver().bytes_applied(ranks)?;
+                Ok(applied.map(|bytes| products + applications * bytes))
+            }
+            Solver::Linear(ksp) => {
+                // PETSc multiplies as often: for the first residual, and in each iteration.
+                let (applications, applied) = (ksp.applications(), ksp.bytes_applied(ranks)?);
+                let matrix = self.matrix()?.bytes_of_a_product();
+                Ok(applied.map(|bytes| applications * (matrix + bytes)))
+            }
+        }
+    }
+
+    fn matrices(&self) -> impl Iterator<Item = &Matrix> {
+        [&self.cached, &self.between].into_iter().flatten().map(|(_, matrix)| matrix)
+    }
+
+    /// Applies the preconditioner. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.solve_linear(r, z),
+            Solver::Linear(ksp) => ksp.precondition(r, z),
+            Solver::Newton(newton) => newton.linear_solver.linear_solver().precondition(r, z),
+        }
+    }
+
+    /// Solves a step from the velocity in `trial`, and leaves the new one there. Where it fails, it is tried again with a factor in
+    /// double precision and with the tolerance that rounding errors of the solution allow. Collective.
+    pub fn solve<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<StepOutcome> {
+        let (session, state, forces) = (problem.session, problem.state, problem.forces);
+        let mut tolerance = self.tolerance(problem, trial)?;
+        let mut is_relaxed = false;
+        loop {
+            let (_, matrix) =
+                self.between.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
+                    Error::Internal("a step was taken before its matrix was assembled".into())
+                })?;
+            let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
+            let solved = match &mut self.solver {
+                Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
+                Solver::Newton(newton) => newton.solve(problem, system, trial),
+                Solver::Condensed(condensed) => condensed.solve(problem, system, trial),
+            };
+            let failure = match session.agree(solved) {
+                Err(failure) if failure.is_failure() => failure,
+                solved => return solved.map_err(|error| self.springs.explain(error)),
+            };
+            if self.factor_in_use()? == Some(Precision::Single) {
+                session.agree(self.factor_in_double(problem, trial))?;
+                continue;
+            }
+            if is_relaxed {
+                return Err(self.springs.explain(failure));
+            }
+            // The start may be much less than the solution, above all at rest.
+            let mut answer = forces.like()?;
+            self.precondition(forces, &mut answer)?;
+            let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
+            if !floor.is_finite() || floor <= tolerance {
+                return Err(self.springs.explain(failure));
+            }
+            if !self.is_nonlinear() {
+                trial.copy_from(&answer)?;
+            }
+            (tolerance, is_relaxed) = (floor, true);
+        }
+    }
+
+    /// The residual norm in N to which a step is solved; refuses forces that are not finite. Sets the reference forces of the
+    /// contacts. Collective.
+    fn tolerance<const D: usize, const S: usize>(
+        &self,
+        problem: &mut StepProblem<'_, D, S>,
+        start: &DistributedVector,
+    ) -> Result<f64> {
+        let norm = problem.forces.norm()?;
+        if !norm.is_finite() {
+            let remedy = "check loads and initial values; use smaller steps";
+            return Err(problem.failed("the forces are not finite", remedy));
+        }
+        let StepProblem { session, body, rounding, .. } = problem;
+        // The sum of the forces as if those of all unknowns were equal. At rest under steady loads the forces cancel: pressures are known
+        // no better than their rounding errors.
+        let size = norm.max(*rounding / self.settings.inclusion_tolerance);
+        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
+        body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
+        // No residual below the rounding of `K v` is asked for, however small the forces that are left; friction on a moving
+        // obstacle rounds `v` as a difference from its velocity.
+        let mut motion = start.norm()?;
+        if body.contacts.iter().any(Contact::may_drift) {
+            let mine = body.contacts.iter().map(Contact::drift_square).sum();
+            motion += session.sum([mine])[0].sqrt();
+        }
+        let product = f64::EPSILON * self.matrix_norm * motion;
+        Ok((self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(*rounding).max(product))
+    }
+
+    /// The precision of the factor in use, where steps are solved on the contact alone.
+    fn factor_in_use(&mut self) -> Result<Option<Precision>> {
+        match &mut self.solver {
+            Solver::Condensed(condensed) => condensed.precision_in_use().map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// Replaces a factor in single precision that was not enough, and takes the step back to its start. Collective.
+    fn factor_in_double<const D: usize, const S: usize>(
+        &mut self,
+        problem: &mut StepProblem<'_, D, S>,
+        trial: &mut DistributedVector,
+    ) -> Result<()> {
+        let (length, matrix) =
+            self.between.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
+        let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
+        condensed.start_again(trial)?;
+        restore_pressures(problem.body, problem.state)?;
+        condensed.precision = Precision::Double;
+        let rows = self.springs.rows(problem.session, problem.body, length)?;
+        condensed.prepare(problem.session, problem.body, rows, matrix, problem.forces)?;
+        Ok(())
+    }
+}
+
+/// Solves a step without contact and flow. Collective.
+fn solve_linear<const D: usize, const S: usize>(
+    ksp: &mut Ksp,
+    problem: &StepProblem<'_, D, S>,
+    tolerance: f64,
+    trial: &mut DistributedVector,
+) -> Result<StepOutcome> {
+    ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
+    let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
+    if !outcome.converged() {
+        return Err(problem.failed(outcome.words(), REMEDY));
+    }
+    Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
+}
+
+/// The rows of the matrix here, which PETSc can count. Collective.
+fn matrix_rows<const D: usize, const S: usize>(
+    session: &Session,
+    body: &Body<D, S>,
+    length: f64,
+) -> Result<BlockRows, Agreed> {
+    let rows = body.matrix(session, length)?;
+    session.agree(rows.check(D, body.mesh.total_nodes))?;
+    Ok(rows)
+}

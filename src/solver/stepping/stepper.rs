@@ -1,0 +1,358 @@
+//! A step as all schemes take it: matrix, right-hand side, contact, solution, commit, energy balance.
+
+use super::{
+    StepOutcome,
+    contacts::{commit_tractions, prepare_contacts},
+    factor_cache::nearest,
+    integrator::Integrator,
+    lagged_euler::refuse_fast_flow,
+    linear_solver::{Preconditioner, SolverSettings},
+    multistart::solve_and_search,
+    problem::StepProblem,
+    step_clock::{Stages, StepClock, StepTraffic},
+    step_error::{ErrorWorkspace, SolvedStep, StepError},
+    step_solver::{Lengths, StepSolver},
+};
+use crate::{
+    error::Result,
+    fem::{
+        body::{Body, PassBytes},
+        effect::Step,
+        state::State,
+    },
+    job::Scheme,
+    linear_algebra::petsc::{DistributedVector, Precision},
+    parallel::session::Session,
+};
+use std::time::Instant;
+
+/// A time scheme with its solver and work vectors.
+pub struct Stepper {
+    scheme: Scheme,
+    integrator: Integrator,
+    stages: Stages,
+    solver: StepSolver,
+    load: Option<DistributedVector>,
+    load_is_current: bool,
+    right_hand_side: DistributedVector,
+    trial: DistributedVector,
+    /// Whether the scheme has finished the step that was attempted last, so that trial histories are those of its solution.
+    is_finished: bool,
+    /// Room for the error of a step.
+    workspace: ErrorWorkspace,
+    /// Length in s of which those with preconditioners are a power of two.
+    base_length: f64,
+    /// Number of other start velocities from which steps with contact are solved to search for other solutions.
+    pub other_starts: usize,
+    /// Whether steps may be longer than explicit flow allows at the stresses that occur.
+    pub accepts_fast_flow: bool,
+    /// Preconditioners that were made.
+    pub set_ups: u64,
+    /// Seconds by phase.
+    pub clock: StepClock,
+    /// Bytes by phase.
+    pub traffic: StepTraffic,
+    passes: PassBytes,
+}
+
+impl Stepper {
+    /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
+    pub fn new<const D: usize, const S: usize>(
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        scheme: Scheme,
+        settings: SolverSettings,
+    ) -> Result<Self> {
+        Ok(Self {
+            scheme,
+            integrator: Integrator::new(scheme, state)?,
+            stages: Stages::register()?,
+            solver: StepSolver::new(session, body, state, settings)?,
+            load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
+            load_is_current: false,
+            right_hand_side: state.velocity.like()?,
+            trial: state.velocity.like()?,
+            is_finished: false,
+            workspace: ErrorWorkspace::default(),
+            base_length: 1.0,
+            other_starts: 0,
+            accepts_fast_flow: false,
+            set_ups: 0,
+            clock: StepClock::default(),
+            traffic: StepTraffic::default(),
+            passes: PassBytes::of(body),
+        })
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Whether steps are solved by Newton's method.
+    pub fn is_nonlinear(&self) -> bool {
+        self.solver.is_nonlinear()
+    }
+
+    /// Whether a vector of nodal loads exists.
+    pub fn has_load(&self) -> bool {
+        self.load.is_some()
+    }
+
+    /// The preconditioner in use, and why it is that one.
+    pub fn preconditioner(&self) -> (Preconditioner, &str) {
+        self.solver.preconditioner()
+    }
+
+    /// The precision of factors, where steps are solved on the contact alone.
+    pub fn factor_precision(&self) -> Option<Precision> {
+        self.solver.factor_precision()
+    }
+
+    /// Assembles the matrix for a first step of this length. Preconditioners are made for this length and powers of two times
+    /// it. Collective.
+    pub fn prepare_length<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        length: f64,
+    ) -> Result<()> {
+        self.base_length = length;
+        self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })
+    }
+
+    /// Assembles the matrix of a step, if the last one was of another length. Collective.
+    fn prepare_matrix<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        step: Step,
+    ) -> Result<()> {
+        let cached = self.integrator.steady_length(nearest(self.base_length, step.length));
+        let lengths = Lengths { matrix: self.integrator.matrix_length(step), cached };
+        if self.solver.is_prepared_for(lengths) {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let _stage = self.stages.assembly.enter()?;
+        let made = self.solver.prepare(session, body, lengths, &self.right_hand_side)?;
+        self.set_ups += u64::from(made);
+        self.clock.assembly += start.elapsed();
+        if self.clock.first_assembly.is_zero() {
+            self.clock.first_assembly = self.clock.assembly;
+        }
+        Ok(())
+    }
+
+    /// `y = K x` with the matrix in use, which must be assembled. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.solver.multiply(x, y)
+    }
+
+    /// Applies the preconditioner of the matrix in use. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.solver.precondition(r, z)
+    }
+
+    /// Takes a step and commits it; on failure the state stays as it was. Collective.
+    pub fn advance<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        let mut outcome = self.attempt(session, body, state, step)?;
+        self.accept(session, body, state, step, &mut outcome)?;
+        Ok(outcome)
+    }
+
+    /// Solves a step without changing the state: another attempt may follow. Collective.
+    pub fn attempt<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
+        self.prepare_matrix(session, body, step)?;
+        self.is_finished = false;
+        let start = Instant::now();
+        let stage = self.stages.history.enter()?;
+        self.write_right_hand_side(session, body, state, step)?;
+        if !self.accepts_fast_flow {
+            refuse_fast_flow(session, body, step)?;
+        }
+        self.start(session, body, state, step)?;
+        drop(stage);
+        self.count_history(body, state, step);
+        self.solver.restart_traffic();
+        let solving = Instant::now();
+        self.clock.history += solving - start;
+        let stage = self.stages.solve.enter()?;
+        let mut problem = StepProblem {
+            session,
+            body,
+            state,
+            step,
+            forces: &self.right_hand_side,
+            rounding: self.integrator.rounding(session),
+            flow_start: self.integrator.flow_start(),
+        };
+        let outcome = if self.other_starts == 0 || problem.body.contacts.is_empty() {
+            self.solver.solve(&mut problem, &mut self.trial)
+        } else {
+            solve_and_search(&mut self.solver, &mut problem, &mut self.trial, self.other_starts)
+        };
+        drop(stage);
+        self.clock.solve += solving.elapsed();
+        self.traffic.add_solve(self.solver.traffic(session.ranks())?);
+        outcome
+    }
+
+    /// The error of the step that was attempted last: of the velocity, of the strain that it makes, and of what histories of
+    /// cells and nodes make of stresses and forces. Collective.
+    pub fn error<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepError> {
+        self.finish(body, state, step)?;
+        self.trial.update_ghosts()?;
+        let second_order_length = (self.scheme.is_two_step() && step.previous_length > 0.0)
+            .then(|| self.integrator.matrix_length(step));
+        let solved = SolvedStep {
+            step,
+            velocity: &self.trial,
+            flow_start: self.integrator.flow_start(),
+            second_order_length,
+        };
+        self.workspace.error(session, body, state, solved)
+    }
+
+    /// Writes displacement, trial histories and energies of the step that was attempted last, unless they are there. Collective.
+    fn finish<const D: usize, const S: usize>(
+        &mut self,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if self.is_finished {
+            return Ok(());
+        }
+        self.integrator.finish(body, state, &mut self.trial, step)?;
+        if self.scheme.is_implicit() {
+            self.traffic.add_solve(Some(self.passes.finish));
+        }
+        self.is_finished = true;
+        Ok(())
+    }
+
+    /// Commits the step that was attempted last, and completes its outcome. Collective.
+    pub fn accept<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+        outcome: &mut StepOutcome,
+    ) -> Result<()> {
+        let solving = Instant::now();
+        let stage = self.stages.solve.enter()?;
+        self.integrator.finish(body, state, &mut self.trial, step)?;
+        if self.scheme.is_implicit() {
+            self.traffic.add_solve(Some(self.passes.finish));
+        }
+        self.integrator.commit(state, &self.trial, step)?;
+        commit_tractions(body, state)?;
+        body.commit();
+        drop(stage);
+        let balancing = Instant::now();
+        self.clock.solve += balancing - solving;
+        let _stage = self.stages.balance.enter()?;
+        (outcome.energy, outcome.peaks) = self.integrator.energy(session, body, state, step)?;
+        self.traffic.balance += self.passes.energy;
+        if let Some(load) = &self.load {
+            outcome.energy.work += step.length * load.dot(&state.velocity)?;
+            self.traffic.balance += 2 * vector_bytes(body);
+        }
+        self.clock.balance += balancing.elapsed();
+        Ok(())
+    }
+
+    /// Loads and the other forces that the scheme knows before the step, zero at held components.
+    fn write_right_hand_side<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        if let Some(load) = &mut self.load
+            && !self.load_is_current
+        {
+            session.agree(body.write_loads(step.time, load))?;
+            self.load_is_current = body.load.is_steady();
+        }
+        {
+            let mut forces = self.right_hand_side.local_mut()?;
+            forces.fill(0.0);
+            self.integrator.start(body, state, step, &mut forces)?;
+        }
+        self.right_hand_side.add_ghosts_to_owners()?;
+        if let Some(load) = &self.load {
+            self.right_hand_side.add_scaled(1.0, load)?;
+        }
+        let mut values = self.right_hand_side.owned_mut()?;
+        values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+        Ok(())
+    }
+
+    /// Starts from the velocity extrapolated linearly in time, and prepares the contacts. Collective.
+    fn start<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<()> {
+        self.extrapolate(state, step)?;
+        let prepared = prepare_contacts(body, state, step);
+        Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
+    }
+
+    /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.
+    fn count_history<const D: usize, const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) {
+        let load = if self.load.is_some() { 3 } else { 0 };
+        let start = if extrapolates(state, step) { 8 } else { 2 };
+        self.traffic.history += self.passes.explicit + (1 + load + start) * vector_bytes(body);
+    }
+
+    fn extrapolate(&mut self, state: &State, step: Step) -> Result<()> {
+        self.trial.copy_from(&state.velocity)?;
+        if extrapolates(state, step) {
+            let ratio = step.length / step.previous_length;
+            self.trial.add_scaled(ratio, &state.velocity)?;
+            self.trial.add_scaled(-ratio, &state.previous_velocity)?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether there are two velocities to start a step from.
+fn extrapolates(state: &State, step: Step) -> bool {
+    step.previous_length > 0.0 && state.step > 1
+}
+
+/// Bytes of the values that this rank owns of a vector.
+fn vector_bytes<const D: usize, const S: usize>(body: &Body<D, S>) -> u64 {
+    (body.mesh.owned * D * size_of::<f64>()) as u64
+}
