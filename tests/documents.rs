@@ -57,13 +57,16 @@ fn declares(text: &str, word: &str) -> bool {
     })
 }
 
-/// Whether a file or folder is there, as written or below `src`, `tests` or one of its folders; `<name>` stands for any.
+/// Whether a file or folder is there, as written or below `src`, `tests`, one of their folders or one of the folders in these;
+/// `<name>` stands for any.
 fn is_there(path: &str) -> bool {
     let path = path.split('<').next().expect("a part").trim_end_matches('/');
     let mut places = vec![root(), root().join("src"), root().join("tests")];
     let inside = |folder: &Path| std::fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").path());
     for folder in ["src", "tests"] {
-        places.extend(inside(&root().join(folder)).filter(|path| path.is_dir()));
+        let outer: Vec<_> = inside(&root().join(folder)).filter(|path| path.is_dir()).collect();
+        places.extend(outer.iter().flat_map(|folder| inside(folder)).filter(|path| path.is_dir()));
+        places.extend(outer);
     }
     places.iter().any(|place| place.join(path).exists())
 }
