@@ -174,7 +174,8 @@ impl Module {
             }
             let is_range = at > 1 && is(&tokens[at - 2], '.');
             let is_member = at > 0 && is(&tokens[at - 1], '.') && !is_range;
-            if !is_member && !(at > 1 && is_separator(&tokens, at - 2)) {
+            let follows_separator = at > 1 && is_separator(&tokens, at - 2);
+            if !(is_member || follows_separator) {
                 self.mentioned.push(Reference { path, line: line(&tokens[at]) });
             }
             at = next;

@@ -6,9 +6,9 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            self, Adhesion, Bonded, Contact, ContactMemory, Damage, Effect, ElasticLaw, Held, Inertia, Load,
-            Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
-            fixed_components,
+            self, Adhesion, Bonded, Contact, ContactConditions, ContactMemory, Damage, Effect, ElasticLaw,
+            Held, Inertia, Load, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress,
+            choose_unknowns, fixed_components,
         },
         space::{Geometry, surface_points},
         state::State,
@@ -41,7 +41,13 @@ pub(super) fn body<const D: usize, const S: usize>(
     for contact in &job.contact {
         let facets = facets(&mesh, &contact.on);
         let (law, gap) = session.agree(normal_law(contact))?;
-        let mut laws = Contact::new(session, &mesh, &facets, contact.quadrature, law, gap, &fixed)?;
+        let mut laws = Contact::new(
+            session,
+            &mesh,
+            &facets,
+            ContactConditions { quadrature: contact.quadrature, law, gap },
+            &fixed,
+        )?;
         if let Some(friction) = contact.friction {
             session.agree(laws.add_friction(friction, &mesh, &fixed))?;
         }

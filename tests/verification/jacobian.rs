@@ -3,7 +3,9 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    fem::effect::{Contact, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns},
+    fem::effect::{
+        Contact, ContactConditions, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns,
+    },
     job::{Expression, Scalar},
     laws::{
         contact::{
@@ -91,7 +93,14 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             }
             let contact = |facets: &[u32], gap: Gap| {
                 let law = normal.clone();
-                Contact::new(session, &body.mesh, facets, quadrature, law, gap, &body.fixed).expect("contact")
+                Contact::new(
+                    session,
+                    &body.mesh,
+                    facets,
+                    ContactConditions { quadrature, law, gap },
+                    &body.fixed,
+                )
+                .expect("contact")
             };
             // Friction of both would act along the edge between them.
             let mut contacts = if friction.is_none() {

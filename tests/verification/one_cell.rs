@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, part};
 use clarke::{
-    fem::effect::{Contact, Quadrature, choose_unknowns},
+    fem::effect::{Contact, ContactConditions, Quadrature, choose_unknowns},
     job::Job,
     laws::contact::{Gap, NormalResponse, Polyline},
     linear_algebra::tensor::{Vector, larger},
@@ -52,7 +52,8 @@ fn forces<const D: usize>(
     let mesh = part(session, mesh);
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
     let (law, gap, fixed) = (NormalResponse::Graph(law.clone()), Gap::default(), vec![false; (D + 1) * D]);
-    let contact = Contact::new(session, &mesh, &facets, quadrature, law, gap, &fixed).expect("contact");
+    let contact = Contact::new(session, &mesh, &facets, ContactConditions { quadrature, law, gap }, &fixed)
+        .expect("contact");
     let mut contacts = [contact];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");
     let [contact] = &mut contacts;
@@ -159,7 +160,13 @@ fn pushed_hard(session: &Session) {
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
     let law =
         NormalResponse::Graph(Polyline::new(vec![[3e-10, -1e9], [3e-10, 1e9]], 1.0, 1.0).expect("graph"));
-    let contact = Contact::new(session, &mesh, &facets, Quadrature::Nodal, law, Gap::default(), &[false; 6]);
+    let contact = Contact::new(
+        session,
+        &mesh,
+        &facets,
+        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
+        &[false; 6],
+    );
     let mut contacts = [contact.expect("contact")];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");
     let mut values = vec![-7e8; 6];

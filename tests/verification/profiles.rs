@@ -3,7 +3,7 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    fem::effect::{Contact, Effect, Held, Inertia, Quadrature},
+    fem::effect::{Contact, ContactConditions, Effect, Held, Inertia, Quadrature},
     io::output::profiles::Profiles,
     laws::{
         contact::{Bound, Gap, NormalResponse, Unilateral},
@@ -119,8 +119,13 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     // With contact: the component of the traction along the part of the normal that no support holds.
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
     let law = NormalResponse::Unilateral(Unilateral { bound: Bound::Displacement, gap: None });
-    let contact =
-        Contact::new(session, &body.mesh, &facets, Quadrature::Nodal, law, Gap::default(), &body.fixed);
+    let contact = Contact::new(
+        session,
+        &body.mesh,
+        &facets,
+        ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
+        &body.fixed,
+    );
     body.contacts.push(contact.expect("a contact"));
     let mut traction = state.velocity.like().expect("a vector");
     set_nodal(&body.mesh, &mut traction, random(3));

@@ -4,7 +4,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
 use clarke::{
-    fem::effect::{Contact, Form, Quadrature, choose_unknowns},
+    fem::effect::{Contact, ContactConditions, Form, Quadrature, choose_unknowns},
     job::Job,
     laws::contact::Gap,
     linear_algebra::petsc::DistributedVector,
@@ -219,8 +219,14 @@ fn compare<const D: usize, const S: usize>(
     let exact = |contact: &Contact<D>| {
         let law = contact.law.clone();
         let facets = contact.facets();
-        Contact::new(session, &run.body.mesh, facets, Quadrature::Gauss, law, Gap::default(), &run.body.fixed)
-            .expect("contact")
+        Contact::new(
+            session,
+            &run.body.mesh,
+            facets,
+            ContactConditions { quadrature: Quadrature::Gauss, law, gap: Gap::default() },
+            &run.body.fixed,
+        )
+        .expect("contact")
     };
     let falling_contacts = run.body.contacts.iter().filter(|c| c.law.monotonicity_constant() > 0.0);
     let mut exact: Vec<Contact<D>> = falling_contacts.map(exact).collect();

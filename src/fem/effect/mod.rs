@@ -30,7 +30,8 @@ mod viscous_stress;
 
 pub use adhesion::{Adhesion, Bonded};
 pub use contact::{
-    COUNTS, Contact, ContactNode, PointCount, Quadrature, ReferenceValues, choose_unknowns, contact_nodes,
+    COUNTS, Contact, ContactConditions, ContactNode, PointCount, Quadrature, ReferenceValues,
+    choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::Damage;

@@ -52,6 +52,17 @@ pub use directions::{ContactNode, contact_nodes};
 pub use reference::ReferenceValues;
 pub use unknowns::choose_unknowns;
 
+/// What holds along the normal of a contact boundary, and at which points.
+#[derive(Debug)]
+pub struct ContactConditions {
+    /// The points.
+    pub quadrature: Quadrature,
+    /// The law.
+    pub law: NormalResponse,
+    /// Distance to the obstacle along the normal.
+    pub gap: Gap,
+}
+
 /// A law on a contact boundary.
 #[derive(Debug)]
 pub struct Contact<const D: usize> {
@@ -88,11 +99,10 @@ impl<const D: usize> Contact<D> {
         session: &Session,
         mesh: &Mesh<D>,
         facets: &[u32],
-        quadrature: Quadrature,
-        law: NormalResponse,
-        gap: Gap,
+        conditions: ContactConditions,
         fixed: &[bool],
     ) -> Result<Self> {
+        let ContactConditions { quadrature, law, gap } = conditions;
         let mut points: Vec<Point<D>> = match quadrature {
             Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
