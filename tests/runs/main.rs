@@ -9,6 +9,7 @@ mod compression;
 mod check_values;
 mod contact;
 mod effects;
+mod example;
 mod failures;
 mod friction;
 mod hdf5_file;
