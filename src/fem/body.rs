@@ -194,11 +194,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if form == Form::Elasticity {
             self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
         }
+        let called = Called::those(&self.effects, |effect| effect.term().form() == Some(form));
         Batch::for_all(&self.mesh, &self.geometry, Nodal::all(x), needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
                 batch.stress = Pack::from_lanes(|lane| batch.strain_rate.lane(lane).map(|rate| -rate));
             }
-            self.terms().filter(|term| term.form() == Some(form)).for_each(|term| term.add_force(batch));
+            called.among(&self.effects).for_each(|effect| effect.term().add_force(batch));
             batch.scatter(&self.mesh, forces);
         });
     }
@@ -380,8 +381,16 @@ impl Called {
         evaluation: Evaluation,
         holds: impl Fn(Phases) -> bool,
     ) -> Self {
+        Self::those(effects, |effect| holds(effect.phases(evaluation)))
+    }
+
+    /// The effects for which this holds.
+    fn those<const D: usize, const S: usize>(
+        effects: &[Box<dyn Effect<D, S>>],
+        holds: impl Fn(&dyn Effect<D, S>) -> bool,
+    ) -> Self {
         let effects = effects.iter().enumerate();
-        Self(effects.map(|(at, effect)| u64::from(holds(effect.phases(evaluation))) << at).sum())
+        Self(effects.map(|(at, effect)| u64::from(holds(&**effect)) << at).sum())
     }
 
     fn is_empty(self) -> bool {

@@ -43,7 +43,7 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
 }
 
 /// What the files of a run contain.
-pub(super) struct Wanted<'a, const D: usize> {
+pub(super) struct Contents<'a, const D: usize> {
     /// The job.
     pub job: &'a Job,
     /// The problem that checkpoints belong to.
@@ -58,13 +58,13 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Prepares the profiles and opens the files; those of a run that is continued are cut after the state's step. Collective.
     pub(super) fn open(
         session: &Session,
-        wanted: Wanted<D>,
+        contents: Contents<D>,
         body: &Body<D, S>,
         state: &State,
         log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
-        let Wanted { job, identity, mut probes, goes_on } = wanted;
+        let Contents { job, identity, mut probes, goes_on } = contents;
         let folder = job.output_folder().to_owned();
         let before = if goes_on && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;

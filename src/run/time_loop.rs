@@ -5,7 +5,7 @@ use super::{
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header,
-    outputs::{Outputs, Wanted},
+    outputs::{Contents, Outputs},
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
@@ -74,8 +74,8 @@ pub(super) fn run<const D: usize, const S: usize>(
         Some(restored) => restored.totals,
         None => session.agree(totals_at_start(session, &body, &state))?,
     };
-    let wanted = Wanted { job, identity, probes, goes_on };
-    let mut outputs = session.agree(Outputs::open(session, wanted, &body, &state, &mut log))?;
+    let contents = Contents { job, identity, probes, goes_on };
+    let mut outputs = session.agree(Outputs::open(session, contents, &body, &state, &mut log))?;
     session.agree(outputs.at_start(session, &body, &state))?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);

@@ -1,4 +1,4 @@
-//! The step in time and what is known of it before it is taken.
+//! Time stepping, and certificates that are computed before the first step.
 
 pub mod stepping;
 pub mod certificate;

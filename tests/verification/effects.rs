@@ -4,9 +4,10 @@ use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
 use clarke::{
     fem::{
+        body::Body,
         effect::{
-            Damage, Effect, ElasticLaw, Elasticity, Energy, Evaluation, Inertia, Outcome, Phases, Step, Term,
-            ViscoplasticFlow, ViscousStress,
+            Blend, Damage, Effect, ElasticLaw, Elasticity, Energy, Evaluation, Inertia, Outcome, Phases,
+            Step, Term, ViscoplasticFlow, ViscousStress,
         },
         space::{Batch, Geometry},
     },
@@ -107,6 +108,41 @@ fn seen_by<const D: usize, const S: usize>(
     let batches = body.mesh.cell_count().div_ceil(LANES);
     drop(body);
     (Rc::try_unwrap(seen).expect("the only one").into_inner(), batches)
+}
+
+/// The values of the matrix of a step of 0.1 s of a body with these effects, whose laws are evaluated at this state.
+fn matrix<const D: usize, const S: usize>(
+    session: &Session,
+    whole: &clarke::mesh::GlobalMesh<D>,
+    effects: Vec<Box<dyn Effect<D, S>>>,
+    at: Evaluation,
+) -> Vec<f64> {
+    let (plain, _) = body::<D, S>(session, whole, &[], Vec::new());
+    let mut body = Body::new(plain.mesh, plain.geometry, effects, plain.fixed, at);
+    body.matrix(session, 0.1).expect("matrix").values
+}
+
+/// Elasticity is in the matrix where it acts at the end of the step, and only there.
+fn matrices<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
+    let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
+    let of = |with_elasticity: bool, at: Evaluation| {
+        let mut effects: Vec<Box<dyn Effect<D, S>>> =
+            vec![Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) })];
+        if with_elasticity {
+            let law = ByMaterial::uniform(ElasticLaw { tensor, with_history: false });
+            effects.push(Box::new(Elasticity { law }));
+        }
+        matrix::<D, S>(session, whole, effects, at)
+    };
+    let (converged, end) = (Evaluation::Converged, Evaluation::End(Blend::euler(0.1)));
+    let viscous = of(false, converged);
+    assert!(viscous.iter().any(|value| *value != 0.0));
+    assert_eq!(of(true, converged), viscous);
+    assert_eq!(of(false, end), viscous);
+    // Of the same tensor, over 0.1 s.
+    for (both, viscous) in of(true, end).iter().zip(&viscous) {
+        assert!((both - 1.1 * viscous).abs() <= 1e-14 * (1.0 + viscous.abs()), "{both} {viscous}");
+    }
 }
 
 fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
@@ -263,6 +299,8 @@ pub fn count(session: &Session) {
     phases::<2, 3>(session, &crossed([3, 2]));
     phases::<2, 4>(session, &crossed([3, 2]));
     phases::<3, 6>(session, &brick([2, 2, 2]));
+    matrices::<2, 4>(session, &crossed([3, 2]));
+    matrices::<3, 6>(session, &brick([2, 2, 2]));
     allocations(session);
 }
 

@@ -61,7 +61,7 @@ pub trait Effect<const D: usize, const S: usize> {
     fn add_step_energy(&self, _at: Evaluation, _step: Step, _batch: &Batch<D, S>, _energy: &mut Energy) {}
 
     /// Adds the stress without viscosity at the end of a step that was solved and not yet committed, and the error that its trial
-    /// histories make in it, given those before. Effects that weaken also weaken the batch as their trial history has it.
+    /// histories make in this stress, given the histories before. Effects that weaken also weaken the batch as their trial history has it.
     fn add_error(&self, _curvature: Curvature, _batch: &mut Batch<D, S>, _error: &mut StressError) {}
 
     /// The histories that it keeps for cells.

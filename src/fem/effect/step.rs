@@ -11,8 +11,7 @@ pub struct Step {
     pub previous_length: f64,
 }
 
-/// How a step that is implicit in every stress starts: it is one of implicit Euler of another length from a blend of the two
-/// states before.
+/// The start of an implicit step, which equals a step of implicit Euler of length `k'` from a blend of the last two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blend {
     /// `k'` in s: displacement, stress and velocity change by `k'` times their rates at the end.

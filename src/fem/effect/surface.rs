@@ -51,8 +51,8 @@ pub trait SurfaceEffect<const D: usize> {
     /// dissipates, and the terms of the scheme.
     fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy);
 
-    /// Adds the force at the end of a step that was solved and not yet committed, given the displacement there, and the error that
-    /// its trial history makes in it, given those before.
+    /// Adds the squares of the force at the end of a step that was solved and not yet committed, given the displacement there, and of
+    /// the error that its trial history makes in the force, given the histories before.
     fn add_error(&self, curvature: Curvature, displacement: &[f64], error: &mut StressError);
 
     /// Adds to `forces` the force against nodal values `x` of the largest stiffness it can have.

@@ -61,7 +61,7 @@ pub(super) fn compute<'a, const D: usize, const S: usize>(at: Converged<'a, D, S
 /// The indicator of a body, with room for the means.
 #[derive(Debug)]
 pub struct ErrorIndicator<const S: usize> {
-    /// Elastic tensors of the body's materials in Pa; none for a material that nothing is known of.
+    /// Elastic tensors of the body's materials in Pa; none for a material without elasticity.
     elasticity: Vec<Option<Isotropic>>,
     /// Mean stress and volume of the cells around, for each node.
     means: DistributedVector,

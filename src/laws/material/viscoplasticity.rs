@@ -1,6 +1,6 @@
 //! Viscoplastic laws `G(s) = -E X(s)`: stress that relaxes by flow.
 //!
-//! A law is a file below and an entry in the list of `laws/law.rs`: its [`Parameters`], as the job file has them, and its [`Flow`], which
+//! A law is a file below and an entry in the list of `viscoplasticity/law.rs`: its [`Parameters`], as the job file has them, and its [`Flow`], which
 //! evaluates it. No other module names a law.
 
 mod drucker_prager;

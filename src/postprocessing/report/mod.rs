@@ -40,7 +40,7 @@ pub struct Made {
     pub missing: Vec<String>,
 }
 
-/// Makes `postprocessing/report/index.html` and the pictures beside it in the output folder of a run, or of a study.
+/// Makes `report/index.html` and the pictures beside it in the output folder of a run, or of a study.
 pub fn report(folder: &Path) -> Result<Made> {
     let (page, missing) = if study::is_study(folder) {
         (study::page(folder)?, Vec::new())

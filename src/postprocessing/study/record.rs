@@ -74,15 +74,15 @@ pub struct Seconds {
     pub solve: f64,
 }
 
-/// What came of a run.
+/// A finished run.
 pub struct Ran {
-    /// What it left.
+    /// Its record.
     pub record: Record,
     /// Whether an earlier study left it.
     pub found: bool,
 }
 
-/// The repetition that counts.
+/// The seconds of the best or the median repetition.
 pub fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
     let mut all = record.seconds.clone();
     all.sort_by(|a, b| a.computing.total_cmp(&b.computing));

@@ -157,13 +157,13 @@ impl Implicit {
         energy += self.solved;
         released_by_contact(body, state, step, &mut energy)?;
         if self.blend.earlier != 0.0 && body.has_form(Form::Mass) {
-            energy.numerical += self.beside(body, state, step)?;
+            energy.numerical += self.momentum_term(body, state, step)?;
         }
         Ok(over_ranks(session, energy, peaks))
     }
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells.
-    fn beside<const D: usize, const S: usize>(
+    fn momentum_term<const D: usize, const S: usize>(
         &mut self,
         body: &Body<D, S>,
         state: &State,

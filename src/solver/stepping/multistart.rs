@@ -11,7 +11,7 @@ const DIFFERENT: f64 = 1e-6;
 /// Normal velocities of all contact points alike, over the largest velocity at which a law turns a corner; every second
 /// start has them at random instead.
 const ALIKE: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
-/// Between which random ones lie.
+/// Range of the random ones.
 const RANDOM: [f64; 2] = [-1.0, 2.0];
 
 /// Solves a step from the velocity in `trial` after it was solved from so many others, leaves the new velocity there and counts
@@ -38,7 +38,7 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
             _ => {}
         }
     }
-    restore_pressures(problem.body, problem.state)?;
+    session.agree(restore_pressures(problem.body, problem.state))?;
     match session.agree(solver.solve(problem, trial)) {
         Ok(outcome) => {
             let solutions = others.len() + usize::from(is_new(&others, trial)?);

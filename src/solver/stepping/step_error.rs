@@ -31,7 +31,7 @@ pub struct StepError {
     pub error: Norms,
     /// Velocity and stress at the end of the step.
     pub size: Norms,
-    /// A velocity below this multiple of the stress is rounding, and the other way round.
+    /// A velocity below this multiple of the stress is rounding error, and a stress below this multiple of the velocity.
     pub negligible: Norms,
 }
 
@@ -98,8 +98,8 @@ impl ErrorWorkspace {
         let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
         let [velocity, stress, all_velocity, all_stress] =
             session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
-        // With mass both are roots of energies: a body that flies without stress has some from rounding, and one that is held has a
-        // velocity from rounding. The square of a velocity in the norm of the viscosity is a power.
+        // With mass both are roots of energies: a free body has a stress of rounding errors, a held one a velocity of rounding errors.
+        // The square of a velocity in the norm of the viscosity is a power.
         let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };
         Ok(StepError {
             error: Norms { velocity, stress },

@@ -31,12 +31,14 @@ pub(super) struct StepSolver {
     reason: String,
     /// The matrix that the preconditioner in use is of.
     cached: Option<(f64, Matrix)>,
-    /// The matrix of steps of another length than that of the preconditioner.
-    between: Option<(f64, Matrix)>,
+    /// The matrix of the step, where its length is not that of the preconditioner.
+    step_matrix: Option<(f64, Matrix)>,
+    /// The lengths for which all is prepared.
+    prepared: Option<Lengths>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
-    /// Whether a set-up failed, so that the linear solver in use can't be.
+    /// Whether a set-up failed: the linear solver in use must be replaced.
     is_broken: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
@@ -60,7 +62,8 @@ impl StepSolver {
             settings,
             reason,
             cached: None,
-            between: None,
+            step_matrix: None,
+            prepared: None,
             matrix_norm: 0.0,
             solver,
             is_broken: false,
@@ -89,10 +92,7 @@ impl StepSolver {
 
     /// Whether the matrices are those of these lengths.
     pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
-        let length = |matrix: &Option<(f64, Matrix)>| matrix.as_ref().map(|(length, _)| *length);
-        let cached = length(&self.cached);
-        cached == Some(self.cached_length(lengths))
-            && length(&self.between).or(cached) == Some(lengths.matrix)
+        self.prepared == Some(lengths)
     }
 
     /// Assembles the matrix of this length and sets its preconditioner up, unless they are there; says whether a
@@ -104,7 +104,7 @@ impl StepSolver {
         lengths: Lengths,
         like: &DistributedVector,
     ) -> Result<bool> {
-        self.between = None;
+        (self.prepared, self.step_matrix) = (None, None);
         let length = self.cached_length(lengths);
         let mut is_new = false;
         if self.cached.as_ref().is_none_or(|(known, _)| *known != length) {
@@ -124,13 +124,14 @@ impl StepSolver {
         }
         if lengths.matrix != length {
             let rows = matrix_rows(session, body, lengths.matrix)?;
-            self.between = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
+            self.step_matrix = Some((lengths.matrix, session.agree(Matrix::symmetric(D, &rows))?));
         }
         self.matrix_norm = self.matrix()?.norm()?;
         set_reference_values(session, &mut body.contacts, like, self.matrix()?)?;
         if let (Solver::Linear(ksp), Some((_, cached))) = (&mut self.solver, &self.cached) {
-            ksp.set_matrices(self.between.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
+            ksp.set_matrices(self.step_matrix.as_ref().map_or(cached, |(_, matrix)| matrix), cached)?;
         }
+        self.prepared = Some(lengths);
         Ok(is_new)
     }
 
@@ -221,7 +222,7 @@ impl StepSolver {
     /// The matrix in use.
     fn matrix(&self) -> Result<&Matrix> {
         let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
-        self.between.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
+        self.step_matrix.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
     }
 
     /// `y = K x`. Collective.
@@ -261,7 +262,7 @@ impl StepSolver {
     }
 
     fn matrices(&self) -> impl Iterator<Item = &Matrix> {
-        [&self.cached, &self.between].into_iter().flatten().map(|(_, matrix)| matrix)
+        [&self.cached, &self.step_matrix].into_iter().flatten().map(|(_, matrix)| matrix)
     }
 
     /// Applies the preconditioner. Collective.
@@ -285,7 +286,7 @@ impl StepSolver {
         let mut is_relaxed = false;
         loop {
             let (_, matrix) =
-                self.between.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
+                self.step_matrix.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
                     Error::Internal("a step was taken before its matrix was assembled".into())
                 })?;
             let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
@@ -363,7 +364,7 @@ impl StepSolver {
         trial: &mut DistributedVector,
     ) -> Result<()> {
         let (length, matrix) =
-            self.between.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
+            self.step_matrix.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
         let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
         condensed.start_again(trial)?;
         restore_pressures(problem.body, problem.state)?;

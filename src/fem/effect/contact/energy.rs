@@ -21,13 +21,13 @@ impl<const D: usize> Contact<D> {
             let work = length * pressure * v;
             let change = point.context.step_length * v;
             let after = point.context.penetration + change;
-            let beside = length * v - change - point.shift;
+            let mismatch = length * v - change - point.shift;
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let stored = self.law.energy(after).zip(self.law.energy(before)).map(|(e, before)| e - before);
             let numerical = match stored {
                 None => 0.0,
                 Some(stored) if pressure == 0.0 => stored,
-                Some(stored) => stored - pressure * (after - before) - pressure * beside,
+                Some(stored) => stored - pressure * (after - before) - pressure * mismatch,
             };
             let stored = stored.unwrap_or(0.0);
             let given = if pressure == 0.0 { 0.0 } else { pressure * point.growth };

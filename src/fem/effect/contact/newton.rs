@@ -54,8 +54,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Adds the contact forces in N to `forces`: of the pressures of the points, where the unknown is the velocity those at
-    /// `velocity`.
+    /// Adds the contact forces in N to `forces`: of the points' pressures; at points whose unknown is the velocity, of the pressures
+    /// at `velocity`.
     pub fn add_forces(&self, velocity: &[f64], forces: &mut [f64]) {
         for point in &self.points {
             point.add_force(Newton, point.pressure_at(&self.law, Newton, velocity), forces);

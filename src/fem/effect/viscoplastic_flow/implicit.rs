@@ -83,17 +83,17 @@ impl<const S: usize> ViscoplasticFlow<S> {
             let stress = add_scaled(&elasticity.apply(&strain), 1.0, &after);
             let before = add_scaled(&elasticity.apply(&before), 1.0, &history);
             let jump = add_scaled(&stress, -1.0, &before);
-            let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
+            let mismatch = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
             let (mut taken, mut dissipated) = (0.0, 0.0);
             if after != history {
                 let flow = elasticity.solve(&add_scaled(&history, -1.0, &after));
                 taken = dot(&stress, &flow);
-                // Of second order with the formula. What it extrapolates beyond the rest of the stress gives back, and is its own.
+                // Trapezoidal, of second order as the formula is. Never negative: the difference is a term of the scheme.
                 dissipated = if two_steps { 0.5 * (taken + dot(&before, &flow)) } else { taken }.max(0.0);
             }
             let share = share[lane] * batch.cells.volume[lane];
             energy.viscoplastic += share * dissipated;
-            let own = dot(&stress, &beside) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
+            let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
             energy.numerical += share * own;
         }
     }
