@@ -20,7 +20,7 @@ fn lengths(results: &Results) -> Vec<f64> {
 }
 
 #[test]
-fn steps_come_from_a_ladder_grow_with_the_motion_and_end_where_they_should() {
+fn steps_double_with_the_motion_and_end_where_they_should() {
     for scheme in ["implicit_euler", "bdf2"] {
         let case = adaptive(8, scheme, 0.02);
         let results = case.run(2);

@@ -1,4 +1,4 @@
-//! Rung 2: the assembled matrix against a dense one computed here by other formulas.
+//! The assembled matrix against a dense one computed here by other formulas.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};

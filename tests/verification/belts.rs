@@ -1,4 +1,4 @@
-//! Rung 7: friction acts on the velocity relative to the obstacle, whose work energy accounts for.
+//! Friction acts on the velocity relative to the obstacle, whose work energy accounts for.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};

@@ -1,4 +1,4 @@
-//! Rung 1, second part: Newton's method, whose callbacks may fail on one rank.
+//! Newton's method, whose callbacks may fail on one rank.
 
 use crate::petsc_boundary::{assert_owned, matrix, product, set, share, shares, vector};
 use crate::{mpirun, run_on};

@@ -1,4 +1,4 @@
-//! Rung 7: motions with closed forms in the discrete scheme.
+//! Motions with closed forms in the discrete scheme.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};

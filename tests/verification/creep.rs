@@ -1,4 +1,4 @@
-//! Rung 7, second part: uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) worked out for one homogeneous
+//! Uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) worked out for one homogeneous
 //! cell, with projections of its own.
 
 use crate::run_on;

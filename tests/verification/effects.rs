@@ -1,4 +1,4 @@
-//! Rung 4: an effect is called in its own phases only, and nothing is gathered that nobody needs.
+//! An effect is called in its own phases only, and nothing is gathered that nobody needs.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};

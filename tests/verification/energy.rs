@@ -1,4 +1,4 @@
-//! Rung 6: in every step of any job energy balances, and contact lies on its graph.
+//! In every step of any job energy balances, and contact lies on its graph.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};

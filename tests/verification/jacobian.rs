@@ -1,4 +1,4 @@
-//! Rung 3: the Jacobian of a contact step is the derivative of its residual.
+//! The Jacobian of a contact step is the derivative of its residual.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};

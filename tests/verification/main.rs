@@ -1,4 +1,4 @@
-//! The low rungs of verification, each standing on those before it: PETSc's handles, assembly, the Jacobian, which
+//! Verification on small meshes in memory, from the simple to the composite: PETSc's handles, assembly, the Jacobian, which
 //! effects are called, uniform fields, energy and closed forms, manufactured solutions.
 //!
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
@@ -21,7 +21,7 @@ mod inclusion;
 mod indefinite;
 mod indicator;
 mod jacobian;
-mod ladder;
+mod manufactured_contact;
 mod manufactured;
 mod manufactured_flow;
 mod memory;
@@ -103,8 +103,8 @@ fn scenario() {
         "branches" => branches::passed(&session),
         "unloading" => unloading::all(&session),
         "orders_space" => orders::space(&session),
-        "ladder_plane" => ladder::plane(&session),
-        "ladder_space" => ladder::space(&session),
+        "manufactured_contact_plane" => manufactured_contact::plane(&session),
+        "manufactured_contact_space" => manufactured_contact::space(&session),
         "manufactured_plane" => manufactured::plane(&session),
         "manufactured_space" => manufactured::space(&session),
         "scheme_adapted" => schemes::adapted(&session),

@@ -1,4 +1,4 @@
-//! Rung 8: manufactured solutions. The loads of a known smooth motion are written as expressions; the solver must find
+//! Manufactured solutions. The loads of a known smooth motion are written as expressions; the solver must find
 //! that motion, at the orders of P1 elements and of the scheme.
 
 use crate::run_on;

@@ -1,4 +1,4 @@
-//! Rung 8, second part: flow in states that change from place to place. A bar between lubricated walls is stretched by
+//! Flow in states that change from place to place. A bar between lubricated walls is stretched by
 //! `u_x = T(t) U(x)`, so that strain is uniaxial and stress is not. The flow law, written down here once more, is integrated along that
 //! strain; polynomials through its stresses give the loads. The solver must find the stresses at first order.
 

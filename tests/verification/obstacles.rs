@@ -1,4 +1,4 @@
-//! Rung 7: obstacles that move do work that energy accounts for; contacts of different laws meet at edges; contacts that
+//! Obstacles that move do work that energy accounts for; contacts of different laws meet at edges; contacts that
 //! are bounds are solved alike by PETSc's solver for variational inequalities.
 
 use crate::run_on;

@@ -1,4 +1,4 @@
-//! Rung 8 where no motion can be prescribed: the order in the step of each effect under each of its schemes, from the
+//! Where no motion can be prescribed: the order in the step of each effect under each of its schemes, from the
 //! differences of runs whose steps are halved.
 
 use crate::manufactured::{Case, Touch, job_of};

@@ -1,4 +1,4 @@
-//! Rung 5: fields that the elements can represent are reproduced exactly on irregular meshes.
+//! Fields that the elements can represent are reproduced exactly on irregular meshes.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation, stir};

@@ -1,4 +1,4 @@
-//! Rung 1: the safe handles around PETSc do what they say.
+//! The safe handles around PETSc do what they say.
 
 use crate::run_on;
 use clarke::{

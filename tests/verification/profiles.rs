@@ -1,4 +1,4 @@
-//! Rung 5: what `profiles.csv` says of stress and traction on oblique boundaries with facets of unequal size.
+//! What `profiles.csv` says of stress and traction on oblique boundaries with facets of unequal size.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};

@@ -1,4 +1,4 @@
-//! Rung 9: the implicit schemes, by their orders and by motions with closed forms.
+//! The implicit schemes, by their orders and by motions with closed forms.
 
 use crate::manufactured::job;
 use crate::run_on;

@@ -1,4 +1,4 @@
-//! Rung 9: flow under the formula of second order ends where the stress leaves the yield surface.
+//! Flow under the formula of second order ends where the stress leaves the yield surface.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};

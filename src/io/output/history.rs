@@ -60,7 +60,7 @@ pub struct Totals {
     pub steps_with_several: u64,
     /// Most different solutions of a step.
     pub most_solutions: u64,
-    /// Where adaptive steps are on their ladder.
+    /// The level of adaptive steps.
     #[serde(default)]
     pub pace: Option<Pace>,
 }

@@ -1,4 +1,4 @@
-//! Rung 8 for each effect and scheme: the manufactured motion with stress that relaxes, on springs and dampers, sliding
+//! For each effect and scheme the manufactured motion with stress that relaxes, on springs and dampers, sliding
 //! with friction; in the plane and in space.
 
 use crate::manufactured::{Case, Touch, assert_orders, job_of, measured};
@@ -62,10 +62,10 @@ pub fn space(session: &Session) {
 
 #[test]
 fn every_scheme_finds_plane_motions_with_flow_springs_and_friction_at_its_orders() {
-    run_on(&[1], "ladder_plane");
+    run_on(&[1], "manufactured_contact_plane");
 }
 
 #[test]
 fn every_scheme_finds_motions_in_space_with_flow_springs_and_friction_at_its_orders() {
-    run_on(&[1], "ladder_space");
+    run_on(&[1], "manufactured_contact_space");
 }
