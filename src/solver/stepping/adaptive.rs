@@ -1,13 +1,14 @@
-//! Steps whose lengths are chosen by their error, among powers of two times the first length (levels), so that many steps share
-//! a matrix and its preconditioner.
+//! Adaptive steps. Step lengths are powers of two times the first length (levels), so that many steps share a matrix and its
+//! preconditioner.
 //!
-//! The error of a step is the part of a quantity `x` that no straight line through its values before has, `k_n / (k_n + k_{n-1})
-//! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`: the local error of implicit Euler, and for schemes of second
-//! order a bound that also holds where contact or flow set in. The velocity counts in the norm of the mass (of the viscosity,
-//! without inertia) beside the largest so far. The stress counts in the norm of the compliance beside the largest stress without
-//! viscosity so far: what the error of the velocity makes of it in the step, and the errors of viscoplastic histories, of
-//! damage, of the bonding of adhesion and of the pressure that contact remembers. The strain that hardening cells accumulate grows
-//! no faster than the flow, whose error counts with the histories.
+//! The error of a step is the deviation of a quantity `x` from linear extrapolation, `k_n / (k_n + k_{n-1})
+//! (x_n - x_{n-1} - w (x_{n-1} - x_{n-2}))` with `w = k_n / k_{n-1}`. For implicit Euler this is the local error; for schemes of
+//! second order it is a bound that is also valid where contact or flow starts. The velocity error is measured in the mass norm (in
+//! the norm of the viscosity for problems without inertia), relative to the largest velocity so far. The stress error is measured
+//! in the compliance norm, relative to the largest stress without viscosity so far. It includes the stress caused by the velocity
+//! error in the step, and the errors of viscoplastic histories, damage, the bonding of adhesion and the memory pressure of contact.
+//! The accumulated strain of hardening cells needs no term of its own: it grows no faster than the flow, whose error is included in
+//! that of the histories.
 
 use super::{
     Norms, StepError, StepOutcome, Stepper,
@@ -21,9 +22,9 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Steps of one length between two growths of it.
+/// Steps at one level before the length may be doubled.
 const STEPS_BEFORE_GROWTH: u32 = 2;
-/// Share of the length that the tolerance allows.
+/// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
 /// Settings of adaptive steps.
@@ -41,7 +42,7 @@ pub struct AdaptiveSettings {
     pub end: f64,
 }
 
-/// The level of a run with the numbers by which it changes; saved in checkpoints.
+/// The level of a run and the values that determine its changes; saved in checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pace {
@@ -53,15 +54,15 @@ pub struct Pace {
     pub velocity: f64,
     /// Largest norm of the stress so far.
     pub stress: f64,
-    /// Steps that were taken back.
+    /// Number of rejected steps.
     pub rejected: u64,
 }
 
-/// Takes steps of adapted length.
+/// Takes steps of adaptive length.
 #[derive(Debug)]
 pub struct Adaptive<const D: usize> {
     settings: AdaptiveSettings,
-    /// Loads and obstacles that change with time, from the first step on.
+    /// Time-dependent loads and obstacles, from the first step on.
     drives: Option<Drives<D>>,
     lowest: i32,
     highest: i32,
@@ -88,8 +89,8 @@ impl<const D: usize> Adaptive<D> {
         self.settings.first * 2f64.powi(level)
     }
 
-    /// Takes a step that ends at `target` at the latest, and commits it; steps with too large an error or without a solution
-    /// are taken back and tried again shorter. Collective.
+    /// Takes a step that ends at `target` at the latest, and commits it. Steps whose error is too large and steps without a
+    /// solution are rejected and repeated with a shorter length. Collective.
     pub fn advance<const S: usize>(
         &mut self,
         session: &Session,
@@ -125,8 +126,8 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// The step to try next and the time that it must not go beyond: so short that loads and obstacles change along straight lines within
-    /// it, up to the tolerance. Collective.
+    /// The length of the next attempt and the time that it must not pass. Within the length, loads and obstacles deviate from
+    /// linear functions of time by at most the tolerance. Collective.
     fn choose(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
         loop {
             let length = self.next_length(target.time - state.time, state.step_length);
@@ -141,7 +142,8 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// The target, or the end of a piece of a load or an obstacle that comes before it within two steps of this length. Collective.
+    /// The target, or the end of a smooth piece of a load or an obstacle within two steps of this length, if that is earlier.
+    /// Collective.
     fn landing(&self, session: &Session, state: &State, target: Landing, length: f64) -> Landing {
         let last = target.time.min(state.time + 2.0 * length);
         let least = (1.0 - SNAP) * self.settings.smallest;
@@ -150,7 +152,7 @@ impl<const D: usize> Adaptive<D> {
         end.unwrap_or(target)
     }
 
-    /// Solves a step without taking it; gives its relative error, and the norms at its end. A step whose error is not a number
+    /// Solves a step without committing it. Returns its relative error and the norms at its end. A step whose error is NaN
     /// has failed. Collective.
     fn attempt<const S: usize>(
         &self,
@@ -173,8 +175,8 @@ impl<const D: usize> Adaptive<D> {
         session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
     }
 
-    /// Finds the sizes of velocity and stress for a body at rest, to which errors are relative: from a step of the largest length, or one
-    /// to where the piece of a load ends, which is not committed.
+    /// Finds reference norms of velocity and stress for a body at rest from a trial step of the largest length, or to the end of
+    /// the current piece of a load. The trial step is not committed.
     fn look_ahead<const S: usize>(
         &mut self,
         session: &Session,
@@ -195,8 +197,8 @@ impl<const D: usize> Adaptive<D> {
         }
     }
 
-    /// The length of the next step, with so much `left` to the target, after a step of the length `last` (0 before the first): at
-    /// most twice that, and half of what is left where a whole one would leave a sliver.
+    /// The length of the next step, with the time `left` to the target, after a step of the length `last` (0 before the first): at
+    /// most twice `last`, and half of `left` where a full step would leave a very short remainder.
     fn next_length(&self, left: f64, last: f64) -> f64 {
         let mut level = self.pace.level.clamp(self.lowest, self.highest);
         while last > 0.0 && level > self.lowest && self.length(level) > 2.000_001 * last {
@@ -207,12 +209,12 @@ impl<const D: usize> Adaptive<D> {
         if leaves_a_sliver { 0.5 * left } else { length }
     }
 
-    /// The highest level whose steps are not longer.
+    /// The highest level whose step length is not above this length.
     fn level_of(&self, step: Step) -> i32 {
         ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
     }
 
-    /// The error beside the largest norms so far; not a number where that of either is none.
+    /// The error relative to the largest norms so far; NaN if the error or a norm is NaN.
     fn relative(&self, StepError { error, size, negligible }: StepError) -> f64 {
         let share = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
         let largest_velocity = self.pace.velocity.max(size.velocity);
@@ -222,7 +224,7 @@ impl<const D: usize> Adaptive<D> {
         (velocity * velocity + stress * stress).sqrt()
     }
 
-    /// The level whose steps would have an error within the tolerance: it falls with the square of the length.
+    /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length.
     fn fitting(&self, step: Step, error: f64) -> i32 {
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
         let level = (length / self.settings.first).log2().floor();
@@ -239,11 +241,11 @@ impl<const D: usize> Adaptive<D> {
         self.pace.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
     }
 
-    /// Goes a level up where twice the length would do, after some steps at this one.
+    /// Moves up one level if a step of twice the length would be within the tolerance, after some steps at this level.
     fn grow(&mut self, step: Step, error: f64) {
         let level = self.level_of(step).clamp(self.lowest, self.highest);
         if step.length < 0.999_999 * self.length(self.pace.level) {
-            // Cut to a time to land on, or growing again after that.
+            // Shortened to end at a prescribed time, or growing again afterwards.
             return;
         }
         self.pace.taken += 1;

@@ -1,4 +1,4 @@
-//! The backward differentiation formula of second order, for steps of any length.
+//! The second-order backward differentiation formula for variable steps.
 //!
 //! The derivative at `t_n` is that of the parabola through the last three values. With `w = k_n / k_{n-1}`
 //!
@@ -6,14 +6,14 @@
 //! (x_n - x~) / k' = x'_n,   k' = k_n (1 + w) / (1 + 2 w),   x~ = ((1 + w)^2 x_{n-1} - w^2 x_{n-2}) / (1 + 2 w)
 //! ```
 //!
-//! for velocity, displacement and, where it flows, history: a step of implicit Euler of length `k'` from the blend `x~`. The
-//! first step, and the first one in which a cell flows, is one of implicit Euler; where a cell stops to yield its flow ends
-//! (`return_mapping/extrapolated.rs` of the laws). A-stable for equal steps; steps may grow by up to `1 + √2` from one to the next
-//! for good. (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, chapter III.5.)
+//! for velocity, displacement and, in cells that flow, history: a step of implicit Euler of length `k'` from the blend `x~`. The
+//! first step, and the first step in which a cell flows, are steps of implicit Euler; where a cell stops yielding its flow ends
+//! (`return_mapping/extrapolated.rs` of the laws). The formula is A-stable for equal steps; it remains stable if steps grow by
+//! factors of at most `1 + √2`. (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, chapter III.5.)
 
 use crate::fem::effect::{Blend, Step};
 
-/// How a step starts.
+/// The blend from which a step starts.
 pub(super) fn blend(step: Step) -> Blend {
     if step.previous_length == 0.0 {
         return Blend::euler(step.length);

@@ -1,7 +1,7 @@
 //! A step whose contacts are bounds on velocity components, solved by PETSc's own solver for variational inequalities.
 //!
-//! `K v - b = 0` but where a velocity is at its bound, which exerts the force that is left there. It does not use the contact graphs and
-//! serves as an independent check of Newton's method on them.
+//! `K v - b = 0`, except where a velocity is at its bound, which exerts the remaining force. The solver does not use the contact
+//! graphs and serves as an independent check of Newton's method on them.
 
 use super::{
     linear_solver::SolverSettings,
@@ -23,13 +23,14 @@ pub(super) struct Bounded {
 }
 
 impl Bounded {
-    /// A solver for velocities laid out like `like`.
+    /// A solver for velocities with the layout of `like`.
     pub fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
         let (lower, upper, residual) = (like.like()?, like.like()?, like.like()?);
         Ok(Self { snes: BoundedSnes::new("bounds_", like)?, settings, lower, upper, residual })
     }
 
-    /// Solves from and into the velocity `trial`, and sets the pressures of the contacts; gives the iterations. Collective.
+    /// Solves for the velocity `trial`, starting from its values, and sets the pressures of the contacts; returns the iterations.
+    /// Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -73,13 +74,13 @@ impl Bounded {
         Ok(outcome)
     }
 
-    /// What is left of the equations of motion at the end of the last solve, in N.
+    /// The residual of the equations of motion at the end of the last solve, in N.
     pub fn residual(&self) -> &DistributedVector {
         &self.residual
     }
 }
 
-/// Refuses contacts on this rank that can't be solved this way.
+/// Refuses contacts on this rank that are not velocity bounds.
 pub(super) fn refuse<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
     match body.contacts.iter().find_map(Contact::more_than_bounds) {
         None => Ok(()),

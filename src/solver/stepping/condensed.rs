@@ -1,14 +1,15 @@
-//! Steps solved on the contact alone: all other velocities are eliminated by half a linear solve before Newton's method,
-//! and follow by the other half after it.
+//! Steps condensed to the contact: the forward half of a linear solve eliminates all other velocities before Newton's method,
+//! and the backward half computes them afterwards.
 //!
-//! With `K = L L^T` and the motions on which contact laws act last, `L y = b` leaves `S v + C(v) = L_c y_c` for them, where
-//! `S = L_c L_c^T` is the Schur complement of the others; `L^T x = y` with `y_c = L_c^T v_c` gives all velocities. A step
-//! costs one linear solve, however many iterations Newton's method needs, and the residual of these is that of the contact alone.
+//! With `K = L L^T` and the motions on which contact laws act ordered last, `L y = b` leaves `S v + C(v) = L_c y_c` for these
+//! motions, where `S = L_c L_c^T` is the Schur complement; `L^T x = y` with `y_c = L_c^T v_c` gives all velocities. A step needs
+//! one linear solve for any number of Newton iterations, whose residual is that of the contact alone.
 //!
 //! With a factor in single precision, `K = L L^T + E`, solutions are corrected until the residual in double precision is small. The
-//! correction `d` of a velocity `v` solves `L L^T d + C(v + d) = r` with `r = b - K v`. The residual `r_c` along the motions on which
-//! laws act, where the forces of contact are large, is left as it is; half a solve takes the rest, `L y = r - r_c`, and the contact alone
-//! solves `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. What is left is `-E d`: it is measured, and corrected in the same way.
+//! correction `d` of a velocity `v` solves `L L^T d + C(v + d) = r` with `r = b - K v`. The residual `r_c` along the motions on
+//! which laws act contains the large contact forces and is not transformed. A forward solve is applied to the rest, `L y = r -
+//! r_c`, and the contact system is `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. The remaining error `-E d` is measured and
+//! corrected in the same way.
 
 use super::{
     StepOutcome,
@@ -36,30 +37,30 @@ use crate::{
 };
 use mpi::topology::SimpleCommunicator;
 
-/// Corrections after which single precision has failed.
+/// Number of corrections after which single precision has failed.
 const CORRECTIONS: usize = 12;
-/// A correction that leaves more than this share of the residual does not converge.
+/// A correction that leaves more than this share of the residual counts as divergence.
 const LARGEST_SHARE_LEFT: f64 = 0.5;
-/// Share of the tolerance to which the contact alone is solved: later corrections start so near to their solution that Newton's
-/// method would stop just below it, and velocity and pressure stay as far off their graph.
+/// Share of the tolerance to which the contact system is solved. Later corrections start so close to their solution that Newton's
+/// method would otherwise stop just below the tolerance, with velocity and pressure at that distance from their graph.
 const CONTACT_SHARE: f64 = 0.1;
 
-/// A solver for steps whose matrix is factored whole on each rank.
+/// A solver for steps whose matrix each rank factors completely.
 pub(super) struct Condensed {
     newton: Newton,
     elimination: Elimination,
-    /// The precision that factors are made in: double once single was not enough.
+    /// The precision of factors: double after single precision has failed.
     pub precision: Precision,
     nodes: ContactNodes,
-    /// Which of the unknowns of all ranks are those of this rank.
+    /// The range of this rank in the unknowns of all ranks.
     own: std::ops::Range<usize>,
-    /// The order of elimination, once it was found.
+    /// The order of elimination, once it is known.
     order: Option<Vec<u32>>,
-    /// Vectors of contact nodes: right-hand side, velocity, and that of the converged state.
+    /// Vectors of contact nodes: right-hand side, velocity, and velocity of the converged state.
     right_hand_side: DistributedVector,
     velocity: DistributedVector,
     converged: DistributedVector,
-    /// What corrections need, where factors are in single precision.
+    /// Data for corrections, if factors are in single precision.
     refinement: Option<Refinement>,
 }
 
@@ -71,16 +72,16 @@ pub(super) struct Factored {
     scales: Vec<[f64; 2]>,
 }
 
-/// The factor in use, and the vectors of all ranks that it solves with.
+/// The factor in use, and its vectors of the unknowns of all ranks.
 struct Elimination {
     factored: Option<Factored>,
     frames: Frames,
-    /// The values of all ranks' nodes, and how they come here.
+    /// The values of all nodes of all ranks, and the gather operation.
     whole: Vec<f64>,
     gathering: Gathering,
-    /// Where those of this rank start.
+    /// Start of the values of this rank.
     first: usize,
-    /// Halves of solves since traffic is counted.
+    /// Half solves since the count of traffic was restarted.
     halves: u64,
 }
 
@@ -116,7 +117,7 @@ impl Refinement {
 }
 
 impl Condensed {
-    /// A solver for the contacts of a body, whose unknowns it numbers; the matrix comes with [`Condensed::prepare`]. Collective.
+    /// A solver for the contacts of a body, which numbers their unknowns; the matrix is set by [`Condensed::prepare`]. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
@@ -155,10 +156,10 @@ impl Condensed {
         })
     }
 
-    /// Factors the matrix that has these rows on this rank, in the order of the one in use, and chooses the parameters of contact
-    /// graphs; says whether it could. Springs in the rows are taken off products with the condensed matrix. Where there are any, that
-    /// resists rigid motions too little to choose parameters by, and `matrix` of the whole body does it, whose vectors are
-    /// laid out like `like`. Collective.
+    /// Factors the matrix with these rows on this rank, in the order of elimination in use, and chooses the parameters of contact
+    /// graphs; returns whether this succeeded. Stiffness of springs in the rows is subtracted from products with the condensed
+    /// matrix. With springs the condensed matrix has too little resistance to rigid motions to choose the parameters; then `matrix`
+    /// of the whole body determines them, whose vectors have the layout of `like`. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -204,8 +205,8 @@ impl Condensed {
         Ok(true)
     }
 
-    /// Factors a matrix in one precision on all ranks: processors that differ may find another one enough. `None` on all where the
-    /// unknowns of contact can't be last on one. Collective.
+    /// Factors a matrix in one precision on all ranks, because the choice could differ between processors. `None` on all ranks
+    /// where the contact unknowns can't be ordered last on one of them. Collective.
     fn factor(&self, session: &Session, block: usize, rows: &BlockRows) -> Result<Option<Cholesky>, Agreed> {
         let unknowns = &self.elimination.frames.unknowns;
         let factor = |precision| Cholesky::new(block, rows, unknowns, self.order.as_deref(), precision);
@@ -227,7 +228,7 @@ impl Condensed {
         Ok(in_use(&mut self.elimination.factored)?.cholesky.precision())
     }
 
-    /// Changes the factored matrix for another.
+    /// Exchanges the factored matrix for another.
     pub fn exchange(&mut self, other: &mut Option<Factored>) {
         std::mem::swap(&mut self.elimination.factored, other);
         if let Some(factored) = &self.elimination.factored {
@@ -245,21 +246,21 @@ impl Condensed {
         self.elimination.backward(solution)
     }
 
-    /// Counts traffic from here on.
+    /// Restarts the count of traffic.
     pub fn restart_traffic(&mut self) {
         self.elimination.halves = 0;
         self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
     }
 
-    /// Bytes that this rank read since then, at the least: the factor for each half of a solve, its last block for each product.
+    /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product.
     pub fn traffic(&self) -> u64 {
         let Elimination { factored, halves, .. } = &self.elimination;
         let of = |factored: &Factored| halves * factored.cholesky.bytes() + factored.condensed.traffic();
         factored.as_ref().map_or(0, of)
     }
 
-    /// Solves a step from the velocity in `trial`, and leaves the new one there. Where it fails with a factor in single precision,
-    /// [`Condensed::start_again`] takes `trial` back. Collective.
+    /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails with a factor in single precision,
+    /// [`Condensed::start_again`] resets `trial`. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -284,7 +285,7 @@ impl Condensed {
         Ok(outcome)
     }
 
-    /// The same with a factor in single precision, by corrections; fails where these do not converge. Collective.
+    /// The same with a factor in single precision, by corrections; fails if these do not converge. Collective.
     fn refine<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -302,7 +303,7 @@ impl Condensed {
         system.write_residual(trial, residual)?;
         let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
         for _ in 0..CORRECTIONS {
-            // The contact alone.
+            // The contact system.
             nodes.separate_forces::<D>(residual, change)?;
             elimination.forward(residual)?;
             nodes.restrict::<D>(trial, velocity)?;
@@ -330,7 +331,7 @@ impl Condensed {
             elimination.backward(correction)?;
             trial.add_scaled(1.0, correction)?;
             nodes.prescribe::<D>(velocity, trial)?;
-            // What is left of `b - K v - C(v)`, with the forces `C(v)` that Newton's method left.
+            // The residual `b - K v - C(v)`, with the forces `C(v)` of the last Newton iteration.
             system.write_residual(trial, residual)?;
             change.copy_from(right_hand_side)?;
             change.add_scaled(-1.0, product)?;
@@ -349,7 +350,7 @@ impl Condensed {
         Err(Error::Failed("corrections with a factor in single precision do not converge".into()))
     }
 
-    /// Takes `trial` back to where the last step with a factor in single precision was started.
+    /// Resets `trial` to the start value of the last step with a factor in single precision.
     pub fn start_again(&self, trial: &mut DistributedVector) -> Result<()> {
         self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
     }
@@ -411,8 +412,8 @@ impl ContactNodes {
         Ok(())
     }
 
-    /// Sets the velocities along the motions on which laws act to those of contact nodes: the solve of all velocities
-    /// gives them with rounding errors.
+    /// Sets the velocities along the motions on which laws act to those of contact nodes: the solve for all velocities
+    /// returns them with rounding errors.
     fn prescribe<const D: usize>(
         &self,
         velocity: &DistributedVector,
@@ -448,7 +449,7 @@ impl ContactNodes {
     }
 }
 
-/// The rows of all ranks. Collective.
+/// Gathers the rows of all ranks. Collective.
 fn gather_rows(session: &Session, rows: BlockRows, block: usize) -> Result<BlockRows> {
     if session.ranks() == 1 {
         return Ok(rows);

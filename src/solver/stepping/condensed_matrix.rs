@@ -1,4 +1,4 @@
-//! The matrix of a step, condensed on the motions on which contact laws act.
+//! The matrix of a step, condensed to the motions on which contact laws act.
 
 use super::equations::StepMatrix;
 use crate::{
@@ -12,25 +12,26 @@ use std::{cell::RefCell, ops::Range};
 /// A motion of one contact node on which laws act: one scalar unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
-    /// Where the values of its node start in vectors of contact nodes.
+    /// Position of the values of its node in vectors of contact nodes.
     pub at: usize,
     pub direction: Vec<f64>,
 }
 
-/// The Schur complement `S = L L^T - B` of all other motions, whole on each rank, with the springs `B` that were factored with it.
+/// The Schur complement `S = L L^T - B` of the motions on which laws act, stored completely on each rank; `B` are springs that were
+/// factored with the matrix.
 ///
 /// Vectors hold all components of the contact nodes of a rank; motions on which no law acts have no stiffness here.
 pub(super) struct CondensedMatrix {
     /// Columns of `L` from the diagonal down.
     pub lower: Vec<f64>,
-    /// The place of each motion of all ranks in `L`.
+    /// The position of each motion of all ranks in `L`.
     pub places: Vec<usize>,
     /// The motions of each node of all ranks.
     pub nodes: Vec<Range<usize>>,
-    /// Which motions are those of this rank.
+    /// The range of this rank in these motions.
     pub own: Range<usize>,
     pub motions: Vec<Motion>,
-    /// Stiffness along each motion of this rank that the factor has and the matrix has not, in N s/m; none, or one a motion.
+    /// Stiffness of the springs in the factor along each motion of this rank, in N s/m; empty without springs.
     pub springs: Vec<f64>,
     pub subspace: RefCell<Subspace>,
     pub workspace: RefCell<Workspace>,
@@ -49,12 +50,12 @@ pub(super) struct Workspace {
     blocks: Vec<f64>,
     block_gathering: Gathering,
     images: [Vec<f64>; DIMENSIONS],
-    /// Bytes read since traffic is counted.
+    /// Bytes read since the count of traffic was restarted.
     traffic: u64,
 }
 
 impl Workspace {
-    /// For these motions of this rank, and so many of all ranks. Collective.
+    /// For these motions of this rank, and this number of motions of all ranks. Collective.
     pub fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
         let world = SimpleCommunicator::world();
         let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
@@ -73,7 +74,7 @@ impl Workspace {
     }
 }
 
-/// What is made for the subspace of the solves.
+/// Data of the current subspace.
 pub(super) struct Subspace {
     room: DistributedVector,
     /// The blocks of the projection, node after node of all ranks.
@@ -83,7 +84,7 @@ pub(super) struct Subspace {
 }
 
 impl Subspace {
-    /// The whole space, of vectors laid out like `like`.
+    /// The whole space, for vectors with the layout of `like`.
     pub fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
         let room = like.like()?;
         Ok(RefCell::new(Self { room, made_for: Vec::new(), factor: None, in_use: false }))
@@ -91,7 +92,7 @@ impl Subspace {
 }
 
 impl CondensedMatrix {
-    /// Writes a vector of contact nodes that moves by `L x`.
+    /// Writes a vector of contact nodes with the motions `L x`.
     pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         workspace.traffic += self.bytes();
@@ -108,17 +109,18 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// Counts traffic from here on.
+    /// Restarts the count of traffic.
     pub fn restart_traffic(&self) {
         self.workspace.borrow_mut().traffic = 0;
     }
 
-    /// Bytes of `L`, or of the factor on a subspace, that products and solves read since then.
+    /// Bytes of `L`, or of the factor on a subspace, that products and solves have read since then.
     pub fn traffic(&self) -> u64 {
         self.workspace.borrow().traffic
     }
 
-    /// Reads the amounts of all motions in a vector of contact nodes into the first place, in the order of the factor. Collective.
+    /// Reads the amounts of all motions in a vector of contact nodes into the first work vector, in the order of the factor.
+    /// Collective.
     fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
         let Workspace { own, all, gathering, placed: [placed, _], .. } = workspace;
         {
@@ -132,7 +134,7 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// Writes a vector of contact nodes that moves by these amounts, given in the order of the factor.
+    /// Writes a vector of contact nodes with these amounts of the motions, given in the order of the factor.
     fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let mut values = vector.owned_mut()?;
         values.fill(0.0);
@@ -144,7 +146,7 @@ impl CondensedMatrix {
         Ok(())
     }
 
-    /// Bytes of `L`; the factor on a subspace has as many.
+    /// Bytes of `L`; the factor on a subspace has the same size.
     fn bytes(&self) -> u64 {
         size_of_val(&self.lower[..]) as u64
     }

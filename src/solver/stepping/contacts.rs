@@ -1,4 +1,4 @@
-//! Contacts before a step and after it.
+//! Operations on contacts before and after a step.
 
 use crate::{
     error::Result,
@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// Adds what contact dissipated, lost to the scheme and gave to obstacles in a committed step.
+/// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles.
 pub(super) fn released_by_contact<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,

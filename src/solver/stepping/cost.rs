@@ -1,13 +1,13 @@
-//! What a preconditioner costs, roughly.
+//! Estimated costs of preconditioners.
 //!
-//! Nested dissection leaves `n log n` entries of a factor in the plane and `n^(4/3)` in space, and takes `n^(3/2)` and `n^2`
-//! operations; multigrid works in proportion to the unknowns. The constants were measured on one core of a common server with
-//! 10^4 to 10^6 unknowns (docs/speed.md); expect a factor of two either way.
+//! Nested dissection leaves `n log n` entries of a factor in 2D and `n^(4/3)` in 3D, and needs `n^(3/2)` and `n^2`
+//! operations; the work of multigrid is proportional to the unknowns. The constants were measured on one core of a common server
+//! with 10^4 to 10^6 unknowns (docs/speed.md); estimates can be wrong by a factor of two.
 
 use super::linear_solver::{FactorPrecision, Preconditioner, ProblemSize};
 use crate::{fem::body::Body, linear_algebra::petsc::Precision, parallel::session::Session};
 
-/// Costs of a preconditioner with the solves of a step, on one rank and over all ranks together.
+/// Costs of a preconditioner and of the solves of a step, on one rank and over all ranks together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Bytes of a factor or a hierarchy.
@@ -16,18 +16,19 @@ pub struct Cost {
     pub set_up: f64,
     /// Seconds of a step.
     pub step: f64,
-    /// Krylov iterations of a step that exchange messages.
+    /// Krylov iterations of a step with communication.
     pub iterations: f64,
 }
 
-/// Bytes of a factor in double precision that fits no cache.
+/// Size in bytes above which a factor in double precision does not fit any cache.
 const BEYOND_CACHES: f64 = 16e6;
-/// Seconds of the messages of a V-cycle between processes of one machine: 25 exchanges with two neighbours (docs/scaling.md).
+/// Seconds for the messages of a V-cycle between processes of one machine: 25 exchanges with two neighbours (docs/scaling.md).
 const MESSAGES: f64 = 100e-6;
-/// V-cycles whose messages take as long as those of a set-up.
+/// Number of V-cycles whose messages take as long as those of a set-up.
 const SET_UP_CYCLES: f64 = 100.0;
 
-/// Iterations of a step without contact, with it, and with friction, which may hold nodes that are free in the preconditioner's matrix.
+/// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's
+/// matrix.
 struct Iterations {
     without: f64,
     contact: f64,
@@ -35,7 +36,7 @@ struct Iterations {
 }
 
 impl ProblemSize {
-    /// The problem size of so many steps of this body.
+    /// The problem size for this number of steps of this body.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
@@ -57,7 +58,7 @@ impl ProblemSize {
         if self.dimension == 2 { in_plane } else { in_space }
     }
 
-    /// Bytes of the matrix in compressed rows, where a node has 7 neighbours with itself in the plane, 15 in space.
+    /// Bytes of the matrix in compressed rows, where a node and its neighbours are 7 nodes in 2D and 15 in 3D.
     pub fn matrix(self) -> f64 {
         12.0 * self.unknowns as f64 * self.pick(7.0 * 2.0, 15.0 * 3.0)
     }
@@ -70,8 +71,8 @@ impl ProblemSize {
         }
     }
 
-    /// The precision of factors: single where that is asked for, or where it takes less time. In space two or three corrections
-    /// reach what one solve in double precision does, in the plane four to seven (docs/speed.md).
+    /// The precision of factors: single where it is requested, or where it takes less time. In 3D two or three corrections
+    /// reach the accuracy of one solve in double precision, in 2D four to seven (docs/speed.md).
     pub fn factor_precision(self) -> Precision {
         let served = self.contact
             && (self.ranks == 1 || Preconditioner::Cholesky.is_redundant(self.ranks, self.unknowns));
@@ -88,7 +89,7 @@ impl ProblemSize {
         }
     }
 
-    /// The cost of a factor, with the solves of a step.
+    /// The cost of a factor, including the solves of a step.
     fn factor(self, precision: Precision) -> Cost {
         let n = self.unknowns as f64;
         let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
@@ -135,12 +136,12 @@ impl ProblemSize {
         }
     }
 
-    /// Seconds of set-up and of the steps that one matrix is for, on one rank.
+    /// Seconds of set-up and of the steps that share one matrix, on one rank.
     fn work(self, cost: Cost) -> f64 {
         cost.set_up + self.steps as f64 * cost.step
     }
 
-    /// Seconds of set-up and of the steps that one matrix is for: work that every rank does, or that they share with messages.
+    /// Seconds of set-up and of the steps that share one matrix: work that every rank repeats, or work shared with messages.
     pub(super) fn seconds(self, preconditioner: Preconditioner) -> f64 {
         let (cost, steps) = (self.cost(preconditioner), self.steps as f64);
         let work = self.work(cost);

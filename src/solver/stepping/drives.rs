@@ -1,8 +1,8 @@
-//! Loads and moving obstacles, evaluated inside a step before it is tried.
+//! Time-dependent loads and moving obstacles, evaluated over a step before it is attempted.
 //!
-//! Each of their expressions is sampled at a few places of the body's bounding box, the same on all ranks. Where a piece of one
-//! ends (`min`, `max`, `abs`, `sign`, `floor`, `ceil`, `round`) is found between two samples by bisection, and a step ends there.
-//! What is left between the ends of a step should be a straight line, up to the tolerance of a step.
+//! Each expression is sampled at a few points of the body's bounding box, the same on all ranks. Ends of smooth pieces
+//! (`min`, `max`, `abs`, `sign`, `floor`, `ceil`, `round`) between two samples are located by bisection, and a step ends there.
+//! Between the ends of a step an expression should be linear in time, up to the tolerance of a step.
 
 use super::step_length::{Landing, SNAP};
 use crate::{
@@ -16,29 +16,29 @@ use crate::{
 const SAMPLES: u32 = 64;
 /// Samples of the whole run, for the largest values.
 const SAMPLES_OF_ALL: u32 = 1024;
-/// Share of the largest value up to which values on both sides of a place count as one, so that it is no jump.
+/// Values on both sides of a point of time that differ by less than this share of the largest value are equal: there is no jump.
 const CONTINUOUS: f64 = 1e-9;
 
-/// The expressions that change with time.
+/// The time-dependent expressions.
 #[derive(Debug)]
 pub(super) struct Drives<const D: usize> {
     all: Vec<Drive<D>>,
 }
 
-/// An expression where it acts.
+/// An expression and its sample points.
 #[derive(Debug)]
 struct Drive<const D: usize> {
-    /// What it is of, for the log.
+    /// What it describes, for the log.
     what: &'static str,
     value: Scalar,
-    /// Where it is sampled.
+    /// The sample points.
     places: Vec<Vector<D>>,
-    /// The largest value of a load in the run, or the distance that an obstacle moves.
+    /// The largest value of a load in the run, or the distance over which an obstacle moves.
     largest: f64,
 }
 
 impl<const D: usize> Drives<D> {
-    /// Those of a body, in a run to the time `end`. Collective.
+    /// The expressions of a body, in a run to the time `end`. Collective.
     pub fn of<const S: usize>(session: &Session, body: &Body<D, S>, end: f64) -> Self {
         let lattice = lattice(session, &body.mesh.nodes);
         let mut all = Vec::new();
@@ -63,8 +63,8 @@ impl<const D: usize> Drives<D> {
         Self { all }
     }
 
-    /// The first time after the step that begins at `start` has gone on for `least`, and not after `last`, at which a piece of an
-    /// expression ends; `length` is that of a step. Collective.
+    /// The first time at which a piece of an expression ends, for a step from `start` that is at least `least` long and does not
+    /// pass `last`; `length` is the length of a step. Collective.
     pub fn first_end(
         &self,
         session: &Session,
@@ -88,13 +88,13 @@ impl<const D: usize> Drives<D> {
                 }
             }
         }
-        // All ranks sample the same: their results differ by rounding at most.
+        // All ranks use the same samples: their results differ by rounding at most.
         let [first, number] = session.largest(mine);
         let what = self.all.get(number as usize).map(|drive| drive.what);
         first.is_finite().then_some(Landing { time: -first, what })
     }
 
-    /// The largest distance within a step from the straight line between its ends, beside the largest value. Collective.
+    /// The largest deviation within a step from the linear function between its ends, relative to the largest value. Collective.
     pub fn departure(&self, session: &Session, step: Step) -> f64 {
         if self.all.is_empty() {
             return 0.0;
@@ -107,7 +107,7 @@ impl<const D: usize> Drives<D> {
 }
 
 impl<const D: usize> Drive<D> {
-    /// Its values in the run: of a load the largest, of an obstacle how far they lie apart.
+    /// The scale of its values in the run: the largest value of a load, the largest distance between positions of an obstacle.
     fn measure(&self, end: f64, is_load: bool) -> f64 {
         let of = |place: &Vector<D>| {
             let times = (0..=SAMPLES_OF_ALL).map(|at| end * f64::from(at) / f64::from(SAMPLES_OF_ALL));
@@ -121,7 +121,7 @@ impl<const D: usize> Drive<D> {
         self.places.iter().map(of).fold(0.0, f64::max)
     }
 
-    /// Where a piece ends between two times, if one does: before a jump, and a round number where there is none.
+    /// The end of a piece between two times, if there is one: before a jump; a round number where there is no jump.
     fn end_between(&self, [mut low, mut high]: [f64; 2], place: &Vector<D>) -> Option<f64> {
         let before = self.value.pieces(low, place);
         if self.value.pieces(high, place) == before {
@@ -158,7 +158,7 @@ impl<const D: usize> Drive<D> {
     }
 }
 
-/// The middle of the body's bounding box, and the corners and the middles of the sides, edges and faces. Collective.
+/// The centre of the body's bounding box, its corners, and the centres of its sides, edges and faces. Collective.
 fn lattice<const D: usize>(session: &Session, nodes: &[Vector<D>]) -> Vec<Vector<D>> {
     let mut mine = [[f64::NEG_INFINITY; D]; 2];
     for node in nodes {
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn the_departure_is_from_a_straight_line_and_relative_to_the_largest_value() {
         assert_eq!(drive("3*t").departure([0.25, 0.5]), 0.0);
-        // A parabola is k^2/4 away in the middle; its largest value is 4.
+        // The deviation of a parabola is k^2/4 at the centre; its largest value is 4.
         assert!((drive("t^2").departure([0.5, 1.0]) - 0.0625 / 4.0).abs() < 1e-15);
         assert!(drive("exp(-((t - 0.6)/0.01)^2)").departure([0.5, 0.75]) > 0.5, "a pulse inside");
         assert_eq!(drive("0*t").departure([0.5, 0.75]), 0.0);

@@ -1,4 +1,4 @@
-//! The equations of one step, `K v + C(v) = b`, in the form that PETSc's SNES takes.
+//! The equations of one step, `K v + C(v) = b`, in the form that PETSc's SNES requires.
 
 use crate::{
     error::{Error, Result},
@@ -12,18 +12,18 @@ pub trait StepMatrix {
     /// `y = K x`. Collective.
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()>;
 
-    /// `z` near `K^-1 r`, on the subspace last set; for matrices that PETSc makes no preconditioner of. Collective.
+    /// Approximates `z = K^-1 r` on the subspace last set, for matrices for which PETSc creates no preconditioner. Collective.
     fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("a matrix that PETSc preconditions was asked to do it".into()))
     }
 
-    /// Sets the subspace of the solves that follow, given the projection on it; says whether a preconditioner was made
+    /// Sets the subspace of later solves, given the projection on it; returns whether a preconditioner was created
     /// for it. Collective.
     fn set_subspace(&self, _project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         Ok(false)
     }
 
-    /// The matrix itself, if its entries are at hand.
+    /// The matrix itself, if its entries are stored.
     fn assembled(&self) -> Option<&Matrix> {
         None
     }
@@ -39,12 +39,12 @@ impl StepMatrix for Matrix {
     }
 }
 
-/// Forces of the cells beyond `K v`, at velocities without ghost values.
+/// Forces of the cells in addition to `K v`, at velocities without ghost values.
 pub trait CellForces {
     /// Adds the forces at a velocity.
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()>;
 
-    /// Takes a velocity as the point of linearisation.
+    /// Sets a velocity as the point of linearisation.
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()>;
 
     /// Whether the derivative is symmetric in this rank's cells.
@@ -58,9 +58,9 @@ pub trait CellForces {
 pub struct ContactEquations<'a, const D: usize> {
     /// `K`.
     pub matrix: &'a dyn StepMatrix,
-    /// What makes up `C`.
+    /// The contacts that define `C`.
     pub contacts: &'a mut [Contact<D>],
-    /// What cells add to `K v`, if that is not linear.
+    /// Nonlinear forces of cells in addition to `K v`, if there are any.
     pub cells: Option<&'a mut dyn CellForces>,
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
@@ -70,11 +70,11 @@ pub struct ContactEquations<'a, const D: usize> {
     pub linear_solver: &'a mut ProjectedKsp,
     /// All ranks.
     pub session: &'a Session,
-    /// Whether to fail when the branches of the contact graph come back.
+    /// Whether to fail when a set of branches of the contact graphs recurs.
     pub stop_at_cycles: bool,
     /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
     pub equilibrated: bool,
-    /// What was done so far.
+    /// Counts of the work done so far.
     pub effort: Effort,
 }
 
@@ -84,14 +84,14 @@ pub struct Scratch {
     /// The velocities of the last residual.
     pub velocity: DistributedVector,
     open: DistributedVector,
-    /// The change of the velocities to equilibrium, where steps are solved so.
+    /// The change of the velocities to equilibrium, where steps are solved in this way.
     correction: Option<DistributedVector>,
-    /// Ghosted values and forces, where some contact reads ghost nodes.
+    /// Values and forces with ghosts, where some contact reads ghost nodes.
     ghosted: Option<[DistributedVector; 2]>,
 }
 
 impl Scratch {
-    /// Work vectors laid out like `like`, for these contacts.
+    /// Work vectors with the layout of `like`, for these contacts.
     pub fn new<const D: usize>(like: &DistributedVector, contacts: &[Contact<D>]) -> Result<Self> {
         let ghosts = contacts.iter().any(Contact::needs_ghosts);
         Ok(Self {
@@ -103,31 +103,31 @@ impl Scratch {
     }
 }
 
-/// What Newton's method did in a step.
+/// Counts of the work of Newton's method in a step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Effort {
     /// Calls of the residual.
     pub residuals: usize,
     /// Krylov iterations.
     pub linear_iterations: usize,
-    /// Linear systems in which CG met negative curvature.
+    /// Linear systems in which CG found negative curvature.
     pub indefinite: usize,
-    /// How often the preconditioner was made anew.
+    /// Number of times that the preconditioner was rebuilt.
     pub refreshed: usize,
-    /// Linear systems that were not symmetric: some point slides under a bound that follows the pressure.
+    /// Linear systems that were not symmetric: some point slides with a friction bound that depends on the pressure.
     pub coupled: usize,
-    /// A number for the set of branches of all points, one a linearisation; different sets have different numbers.
+    /// A hash of the branches of all points for each linearisation; different sets of branches have different hashes.
     pub sets: Vec<f64>,
 }
 
 impl Effort {
-    /// Nothing done; `sets` keeps its memory.
+    /// Resets all counts; `sets` keeps its memory.
     pub fn restart(&mut self) {
         self.sets.clear();
         *self = Self { sets: std::mem::take(&mut self.sets), ..Self::default() };
     }
 
-    /// How many iterations ago the set of branches was the same as now, if there were others in between.
+    /// The number of iterations since the same set of branches occurred, if other sets occurred in between.
     pub fn period(&self) -> Option<usize> {
         let (last, before) = self.sets.split_last()?;
         let at = before.iter().rposition(|set| set == last)?;
@@ -135,14 +135,14 @@ impl Effort {
     }
 }
 
-/// That the branches came back, in words.
+/// The message that a set of branches recurred.
 pub(super) fn cycle(period: usize) -> String {
     format!(
         "Newton's method came back to the branches of the contact graph that it had {period} iterations before"
     )
 }
 
-/// Adds to `out` what `add` adds to nodal values, given those of `x`.
+/// Adds to `out` the contribution that `add` computes from the nodal values of `x`.
 fn add_contact<const D: usize>(
     ghosted: &mut Option<[DistributedVector; 2]>,
     contacts: &[Contact<D>],
@@ -229,7 +229,7 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         }
         let digests = self.contacts.iter().map(Contact::set_digest);
         let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
-        // Half the bits are enough for different numbers, and their sum over ranks is exact.
+        // Half the bits suffice to distinguish sets, and their sum over ranks is exact.
         let [all] = self.session.sum([(mine >> 32) as f64]);
         self.effort.sets.push(all);
         match self.effort.period() {
@@ -299,9 +299,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     }
 }
 
-/// `P Q (K + F' + C') P` in velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
-/// their graphs and `Q` takes the unknown pressures of sliding points out of the equations: the identity, unless friction follows
-/// these.
+/// `P Q (K + F' + C') P` for velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
+/// their graphs, and `Q` eliminates the unknown pressures of sliding points from the equations; `Q` is the identity unless friction
+/// depends on these pressures.
 struct Reduced<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
     cells: Option<&'a mut dyn CellForces>,

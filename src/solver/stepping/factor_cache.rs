@@ -1,7 +1,7 @@
-//! Matrices with their preconditioners, kept for when steps are of these lengths again.
+//! Matrices with their preconditioners, stored for later steps of the same lengths.
 //!
-//! Step lengths are powers of two times the first one. The preconditioner of such a length is used for all lengths near it: two matrices
-//! `M / k + A + k E` of lengths in the ratio `r` differ by factors from `1 / r` to `r`.
+//! Step lengths are powers of two times the first one. The preconditioner of such a length is used for all nearby lengths: two
+//! matrices `M / k + A + k E` whose lengths have the ratio `r` are spectrally equivalent with factors from `1 / r` to `r`.
 
 use super::{
     condensed::Factored,
@@ -16,18 +16,18 @@ use crate::{
 };
 use std::mem::swap;
 
-/// Matrices that are kept at most, with the one in use.
+/// Largest number of stored matrices, including the one in use.
 const MOST: usize = 8;
-/// Bytes of a rank that they may take.
+/// Bytes that they may occupy on a rank.
 const ROOM: f64 = 512e6;
 
 /// A matrix with its preconditioner.
 pub(super) struct Cached {
-    /// Length in s of the steps that the matrix is of.
+    /// Length in s of the steps to which the matrix belongs.
     pub length: f64,
     /// The matrix.
     pub matrix: Matrix,
-    /// What solves with it.
+    /// The solver for it.
     pub krylov: Krylov,
 }
 
@@ -42,7 +42,7 @@ pub(super) enum Krylov {
 }
 
 impl Krylov {
-    /// One like that in use, not set up.
+    /// A solver like the one in use, not set up.
     pub fn another<const D: usize>(
         used: &Solver,
         session: &Session,
@@ -59,7 +59,7 @@ impl Krylov {
         })
     }
 
-    /// Changes places with the one in use.
+    /// Swaps the contents with the solver in use.
     pub fn exchange(&mut self, used: &mut Solver) {
         match (self, used) {
             (Self::Linear(mine), Solver::Linear(used)) => swap(mine, used),
@@ -74,39 +74,39 @@ impl Krylov {
     }
 }
 
-/// Matrices with their preconditioners that are not in use, the one used last at the end.
+/// Matrices with their preconditioners that are not in use, the most recently used at the end.
 pub(super) struct FactorCache {
     kept: Vec<Cached>,
     most: usize,
 }
 
 impl FactorCache {
-    /// None yet; so many are kept besides the one in use.
+    /// An empty cache for this number of matrices besides the one in use.
     pub fn new(most: usize) -> Self {
         Self { kept: Vec::new(), most }
     }
 
-    /// Puts one away; gives the one that has not been used for longest where there are too many.
+    /// Stores an entry; returns the least recently used one if there are too many.
     pub fn put(&mut self, cached: Cached) -> Option<Cached> {
         self.kept.push(cached);
         (self.kept.len() > self.most).then(|| self.kept.remove(0))
     }
 
-    /// Takes the one of this length out.
+    /// Removes and returns the entry of this length.
     pub fn take(&mut self, length: f64) -> Option<Cached> {
         let at = self.kept.iter().position(|cached| cached.length == length)?;
         Some(self.kept.remove(at))
     }
 }
 
-/// The power of two times `base` that is nearest to this length.
+/// The power of two times `base` nearest to this length.
 pub(super) fn nearest(base: f64, length: f64) -> f64 {
     base * 2f64.powi((length / base).log2().round() as i32)
 }
 
 impl Preconditioner {
-    /// Bytes over all ranks of a factor or a hierarchy, about, given those of the matrix: nested dissection's `n log n` and
-    /// `n^(4/3)` entries, or work proportional to the unknowns.
+    /// Estimated bytes of a factor or a hierarchy over all ranks, given those of the matrix: nested dissection's `n log n` and
+    /// `n^(4/3)` entries, or a size proportional to the unknowns.
     pub fn bytes(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> f64 {
         let n = unknowns as f64;
         match self {
@@ -120,8 +120,8 @@ impl Preconditioner {
         }
     }
 
-    /// How many matrices of different lengths are kept, each with its preconditioner, with the one in use: as many as find
-    /// room in 512 MB of each rank, at most 8.
+    /// Number of matrices of different lengths to store, each with its preconditioner, including the one in use: as many as fit
+    /// into 512 MB on each rank, at most 8.
     pub fn kept(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
         let each = (matrix + self.bytes(dimension, unknowns, ranks, matrix)) / ranks as f64;
         ((ROOM / each.max(1.0)) as usize).clamp(1, MOST)

@@ -1,4 +1,4 @@
-//! The ways in which Newton's method is tried on a step.
+//! Fallbacks of Newton's method for a step.
 
 use super::linear_solver::FrictionIteration;
 
@@ -6,19 +6,20 @@ use super::linear_solver::FrictionIteration;
 #[derive(Clone, Copy)]
 pub(super) struct Fallback {
     pub search: Search,
-    /// How much stiffer than the body the parameters of the graphs are: which branches come back depends on it.
+    /// Ratio of the parameters of the graphs to the resistance of the body; which branches recur depends on it.
     pub stiffer: f64,
     pub iteration: FrictionIteration,
 }
 
-/// How far Newton's method goes along each of its steps, and on which equations.
+/// Step lengths of Newton's method, and the equations that determine them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Search {
-    /// All steps in full.
+    /// Full steps only.
     FullSteps,
-    /// Every step as far as the residual falls enough.
+    /// Each step is shortened until the residual decreases enough.
     Backtracking,
-    /// The same for the equations of the contact points alone: all other velocities are in equilibrium with theirs.
+    /// The same for the equations of the contact points alone: all other velocities are in equilibrium with those of the contact
+    /// points.
     Equilibrated,
 }
 
@@ -26,11 +27,12 @@ const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> 
     Fallback { search, stiffer, iteration }
 }
 
-/// What is tried in turn until a step is solved, each time from where the step started.
+/// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
 ///
-/// Full steps first: a new set of branches raises the residual of the whole body, so that a search would take tiny steps where full
-/// ones arrive. With all other velocities in equilibrium the residual is that of the contact points alone and measures how far off these
-/// are. The fixed-point iterations, at last, do not cycle between pressure and friction; they are for friction that follows the pressure.
+/// Full steps are tried first: a new set of branches raises the residual of the whole body, so that a line search would take very
+/// short steps where full ones converge. With all other velocities in equilibrium the residual is that of the contact points alone
+/// and measures their error. The last fallback, fixed-point iteration, avoids cycles between pressure and friction; it is used if
+/// friction depends on the pressure.
 const FALLBACKS: [Fallback; 12] = [
     attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
     attempt(Search::Equilibrated, 1.0, FrictionIteration::Newton),
@@ -46,21 +48,21 @@ const FALLBACKS: [Fallback; 12] = [
     attempt(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
 ];
 
-/// What decides which fallbacks a step has.
+/// The properties that determine the fallbacks of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Conditions {
-    /// Whether some friction bound follows the contact pressure.
+    /// Whether some friction bound depends on the contact pressure.
     pub follows_pressure: bool,
-    /// How such bounds find the pressure first.
+    /// How such bounds obtain the pressure at first.
     pub friction: FrictionIteration,
-    /// Whether the user chose how to search along steps.
+    /// Whether the user has set a line search.
     pub chosen_search: bool,
-    /// Whether the equations of all but the contact points are linear.
+    /// Whether all equations except those of the contact points are linear.
     pub interior_is_linear: bool,
 }
 
 impl Conditions {
-    /// The fallbacks in their order.
+    /// The fallbacks in order.
     pub fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         let applies = move |fallback: &Fallback| {
             let iteration = match fallback.iteration {

@@ -1,4 +1,4 @@
-//! The forces of cells that flow in the equations that Newton's method solves.
+//! Forces of cells with viscoplastic flow in the equations of Newton's method.
 
 use super::equations::CellForces;
 use crate::{
@@ -32,7 +32,7 @@ pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
 }
 
 impl Flow {
-    /// Vectors laid out like `like`.
+    /// Vectors with the layout of `like`.
     pub fn new(like: &DistributedVector) -> Result<Self> {
         Ok(Self { values: like.like()?, forces: like.like()?, tangents: Tangents::default() })
     }
@@ -47,7 +47,7 @@ impl Flow {
         FlowForces { flow: self, cells, start, symmetric }
     }
 
-    /// Adds the sum of all ranks to `out`, without held components.
+    /// Adds the sum over all ranks to `out`, without prescribed components.
     fn add_sum_to(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
         let forces = self.forces.owned()?;

@@ -1,4 +1,4 @@
-//! Directions at contact nodes in place of the axes.
+//! Local directions at contact nodes that replace the coordinate axes.
 
 use crate::{
     error::Result,
@@ -11,20 +11,20 @@ use crate::{
 /// The frames of the contact nodes of all ranks.
 pub(super) struct Frames {
     dimension: usize,
-    /// Number of the frame of each node of all ranks, or `NONE`.
+    /// Index of the frame of each node of all ranks, or `NONE`.
     at: Vec<u32>,
     /// `dimension` directions each.
     directions: Vec<f64>,
     /// The components along directions on which contact laws act, of all ranks.
     pub unknowns: Vec<usize>,
-    /// Which unknowns are those of each contact node.
+    /// The unknowns of each contact node.
     pub groups: Vec<std::ops::Range<usize>>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Frames {
-    /// Those of the contact nodes of this rank and the others. Collective.
+    /// The frames of the contact nodes of this rank and all others. Collective.
     pub fn new<const D: usize>(session: &Session, mesh: &Mesh<D>, nodes: &[ContactNode<D>]) -> Result<Self> {
         let world = session.world();
         let mine: Vec<u64> = nodes.iter().map(|c| (mesh.first_node + c.node) as u64).collect();
@@ -43,18 +43,18 @@ impl Frames {
         Ok(Self { dimension: D, at, directions, unknowns, groups })
     }
 
-    /// Unknowns of all nodes of all ranks.
+    /// Number of unknowns of all nodes of all ranks.
     pub fn total(&self) -> usize {
         self.at.len() * self.dimension
     }
 
-    /// The components of a node's value along its directions; `None` where these are the axes.
+    /// The components of a nodal value along its directions; `None` where these are the axes.
     fn of(&self, node: usize) -> Option<&[f64]> {
         let size = self.dimension * self.dimension;
         (self.at[node] != NONE).then(|| &self.directions[self.at[node] as usize * size..][..size])
     }
 
-    /// Replaces components along the axes by those along the directions, or back.
+    /// Transforms components along the axes into components along the directions, or back.
     pub fn turn(&self, values: &mut [f64], back: bool) {
         let d = self.dimension;
         for (node, value) in values.chunks_exact_mut(d).enumerate() {
@@ -85,7 +85,7 @@ impl Frames {
     }
 }
 
-/// Replaces the entries of a square block.
+/// Transforms the entries of a square block.
 fn multiply(block: &mut [f64], entry: impl Fn(&[f64], usize, usize) -> f64) {
     let before = block.to_vec();
     let d = block.len().isqrt();

@@ -1,13 +1,14 @@
-//! What implicit Euler and the two-step formula share: a step of length `k'` from a blend `x~` of the states before.
+//! Common part of implicit Euler and the two-step formula: a step of length `k'` from a blend `x~` of earlier states.
 //!
 //! ```text
 //! (M / k' + A + k' E) v_n + C(v_n) + B^T (s_n - s*) = f_n + M v~ / k' - B^T s~,   s~ = E e(u~) + H_{n-1},   s* = s~ + k' E e(v_n)
 //! ```
 //!
-//! Energy: tested with `k v_n`, the change of the kinetic energy `1/2 (x, x)` and what the formula makes of it differ by
-//! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`. The elastic energy differs
-//! from the work of the stress less that on the flow of the step by `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`,
-//! in the metric of the compliance. For implicit Euler only the last terms are left.
+//! Energy: tested with `k v_n`, the change of the kinetic energy `1/2 (x, x)` and the work of the discrete inertia forces differ by
+//! `1/2 |x_n|^2 - 1/2 |x_{n-1}|^2 - k (x_n, x'_n) = (x_n, x_n - x_{n-1} - k x'_n) - 1/2 |x_n - x_{n-1}|^2`. The elastic energy
+//! differs from the work of the stress less its work on the flow of the step by
+//! `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`, in the compliance norm. For implicit Euler only the last terms
+//! remain.
 
 use super::{contacts::released_by_contact, flow::FlowStart, outcome::over_ranks};
 use crate::{
@@ -22,17 +23,17 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Work vectors, and the energies of a step that need the state before it.
+/// Work vectors, and the energy terms of a step that depend on the state before it.
 pub(super) struct Implicit {
     formula: fn(Step) -> Blend,
-    /// The blend of the step in hand.
+    /// The blend of the current step.
     blend: Blend,
     /// `u~` and `v~`, with ghosts.
     displacement: DistributedVector,
     velocity: DistributedVector,
     /// `u_n`, with ghosts.
     end: DistributedVector,
-    /// Squares of the forces of this rank's cells at the start.
+    /// Sums of squares of the forces of this rank's cells at the start.
     squares: f64,
     solved: Energy,
     /// `M v_n`, where the energy balance needs it.
@@ -40,7 +41,7 @@ pub(super) struct Implicit {
 }
 
 impl Implicit {
-    /// Vectors laid out like those of the state.
+    /// Vectors with the layout of those of the state.
     pub fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
         let like = || state.velocity.like();
         Ok(Self {
@@ -84,7 +85,7 @@ impl Implicit {
         Ok(())
     }
 
-    /// Corrects contacts that are prepared for the step for the blend from which it starts.
+    /// Corrects prepared contacts for the blend from which the step starts.
     pub fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -103,17 +104,17 @@ impl Implicit {
         body.contacts.iter_mut().try_for_each(|contact| contact.blend(step, self.blend, &shift))
     }
 
-    /// Where the displacement starts, for cells that flow.
+    /// The displacement from which the step starts, for cells with flow.
     pub fn flow_start(&self) -> FlowStart<'_> {
         FlowStart { displacement: &self.displacement, length: self.blend.length }
     }
 
-    /// The residual norm in N that rounding errors of the forces make. Collective.
+    /// The residual norm in N due to rounding errors of the forces. Collective.
     pub fn rounding(&self, session: &Session) -> f64 {
         1e-13 * session.sum([self.squares])[0].sqrt()
     }
 
-    /// Displacement, trial histories and the terms of the energy balance that need the state before. Collective.
+    /// Computes displacement, trial histories and the terms of the energy balance that need the previous state. Collective.
     pub fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -141,7 +142,7 @@ impl Implicit {
         Ok(())
     }
 
-    /// Takes the solved step over into the state. Collective.
+    /// Commits the solved step to the state. Collective.
     pub fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         state.commit_both(solved, &self.end, step.time, step.length)
     }

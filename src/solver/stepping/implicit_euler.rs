@@ -5,11 +5,11 @@
 //! s_n = s_{n-1} + k [E e(v_n) + G(s_n)],   u_n = u_{n-1} + k v_n,   sigma_n = A e(v_n) + s_n
 //! ```
 //!
-//! No bound on the step. Of first order.
+//! Unconditionally stable, of first order.
 
 use crate::fem::effect::{Blend, Step};
 
-/// How a step starts: from the state before it.
+/// The blend from which a step starts: the previous state.
 pub(super) fn blend(step: Step) -> Blend {
     Blend::euler(step.length)
 }

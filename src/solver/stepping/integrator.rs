@@ -1,4 +1,4 @@
-//! A time scheme at work: what is its own in a step.
+//! Time schemes: the parts of a step that are specific to a scheme.
 
 use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
 use crate::{
@@ -13,20 +13,20 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The state at which laws are evaluated under a scheme, before the first step.
+/// The state at which laws are evaluated under a scheme before the first step.
 pub fn evaluation(scheme: Scheme) -> Evaluation {
     if scheme.is_implicit() { Evaluation::End(Blend::euler(0.0)) } else { Evaluation::Converged }
 }
 
-/// A scheme with what it keeps from one part of a step to the next. Implicit schemes differ in the blend of earlier states from which
-/// a step starts, and have all else in common.
+/// A scheme with the data that it stores during a step. Implicit schemes differ only in the blend of earlier states from which
+/// a step starts.
 pub(super) enum Integrator {
     LaggedEuler(LaggedEuler),
     Implicit(Box<Implicit>),
 }
 
 impl Integrator {
-    /// The integrator of a scheme, for vectors laid out like those of the state.
+    /// The integrator of a scheme, for vectors with the layout of those of the state.
     pub fn new(scheme: Scheme, state: &State) -> Result<Self> {
         let blend = match scheme {
             Scheme::LaggedEuler => return Ok(Self::LaggedEuler(LaggedEuler::default())),
@@ -44,12 +44,12 @@ impl Integrator {
         }
     }
 
-    /// The same for a step after others of its length.
+    /// The same for a step that follows others of its length.
     pub fn steady_length(&self, length: f64) -> f64 {
         self.matrix_length(Step { time: 0.0, length, previous_length: length })
     }
 
-    /// Keeps what the step starts from, and adds its known forces to `forces` (with ghosts).
+    /// Stores the start of the step, and adds its known forces to `forces` (with ghosts).
     pub fn start<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -63,7 +63,7 @@ impl Integrator {
         }
     }
 
-    /// Corrects contacts that are prepared for the step for the blend from which it starts.
+    /// Corrects prepared contacts for the blend from which the step starts.
     pub fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -76,7 +76,7 @@ impl Integrator {
         }
     }
 
-    /// Where the displacement starts, for cells that flow at the end of the step.
+    /// The displacement from which the step starts, for cells that flow at the end of the step.
     pub fn flow_start(&self) -> Option<FlowStart<'_>> {
         match self {
             Self::LaggedEuler(_) => None,
@@ -84,7 +84,7 @@ impl Integrator {
         }
     }
 
-    /// The residual norm in N that rounding errors of the forces make. Collective.
+    /// The residual norm in N due to rounding errors of the forces. Collective.
     pub fn rounding(&self, session: &Session) -> f64 {
         match self {
             Self::LaggedEuler(_) => 0.0,

@@ -1,5 +1,5 @@
 //! The scheme of Wang and Cheng (2022), (24)-(25): backward difference for inertia, implicit viscosity and contact,
-//! elastic and viscoplastic stress from the step before.
+//! elastic and viscoplastic stress from the previous step.
 //!
 //! ```text
 //! H_n = H_{n-1} + k G(s_{n-1}),   s_n = E e(u_{n-1}) + H_n
@@ -18,14 +18,14 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Energies that the start of a step adds to its balance.
+/// Energies that are computed at the start of a step.
 #[derive(Debug, Default)]
 pub(super) struct LaggedEuler {
     explicit: Energy,
 }
 
-/// Refuses a step that is longer than explicit flow allows at the stresses for which forces were just added, if that depends on
-/// them. Collective.
+/// Refuses a step longer than the stability bound of explicit flow at the stresses for which forces were just added, if the bound
+/// depends on them. Collective.
 pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
     session: &Session,
     body: &mut Body<D, S>,

@@ -1,4 +1,4 @@
-//! Which Krylov method and preconditioner solve with the constant matrix.
+//! Krylov methods and preconditioners for the constant matrix.
 
 use crate::{
     error::Result,
@@ -18,17 +18,17 @@ pub struct SolverSettings {
     pub method: Method,
     /// The preconditioner.
     pub preconditioner: Preconditioner,
-    /// The precision of factors that steps with contact are solved with.
+    /// The precision of factors for steps with contact.
     pub factor_precision: FactorPrecision,
-    /// Newton iterations after which a step has failed.
+    /// Newton iterations after which a step fails.
     pub newton_iterations: usize,
-    /// Steps that one matrix is for, as far as is known.
+    /// Number of steps that share one matrix, as far as it is known.
     pub steps: u64,
-    /// Where the pressure that friction bounds follow is found.
+    /// How the pressure in friction bounds is determined.
     pub friction: FrictionIteration,
 }
 
-/// The sizes by which a preconditioner is chosen.
+/// The problem sizes that determine the choice of a preconditioner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProblemSize {
     /// Dimension of the space.
@@ -37,25 +37,25 @@ pub struct ProblemSize {
     pub unknowns: usize,
     /// Processes.
     pub ranks: usize,
-    /// Steps that one matrix is for, as far as is known.
+    /// Number of steps that share one matrix, as far as it is known.
     pub steps: u64,
     /// Whether there is contact.
     pub contact: bool,
     /// Whether there is friction.
     pub friction: bool,
-    /// The precision of factors that is asked for.
+    /// The requested precision of factors.
     pub precision: FactorPrecision,
 }
 
-/// Bytes of a factor beyond which it is made on request only.
+/// Size in bytes above which factors are made on request only.
 const LARGEST_FACTOR: f64 = 4e9;
-/// Most unknowns whose matrix every rank factors for itself.
+/// Largest number of unknowns for which every rank factors the matrix itself.
 const REDUNDANT: usize = 50_000;
-/// Krylov iterations after which a linear solve has failed.
+/// Krylov iterations after which a linear solve fails.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
 impl Preconditioner {
-    /// Replaces `Auto` by what takes less time for this problem, and says why.
+    /// Replaces `Auto` by the faster choice for this problem, and returns the reason.
     pub fn resolve(self, problem: ProblemSize) -> (Self, String) {
         let (chosen, why) = self.choose(problem);
         let single = chosen == Self::Cholesky && problem.factor_precision() == Precision::Single;
@@ -87,12 +87,13 @@ impl Preconditioner {
         (chosen, why)
     }
 
-    /// Whether every rank factors the whole matrix for itself.
+    /// Whether every rank factors the whole matrix.
     pub fn is_redundant(self, ranks: usize, unknowns: usize) -> bool {
         matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
     }
 
-    /// Iterations that cost as much as making it anew; in 3D that never pays (measured, see docs/contact-preconditioner.md).
+    /// Number of iterations that take as long as rebuilding it; in 3D rebuilding never pays (measured, see
+    /// docs/contact-preconditioner.md).
     pub(super) fn refresh_threshold(self, dimension: usize) -> usize {
         match self {
             _ if dimension == 3 => usize::MAX,
@@ -111,11 +112,11 @@ impl Preconditioner {
         }
     }
 
-    /// Sets the method and the preconditioner; PETSc options that the user gave stay.
+    /// Sets the method and the preconditioner; PETSc options of the user have priority.
     ///
-    /// Cholesky of a small matrix is done by CHOLMOD on every rank at once: MUMPS on several ranks sums in the order in
-    /// which messages arrive, so that no two runs agree to the last bit. It is used where the matrix is too large for that.
-    /// The faster way to GAMG's coarse matrices sums so, too, as soon as a rank has two neighbours, and is not used then.
+    /// Each rank applies CHOLMOD to a small matrix separately: MUMPS on several ranks sums in the order in which messages arrive,
+    /// so that results of two runs differ in the last bits. MUMPS is used only for larger matrices. The faster triple product for
+    /// the coarse matrices of GAMG also sums in the order of arrival, as soon as a rank has two neighbours, and is not used then.
     pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
         ksp.set_method("cg")?;
         match self {
