@@ -1,4 +1,4 @@
-//! A step solved from other start velocities, to see whether it has other solutions.
+//! Repeated solution of a step from other start velocities, to search for further solutions.
 
 use super::{StepOutcome, contacts::restore_pressures, problem::StepProblem, step_solver::StepSolver};
 use crate::{
@@ -6,15 +6,15 @@ use crate::{
     linear_algebra::petsc::DistributedVector,
 };
 
-/// Velocities differ when they do by more than this share of the larger one.
+/// Velocities that differ by more than this share of the larger one are different.
 const DIFFERENT: f64 = 1e-6;
-/// Normal velocities of all contact points alike, over the largest velocity at which a law turns a corner; every second
-/// start has them at random instead.
+/// Uniform normal velocity of all contact points, relative to the largest velocity at which a law has a kink; every second
+/// start has random velocities instead.
 const ALIKE: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
-/// Range of the random ones.
+/// Range of the random velocities.
 const RANDOM: [f64; 2] = [-1.0, 2.0];
 
-/// Solves a step from the velocity in `trial` after it was solved from so many others, leaves the new velocity there and counts
+/// Solves a step from the velocity in `trial` after solving it from this number of others; writes the new velocity there and counts
 /// the solutions that differ. Collective.
 pub(super) fn solve_and_search<const D: usize, const S: usize>(
     solver: &mut StepSolver,
@@ -51,7 +51,7 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
     }
 }
 
-/// Sets the velocities of contact nodes to those of the start of this number.
+/// Sets the velocities of contact nodes to those of the start with this number.
 fn write_start<const D: usize, const S: usize>(
     problem: &StepProblem<'_, D, S>,
     number: usize,
@@ -81,7 +81,7 @@ fn is_new(found: &[DistributedVector], velocity: &DistributedVector) -> Result<b
     Ok(true)
 }
 
-/// The velocity of a node in the start of this number, the same on any number of ranks.
+/// The velocity of a node in the start with this number, the same on any number of ranks.
 fn share(number: usize, node: u32) -> f64 {
     if number.is_multiple_of(2) {
         return ALIKE[number / 2 % ALIKE.len()];

@@ -27,53 +27,53 @@ use crate::{
 pub(super) struct Newton {
     snes: Snes,
     settings: SolverSettings,
-    /// PETSc's solver for variational inequalities, if that solves the steps.
+    /// PETSc's solver for variational inequalities, if it is selected.
     pub bounded: Option<Bounded>,
     pub linear_solver: ProjectedKsp,
     scratch: Scratch,
     /// Branches of all contact points at the start of the step and at its end.
     before: Vec<u8>,
     after: Vec<u8>,
-    /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: as stiff as the body is
-    /// against motions of its surface alone, and along the normal above twice the steepest fall. With softer ones the residual is
-    /// so steep where points change their branch that line searches fail.
+    /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: equal to the resistance of
+    /// the body to motions of its surface alone, and along the normal at least twice the steepest descent. With smaller parameters
+    /// the residual is so steep where points change their branch that line searches fail.
     pub scales: Vec<[f64; 2]>,
-    /// The steepest fall of each contact's friction at the pressures of the last attempt.
+    /// The steepest descent of each contact's friction at the pressures of the last attempt.
     falls: Vec<f64>,
-    /// What was done for the step.
+    /// Counts of the work done for the step.
     effort: Effort,
     /// The velocity from which the step was started.
     start: DistributedVector,
-    /// Whether the user chose how to search along steps.
+    /// Whether the user has set a line search.
     chosen_search: bool,
-    /// What cells that flow need, if there are any.
+    /// Work data for cells that flow, if there are any.
     pub flow: Option<Flow>,
 }
 
-/// Share of the friction graph's parameter that its fall may reach while a step is solved, and the share that it has at first.
+/// Limit of the descent of the friction graph while a step is solved, and its initial limit, as shares of the graph's parameter.
 const STEEPEST: f64 = 0.8;
 const STEEP: f64 = 0.5;
 
-/// Linear solves stop at this share of what the step needs.
+/// Linear solves stop at this share of the tolerance of the step.
 const LINEAR_SHARE: f64 = 0.3;
-/// First linear solves of a step reduce their residual by this factor only, while branches may still change.
+/// The first linear solves of a step reduce their residual only by this factor, while branches may still change.
 const LINEAR_REDUCTION: f64 = 1e-3;
 
-/// Fixed-point iterations after which an attempt has failed.
+/// Fixed-point iterations after which an attempt fails.
 const FIXED_POINTS: usize = 200;
 
 const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
 
-/// How an attempt to solve a step ended.
+/// Outcome of an attempt to solve a step.
 struct Attempt {
     /// Newton iterations.
     iterations: usize,
-    /// Why it failed, if it did.
+    /// The reason for failure, if it failed.
     failure: Option<String>,
 }
 
 impl Newton {
-    /// Newton's method for unknowns laid out like `like`.
+    /// Newton's method for unknowns with the layout of `like`.
     pub fn new<const D: usize>(
         like: &DistributedVector,
         contacts: &[Contact<D>],
@@ -99,8 +99,8 @@ impl Newton {
         })
     }
 
-    /// Solves a step from the velocity in `trial`, and leaves the new one there: tries one fallback after the other, then checks that
-    /// velocities and pressures lie on the contact graphs. Collective.
+    /// Solves a step from the velocity in `trial`, and writes the new one there: tries one fallback after the other, then checks
+    /// that velocities and pressures lie on the contact graphs. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -131,7 +131,7 @@ impl Newton {
                 restore_pressures(problem.body, problem.state)?;
                 continue;
             }
-            // Where the pressure rose so much that the friction graph folded over its parameter: the same with a larger one.
+            // The pressure rose so much that the descent of the friction graph exceeds its parameter: repeat with a larger one.
             write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
             let mut pairs = problem.body.contacts.iter().zip(&self.falls);
             if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
@@ -150,7 +150,7 @@ impl Newton {
         }
     }
 
-    /// Sets the parameters of all graphs, those of friction for its falls.
+    /// Sets the parameters of all graphs, those of friction according to its descents.
     fn set_graph_parameters<const D: usize>(&self, contacts: &mut [Contact<D>], fallback: Fallback) {
         let follows = fallback.iteration == FrictionIteration::Newton;
         for ((contact, scales), fall) in contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
@@ -160,8 +160,8 @@ impl Newton {
         }
     }
 
-    /// Tries a fallback once. A fixed-point iteration solves with friction bounds of fixed pressures, and updates these until
-    /// the bounds of the solution solve the equations, too. Collective.
+    /// Tries a fallback once. A fixed-point iteration solves with friction bounds at fixed pressures, and updates these until
+    /// the solution also solves the equations with its own pressures. Collective.
     fn attempt<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -180,7 +180,7 @@ impl Newton {
                 return Ok(Attempt { iterations: sum + iterations, failure });
             }
             if iterations == 0 && sum > 0 {
-                // What solves the equations of the last bounds solves those of its own.
+                // The solution for the last bounds also solves the equations with its own bounds.
                 return Ok(Attempt { iterations: sum, failure: None });
             }
             sum += iterations.max(1);
@@ -189,7 +189,7 @@ impl Newton {
         Ok(Attempt { iterations: sum, failure: Some(failure) })
     }
 
-    /// Newton's method from the velocity in `trial`, and the solution there. Collective.
+    /// Newton's method from the velocity in `trial`, where it writes the solution. Collective.
     fn iterate<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -223,13 +223,14 @@ impl Newton {
             equilibrated: search == Search::Equilibrated,
             effort: std::mem::take(&mut self.effort),
         };
-        // Small relative to the first residual is enough: the right-hand side is next to zero where only an obstacle moves the body.
+        // A tolerance relative to the first residual suffices: the right-hand side is almost zero where only an obstacle moves the
+        // body.
         let tolerances = (system.tolerance, self.settings.tolerance);
         let solved = self.snes.solve(&mut equations, trial, tolerances, self.settings.newton_iterations);
         self.effort = equations.effort;
         let iterations = self.effort.sets.len();
         let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
-        // All ranks take the same branch, whichever of them failed.
+        // All ranks take the same branch, on whichever rank the failure occurred.
         let [missed] = session.largest([f64::from(u8::from(missed))]);
         let failure = if missed == 0.0 {
             None
@@ -249,8 +250,8 @@ impl Newton {
         Ok(Attempt { iterations, failure })
     }
 
-    /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and sums up what the step took.
-    /// Collective.
+    /// Checks that the velocity in `trial` and the pressures of the contacts lie on the graphs, and summarises the work of the
+    /// step. Collective.
     fn check_inclusion<const D: usize, const S: usize>(
         &mut self,
         problem: &StepProblem<'_, D, S>,
@@ -305,13 +306,13 @@ impl Newton {
     }
 }
 
-/// Why Newton's method failed, in words.
+/// The reason why Newton's method failed, as a message.
 fn explain(outcome: &NonlinearOutcome, effort: &Effort) -> String {
     let words = outcome.words().to_owned();
     effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
 }
 
-/// Writes the steepest fall of each contact's friction at the pressures that its bounds follow, over all ranks. Collective.
+/// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
 fn write_largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let falls = |contact: &Contact<D>| match contact.friction() {
         Some(law) if law.steepest_fall() > 0.0 => session.largest([contact.steepest_friction_fall()])[0],

@@ -5,24 +5,24 @@ use crate::{
     parallel::session::Session,
 };
 
-/// What a step cost and how well it was solved.
+/// Work and accuracy of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepOutcome {
-    /// Newton iterations; 0 where a step is linear.
+    /// Newton iterations; 0 if a step is linear.
     pub newton_iterations: usize,
     /// Krylov iterations.
     pub linear_iterations: usize,
     /// Contact points that changed their branch, over all ranks.
     pub active_changes: usize,
-    /// Contact points by what happens there, over all ranks.
+    /// Contact points by state, over all ranks.
     pub points: PointCount,
-    /// Linear systems that were not positive definite, so that GMRES had to solve them.
+    /// Linear systems that were not positive definite and were solved by GMRES.
     pub indefinite_solves: usize,
     /// Largest scaled distance to the contact graphs.
     pub inclusion_residual: f64,
-    /// Different solutions that were found, where others were searched for; else 0.
+    /// Number of different solutions found, if a search was requested; otherwise 0.
     pub solutions: usize,
-    /// What the step landed on, if the log reports it.
+    /// The name of the time at which the step ended, if the log reports it.
     pub landed_on: Option<&'static str>,
     /// Energies of the step, over all ranks.
     pub energy: Energy,

@@ -1,4 +1,4 @@
-//! A step to be solved.
+//! A step to be solved: its data.
 
 use super::{equations::StepMatrix, flow::FlowStart};
 use crate::{
@@ -12,34 +12,34 @@ use crate::{
 pub(super) struct StepProblem<'a, const D: usize, const S: usize> {
     /// All ranks.
     pub session: &'a Session,
-    /// The body, in whose contacts the pressures change.
+    /// The body; the solution changes the pressures of its contacts.
     pub body: &'a mut Body<D, S>,
-    /// The converged state that the step starts from.
+    /// The converged state from which the step starts.
     pub state: &'a State,
     pub step: Step,
     /// The right-hand side in N.
     pub forces: &'a DistributedVector,
-    /// The residual norm in N that rounding errors of the forces make.
+    /// The residual norm in N due to rounding errors of the forces.
     pub rounding: f64,
-    /// Where the displacement starts, if stresses are those at the end of the step.
+    /// The displacement from which the step starts, if stresses are those at the end of the step.
     pub flow_start: Option<FlowStart<'a>>,
 }
 
-/// The equations `K v + C(v) = b` that Newton's method solves: of the whole body, or of its contact nodes alone.
+/// The equations `K v + C(v) = b` of Newton's method: for the whole body, or for its contact nodes alone.
 #[derive(Clone, Copy)]
 pub(super) struct System<'a> {
     /// `K`.
     pub matrix: &'a dyn StepMatrix,
     /// `b` in N.
     pub right_hand_side: &'a DistributedVector,
-    /// The residual norm in N at which they are solved.
+    /// The residual norm in N at which the equations count as solved.
     pub tolerance: f64,
     /// The velocity of the converged state.
     pub converged: &'a DistributedVector,
 }
 
 impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
-    /// That the step failed, why, and what to do.
+    /// The message that the step failed, with the reason and a remedy.
     pub fn failed(&self, why: &str, remedy: &str) -> Error {
         let Step { time, length, .. } = self.step;
         Error::Failed(format!("step to t = {time:.6e} s (length {length:.3e} s) failed: {why}; {remedy}"))
@@ -59,6 +59,6 @@ impl System<'_> {
     }
 }
 
-/// What to do where a solver does not converge.
+/// A remedy if a solver does not converge.
 pub(super) const REMEDY: &str =
     "try a smaller [time] step, a looser [solver] tolerance, or another [solver] preconditioner";

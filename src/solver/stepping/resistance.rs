@@ -1,13 +1,13 @@
-//! What resists motions of the contact boundaries alone.
+//! Resistance of a body to motions of its contact boundaries alone.
 
 use super::equations::StepMatrix;
 use crate::{
     error::Result, fem::effect::Contact, linear_algebra::petsc::DistributedVector, parallel::session::Session,
 };
 
-/// What resists a motion of each contact's boundary alone, along the normal and in sliding, in Pa s/m; along the normal no less
-/// than twice the law's steepest fall. `power` gives `x . K x` of a vector laid out like `like`, as velocities of the body are.
-/// Collective.
+/// The resistance to a motion of each contact's boundary alone, along the normal and in sliding, in Pa s/m; along the normal at
+/// least twice the steepest descent of the law. `power` computes `x . K x` of a vector with the layout of `like`, that of
+/// velocities of the body. Collective.
 pub(super) fn resistances<const D: usize>(
     session: &Session,
     contacts: &[Contact<D>],
@@ -49,7 +49,7 @@ pub(super) fn resistances_of_body<const D: usize>(
     })
 }
 
-/// Sets the reference values of the contacts from the matrix of the whole body, however steps are solved. Collective.
+/// Sets the reference values of the contacts from the matrix of the whole body, for any method of solving steps. Collective.
 pub(super) fn set_reference_values<const D: usize>(
     session: &Session,
     contacts: &mut [Contact<D>],

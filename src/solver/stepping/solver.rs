@@ -1,4 +1,4 @@
-//! What solves the steps of a body.
+//! The solver for the steps of a body.
 
 use super::{
     bounded::{self, Bounded},
@@ -17,22 +17,22 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Motions of contact nodes whose dense matrix costs no more than the factorisation.
+/// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
 const MOST_MOTIONS: usize = 4_000;
 
-/// The solver of a linear or of a nonlinear step: only the one that is needed exists.
+/// The solver of linear or of nonlinear steps; only the required one exists.
 pub(super) enum Solver {
     /// Steps without contact and flow.
     Linear(Ksp),
     /// Newton's method on the whole body.
     Newton(Box<Newton>),
-    /// Newton's method on the contact alone.
+    /// Newton's method on the contact unknowns alone.
     Condensed(Box<Condensed>),
 }
 
 impl Solver {
-    /// The solver for the steps of a body, with the preconditioner of the settings and factors of this precision. Vectors are laid
-    /// out like `like`. Collective.
+    /// The solver for the steps of a body, with the preconditioner of the settings and factors of this precision. Vectors have the
+    /// layout of `like`. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
@@ -49,7 +49,7 @@ impl Solver {
         Self::whole(session, body, like, settings)
     }
 
-    /// Newton's method on the whole body, for velocities laid out like `like`. Collective.
+    /// Newton's method on the whole body, for velocities with the layout of `like`. Collective.
     pub fn whole<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
@@ -77,7 +77,7 @@ impl Solver {
     }
 }
 
-/// Whether all but the motions of contact nodes can be eliminated. Collective.
+/// Whether all unknowns except the motions of contact nodes can be eliminated. Collective.
 fn can_condense<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
@@ -100,7 +100,7 @@ fn components<const D: usize, const S: usize>(body: &Body<D, S>) -> usize {
     body.mesh.total_nodes * D
 }
 
-/// The motions on which the contacts of a body act, over all ranks. Collective.
+/// The number of motions on which the contacts of a body act, over all ranks. Collective.
 fn motions<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
     session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
 }
@@ -114,7 +114,7 @@ pub(super) fn linear(session: &Session, chosen: Preconditioner, unknowns: usize)
     Ok(ksp)
 }
 
-/// A solver for Newton's method, for vectors laid out like `like` with `D` components a node. Collective.
+/// A solver for Newton's method, for vectors with the layout of `like` and `D` components for each node. Collective.
 pub(super) fn projected<const D: usize>(
     session: &Session,
     chosen: Preconditioner,

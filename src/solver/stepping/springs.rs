@@ -1,8 +1,8 @@
-//! Springs on contact nodes, for factors and preconditioners of bodies that contact alone holds.
+//! Springs on contact nodes, for factors and preconditioners of bodies that only contact holds.
 //!
-//! Where neither supports nor inertia resist a rigid motion, the matrix `K` of a step is singular, or so nearly that its factor
-//! is made of rounding errors. `K + B` is not, with soft springs `B` along the motions on which contact laws act. It is what is factored, or
-//! what preconditioners are made of; the equations of the step keep `K`.
+//! Where neither supports nor inertia resist a rigid motion, the matrix `K` of a step is singular, or so nearly singular that its
+//! factor consists of rounding errors. `K + B` with soft springs `B` along the motions on which contact laws act is regular. It is
+//! factored or used for preconditioners; the equations of the step use `K`.
 
 use crate::{
     error::{Error, Result},
@@ -12,28 +12,28 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
 };
 
-/// Stiffness of a spring over that of the matrix at its node.
+/// Ratio of the stiffness of a spring to that of the matrix at its node.
 const SOFTNESS: f64 = 1e-4;
-/// The resistance of a whole body against a translation, over that of one of its nodes, below which it does not count.
+/// Ratio of the resistance of a whole body to translation to that of one of its nodes, below which the resistance is negligible.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// The springs of a body.
 #[derive(Default)]
 pub(super) struct Springs {
-    /// The rigid motions that no support holds, in words, body by body; `None` until they are needed.
+    /// The rigid motions that no support prevents, in words, for each body; `None` until they are needed.
     free: Option<Vec<String>>,
 }
 
 /// The rows of the matrix `K + B` on this rank.
 pub(super) struct SprungRows {
     pub rows: BlockRows,
-    /// The stiffness of the springs `B` in N s/m, of every motion of the contact nodes of this rank; `None` on all ranks where no body
-    /// needs any.
+    /// The stiffness of the springs `B` in N s/m for every motion of the contact nodes of this rank; `None` on all ranks where no
+    /// body needs springs.
     pub springs: Option<Vec<f64>>,
 }
 
 impl Springs {
-    /// Adds to the failure of a step which motions contact has to hold, if there are any.
+    /// Adds to the failure of a step the motions that only contact can prevent, if there are any.
     pub fn explain(&self, failure: Agreed) -> Error {
         match &self.free {
             Some(free) if failure.is_failure() && !free.is_empty() => Error::Failed(format!(
@@ -45,7 +45,7 @@ impl Springs {
         }
     }
 
-    /// The rows of the matrix of steps of this length in s with the springs. Collective.
+    /// The rows of the matrix for steps of this length in s, with the springs. Collective.
     pub fn rows<const D: usize, const S: usize>(
         &mut self,
         session: &Session,

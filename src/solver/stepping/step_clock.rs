@@ -1,4 +1,4 @@
-//! Where the time of steps goes, and what they move through memory.
+//! Time and memory traffic of steps by phase.
 
 use crate::{error::Result, linear_algebra::petsc::Stage};
 use std::time::Duration;
@@ -12,9 +12,9 @@ pub struct StepClock {
     pub solve: Duration,
     /// Energy balance and certificates of the step.
     pub balance: Duration,
-    /// Matrix assembly and preconditioner, whenever the step length changes.
+    /// Matrix assembly and preconditioner, each time the step length changes.
     pub assembly: Duration,
-    /// The part of `assembly` before the first step.
+    /// The part of `assembly` spent before the first step.
     pub first_assembly: Duration,
 }
 
@@ -37,12 +37,12 @@ impl Stages {
     }
 }
 
-/// Bytes that the steps moved through the memory of this rank at the least, by phase.
+/// Least number of bytes that the steps moved through the memory of this rank, by phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepTraffic {
-    /// Explicit stress, history and forces; loads that depend on time are not counted.
+    /// Explicit stress, history and forces; time-dependent loads are not counted.
     pub history: u64,
-    /// Matrices, factors and multigrid levels as often as they are read, not the vectors of iterations; `None` where the
+    /// Matrices, factors and multigrid levels, each time they are read, without the vectors of iterations; `None` where the
     /// solver does not count them.
     pub solve: Option<u64>,
     /// Energy balance.
@@ -56,7 +56,7 @@ impl Default for StepTraffic {
 }
 
 impl StepTraffic {
-    /// Adds a part of a solve; the sum is unknown once a part is.
+    /// Adds a part of a solve; the sum is unknown as soon as one part is unknown.
     pub(super) fn add_solve(&mut self, bytes: Option<u64>) {
         self.solve = self.solve.zip(bytes).map(|(sum, more)| sum + more);
     }

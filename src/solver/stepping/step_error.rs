@@ -1,4 +1,4 @@
-//! The error of a step, for steps that are chosen by it.
+//! The error of a step, for adaptive steps.
 
 use super::flow::FlowStart;
 use crate::{
@@ -12,30 +12,30 @@ use crate::{
     parallel::session::Session,
 };
 
-/// Share of the root of the kinetic energy below which that of the stress is rounding, and the other way round.
+/// Share of the root of the kinetic energy below which the root of the elastic energy is a rounding error, and vice versa.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// Norms of velocity and stress.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Norms {
-    /// Of the velocity: of the mass, or of the viscosity without inertia.
+    /// Velocity in the mass norm, or in the norm of the viscosity for problems without inertia.
     pub velocity: f64,
-    /// Of the stress: of the compliance.
+    /// Stress in the compliance norm.
     pub stress: f64,
 }
 
-/// The error of a step with the sizes that it is relative to.
+/// The error of a step with its reference norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepError {
     /// The error.
     pub error: Norms,
     /// Velocity and stress at the end of the step.
     pub size: Norms,
-    /// A velocity below this multiple of the stress is rounding error, and a stress below this multiple of the velocity.
+    /// A velocity below this multiple of the stress is a rounding error, and a stress below this multiple of the velocity.
     pub negligible: Norms,
 }
 
-/// Room for nodal values with ghosts.
+/// Work space for nodal values with ghosts.
 #[derive(Debug, Default)]
 pub(super) struct ErrorWorkspace {
     curved: Vec<f64>,
@@ -44,20 +44,20 @@ pub(super) struct ErrorWorkspace {
     forces: Vec<f64>,
 }
 
-/// A step that was solved and not yet committed.
+/// A step that is solved and not yet committed.
 #[derive(Clone, Copy)]
 pub(super) struct SolvedStep<'a> {
     pub step: Step,
     /// The velocity at its end, with ghosts.
     pub velocity: &'a DistributedVector,
-    /// Where the displacement starts, if stresses are those at the end of the step.
+    /// The displacement from which the step starts, if stresses are those at the end of the step.
     pub flow_start: Option<FlowStart<'a>>,
-    /// In a step of second order, the length in s by which a velocity counts in the displacement.
+    /// In a step of second order, the length in s that multiplies a velocity in the displacement.
     pub second_order_length: Option<f64>,
 }
 
 impl ErrorWorkspace {
-    /// The error of a step whose trial histories are those of its solution. Collective.
+    /// The error of a step whose trial histories belong to its solution. Collective.
     pub fn error<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -72,7 +72,7 @@ impl ErrorWorkspace {
         let values = trial.iter().zip(now.iter().zip(before.iter()));
         let Self { curved, strained, end, forces } = self;
         write(curved, values.clone().map(|(t, (v, p))| curvature.error([*t, *v, *p])));
-        // Displacements, and stresses with them, are one order better in the formula of second order.
+        // Displacements, and stresses with them, are one order more accurate in the second-order formula.
         let length = if let Some(length) = second_order_length {
             strained.clone_from(curved);
             length
@@ -98,8 +98,8 @@ impl ErrorWorkspace {
         let mine = [square(form, curved), strains + histories.error, square(form, &trial), histories.size];
         let [velocity, stress, all_velocity, all_stress] =
             session.sum(mine).map(|square| if square > 0.0 { square.sqrt() } else { square });
-        // With mass both are roots of energies: a free body has a stress of rounding errors, a held one a velocity of rounding errors.
-        // The square of a velocity in the norm of the viscosity is a power.
+        // With mass both norms are roots of energies: a free body has a stress of rounding errors, a fixed one a velocity of
+        // rounding errors. Without mass the square of a velocity norm is a power.
         let unit = if form == Some(Form::Mass) { 1.0 } else { step.length.sqrt() };
         Ok(StepError {
             error: Norms { velocity, stress },
@@ -109,7 +109,7 @@ impl ErrorWorkspace {
     }
 }
 
-/// Writes these values in place of the ones before.
+/// Replaces the previous values by these.
 fn write(target: &mut Vec<f64>, values: impl Iterator<Item = f64>) {
     target.clear();
     target.extend(values);

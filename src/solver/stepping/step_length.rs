@@ -1,23 +1,23 @@
-//! Where a step ends.
+//! Times at which steps end.
 
 use crate::fem::{effect::Step, state::State};
 
-/// A step that ends within this share of a step of the end ends there.
+/// A step that ends within this share of its length before a prescribed time is extended to that time.
 pub const SNAP: f64 = 1e-6;
 
-/// A time that a step must not go beyond.
+/// A time that a step must not pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Landing {
     /// In s.
     pub time: f64,
-    /// What is there, if the log reports it.
+    /// Its name, if the log reports it.
     pub what: Option<&'static str>,
 }
 
-/// The times at which steps of a run have to end.
+/// The times at which steps of a run must end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Landings {
-    /// Those that the job names, in s, sorted.
+    /// Times specified in the job, in s, sorted.
     pub times: Vec<f64>,
     /// Every multiple of this time in s.
     pub interval: Option<f64>,
@@ -26,7 +26,7 @@ pub struct Landings {
 }
 
 impl Landings {
-    /// The first one after `time`.
+    /// The first of these times after `time`.
     pub fn next(&self, time: f64) -> Landing {
         let after = time * (1.0 + 1e-12);
         let multiple = |interval: f64| interval * ((after / interval).floor() + 1.0);
@@ -49,7 +49,7 @@ impl Landings {
     }
 }
 
-/// The step of `length` from here, cut or stretched to end at `end` where that is near.
+/// A step of `length` from here, shortened or extended to end at `end` if that is near.
 pub fn next_step(state: &State, length: f64, end: f64) -> Step {
     let previous_length = state.step_length;
     let time = on_the_grid(state.time + length, length);
@@ -62,7 +62,8 @@ pub fn next_step(state: &State, length: f64, end: f64) -> Step {
     }
 }
 
-/// The multiple of `length` that is meant by a time, if one is: sums of millions of lengths would drift away from it.
+/// The multiple of `length` that equals a time up to rounding, if there is one: sums of millions of lengths would drift away from
+/// it.
 fn on_the_grid(time: f64, length: f64) -> f64 {
     let multiple = (time / length).round() * length;
     if (time - multiple).abs() <= SNAP * length { multiple } else { time }

@@ -1,4 +1,4 @@
-//! The matrix of a step with its solver.
+//! The matrix of a step and its solver.
 
 use super::{
     StepOutcome,
@@ -17,23 +17,23 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
 };
 
-/// The length of a step, and that of the steps for which its preconditioner is set up, both as matrices have them, in s.
+/// The length of a step, and the length of the steps for which its preconditioner is set up, both as used in matrices, in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lengths {
     pub matrix: f64,
     pub cached: f64,
 }
 
-/// The matrix for steps of one length, and what solves with it.
+/// The matrix for steps of one length, and its solver.
 pub(super) struct StepSolver {
     settings: SolverSettings,
-    /// Why the preconditioner is what it is.
+    /// The reason for the choice of the preconditioner.
     reason: String,
-    /// The matrix that the preconditioner in use is of.
+    /// The matrix to which the preconditioner in use belongs.
     cached: Option<(f64, Matrix)>,
-    /// The matrix of the step, where its length is not that of the preconditioner.
+    /// The matrix of the step, if its length is not that of the preconditioner.
     step_matrix: Option<(f64, Matrix)>,
-    /// The lengths for which all is prepared.
+    /// The lengths for which matrix and preconditioner are prepared.
     prepared: Option<Lengths>,
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
@@ -42,12 +42,12 @@ pub(super) struct StepSolver {
     is_broken: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
-    /// What keeps factors of bodies that contact alone holds from being singular.
+    /// Springs that keep the factors of bodies that only contact holds regular.
     springs: Springs,
 }
 
 impl StepSolver {
-    /// Chooses the solver; the matrix comes with [`StepSolver::prepare`]. Collective.
+    /// Chooses the solver; the matrix is set by [`StepSolver::prepare`]. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
@@ -77,12 +77,12 @@ impl StepSolver {
         !matches!(self.solver, Solver::Linear(_))
     }
 
-    /// The preconditioner in use, and why it is that one.
+    /// The preconditioner in use, and the reason for it.
     pub fn preconditioner(&self) -> (Preconditioner, &str) {
         (self.settings.preconditioner, &self.reason)
     }
 
-    /// The precision of factors, where steps are solved on the contact alone.
+    /// The precision of factors, if steps are condensed to the contact.
     pub fn factor_precision(&self) -> Option<Precision> {
         match &self.solver {
             Solver::Condensed(condensed) => Some(condensed.precision),
@@ -90,13 +90,13 @@ impl StepSolver {
         }
     }
 
-    /// Whether the matrices are those of these lengths.
+    /// Whether the matrices belong to these lengths.
     pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
         self.prepared == Some(lengths)
     }
 
-    /// Assembles the matrix of this length and sets its preconditioner up, unless they are there; says whether a
-    /// preconditioner was made. `like` is laid out as velocities are. Collective.
+    /// Assembles the matrix of this length and sets up its preconditioner, unless they are available; returns whether a
+    /// preconditioner was built. `like` has the layout of velocities. Collective.
     pub fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -135,13 +135,13 @@ impl StepSolver {
         Ok(is_new)
     }
 
-    /// The length whose preconditioner is set up: a condensed matrix is of no use for another.
+    /// The length whose preconditioner is set up: a condensed matrix is valid only for its own length.
     fn cached_length(&self, lengths: Lengths) -> f64 {
         if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
     }
 
-    /// Brings another linear solver into use: `next`, or one that is not set up. The matrix in use, if there is one, goes with its
-    /// preconditioner to those that are kept; what a failed set-up left is dropped. Collective.
+    /// Activates another linear solver: `next`, or a new one that is not set up. The matrix in use, if there is one, is stored in
+    /// the cache with its preconditioner; the remains of a failed set-up are dropped. Collective.
     fn exchange_matrix_in_use<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -169,7 +169,8 @@ impl StepSolver {
         Ok(())
     }
 
-    /// Assembles the matrix of steps of this length in s and sets the preconditioner of the linear solver in use up with it. Collective.
+    /// Assembles the matrix of steps of this length in s and sets up the preconditioner of the linear solver in use with it.
+    /// Collective.
     fn set_up<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -191,7 +192,7 @@ impl StepSolver {
             sprung = self.springs.rows(session, body, length)?;
         }
         let SprungRows { rows, springs } = sprung;
-        // What the preconditioner is made of, if it is not the matrix itself.
+        // The matrix for the preconditioner, if it differs from the matrix of the step.
         let mut with_springs = None;
         if springs.is_some() {
             with_springs = Some(session.agree(Matrix::symmetric(D, &rows))?);
@@ -230,7 +231,7 @@ impl StepSolver {
         self.matrix()?.multiply(x, y)
     }
 
-    /// Counts traffic from here on.
+    /// Restarts the count of traffic.
     pub fn restart_traffic(&mut self) {
         self.matrices().for_each(Matrix::restart_products);
         match &mut self.solver {
@@ -240,8 +241,8 @@ impl StepSolver {
         }
     }
 
-    /// Bytes that were moved on this rank since then, at the least; `None` where that is not counted: cells that flow, PETSc's solver
-    /// for variational inequalities, preconditioners whose size is not known.
+    /// Least number of bytes moved on this rank since then; `None` where they are not counted: cells that flow, PETSc's solver
+    /// for variational inequalities, preconditioners of unknown size.
     pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
         let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
         match &mut self.solver {
@@ -253,7 +254,7 @@ impl StepSolver {
                 Ok(applied.map(|bytes| products + applications * bytes))
             }
             Solver::Linear(ksp) => {
-                // PETSc multiplies as often: for the first residual, and in each iteration.
+                // PETSc multiplies the same number of times: for the first residual, and in each iteration.
                 let (applications, applied) = (ksp.applications(), ksp.bytes_applied(ranks)?);
                 let matrix = self.matrix()?.bytes_of_a_product();
                 Ok(applied.map(|bytes| applications * (matrix + bytes)))
@@ -274,7 +275,7 @@ impl StepSolver {
         }
     }
 
-    /// Solves a step from the velocity in `trial`, and leaves the new one there. Where it fails, it is tried again with a factor in
+    /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails, it is repeated with a factor in
     /// double precision and with the tolerance that rounding errors of the solution allow. Collective.
     pub fn solve<const D: usize, const S: usize>(
         &mut self,
@@ -306,7 +307,7 @@ impl StepSolver {
             if is_relaxed {
                 return Err(self.springs.explain(failure));
             }
-            // The start may be much less than the solution, above all at rest.
+            // The start value may be much smaller than the solution, especially at rest.
             let mut answer = forces.like()?;
             self.precondition(forces, &mut answer)?;
             let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
@@ -320,8 +321,8 @@ impl StepSolver {
         }
     }
 
-    /// The residual norm in N to which a step is solved; refuses forces that are not finite. Sets the reference forces of the
-    /// contacts. Collective.
+    /// The residual norm in N at which a step counts as solved; refuses forces that are not finite. Sets the reference forces of
+    /// the contacts. Collective.
     fn tolerance<const D: usize, const S: usize>(
         &self,
         problem: &mut StepProblem<'_, D, S>,
@@ -333,13 +334,13 @@ impl StepSolver {
             return Err(problem.failed("the forces are not finite", remedy));
         }
         let StepProblem { session, body, rounding, .. } = problem;
-        // The sum of the forces as if those of all unknowns were equal. At rest under steady loads the forces cancel: pressures are known
-        // no better than their rounding errors.
+        // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and the
+        // accuracy of pressures is limited by the rounding errors of the forces.
         let size = norm.max(*rounding / self.settings.inclusion_tolerance);
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
-        // No residual below the rounding of `K v` is asked for, however small the forces that are left; friction on a moving
-        // obstacle rounds `v` as a difference from its velocity.
+        // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
+        // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;
         if body.contacts.iter().any(Contact::may_drift) {
             let mine = body.contacts.iter().map(Contact::drift_square).sum();
@@ -349,7 +350,7 @@ impl StepSolver {
         Ok((self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(*rounding).max(product))
     }
 
-    /// The precision of the factor in use, where steps are solved on the contact alone.
+    /// The precision of the factor in use, if steps are condensed to the contact.
     fn factor_in_use(&mut self) -> Result<Option<Precision>> {
         match &mut self.solver {
             Solver::Condensed(condensed) => condensed.precision_in_use().map(Some),
@@ -357,7 +358,7 @@ impl StepSolver {
         }
     }
 
-    /// Replaces a factor in single precision that was not enough, and takes the step back to its start. Collective.
+    /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
     fn factor_in_double<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
@@ -390,7 +391,7 @@ fn solve_linear<const D: usize, const S: usize>(
     Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
 }
 
-/// The rows of the matrix here, which PETSc can count. Collective.
+/// The rows of the matrix on this rank. PETSc's integers can count them. Collective.
 fn matrix_rows<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,

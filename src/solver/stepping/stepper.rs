@@ -1,4 +1,4 @@
-//! A step as all schemes take it: matrix, right-hand side, contact, solution, commit, energy balance.
+//! The sequence of a step, common to all schemes: matrix, right-hand side, contact, solution, commit, energy balance.
 
 use super::{
     StepOutcome,
@@ -36,17 +36,17 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     trial: DistributedVector,
-    /// Whether the scheme has finished the step that was attempted last, so that trial histories are those of its solution.
+    /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
     is_finished: bool,
-    /// Room for the error of a step.
+    /// Work space for the error of a step.
     workspace: ErrorWorkspace,
-    /// Length in s of which those with preconditioners are a power of two.
+    /// The base length in s: lengths with preconditioners are powers of two times this one.
     base_length: f64,
-    /// Number of other start velocities from which steps with contact are solved to search for other solutions.
+    /// Number of other start velocities in the search for further solutions of steps with contact.
     pub other_starts: usize,
-    /// Whether steps may be longer than explicit flow allows at the stresses that occur.
+    /// Whether steps may exceed the stability bound of explicit flow at the actual stresses.
     pub accepts_fast_flow: bool,
-    /// Preconditioners that were made.
+    /// Number of preconditioners built.
     pub set_ups: u64,
     /// Seconds by phase.
     pub clock: StepClock,
@@ -56,7 +56,7 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Prepares the vectors and the solver; the matrix comes with the first step. Collective.
+    /// Prepares the vectors and the solver; the matrix is set by the first step. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
@@ -100,17 +100,17 @@ impl Stepper {
         self.load.is_some()
     }
 
-    /// The preconditioner in use, and why it is that one.
+    /// The preconditioner in use, and the reason for it.
     pub fn preconditioner(&self) -> (Preconditioner, &str) {
         self.solver.preconditioner()
     }
 
-    /// The precision of factors, where steps are solved on the contact alone.
+    /// The precision of factors, if steps are condensed to the contact.
     pub fn factor_precision(&self) -> Option<Precision> {
         self.solver.factor_precision()
     }
 
-    /// Assembles the matrix for a first step of this length. Preconditioners are made for this length and powers of two times
+    /// Assembles the matrix for a first step of this length. Preconditioners are built for this length and powers of two times
     /// it. Collective.
     pub fn prepare_length<const D: usize, const S: usize>(
         &mut self,
@@ -122,7 +122,7 @@ impl Stepper {
         self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })
     }
 
-    /// Assembles the matrix of a step, if the last one was of another length. Collective.
+    /// Assembles the matrix of a step, if the previous step had another length. Collective.
     fn prepare_matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -155,7 +155,7 @@ impl Stepper {
         self.solver.precondition(r, z)
     }
 
-    /// Takes a step and commits it; on failure the state stays as it was. Collective.
+    /// Takes a step and commits it; on failure the state is unchanged. Collective.
     pub fn advance<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -168,7 +168,7 @@ impl Stepper {
         Ok(outcome)
     }
 
-    /// Solves a step without changing the state: another attempt may follow. Collective.
+    /// Solves a step without changing the state; another attempt may follow. Collective.
     pub fn attempt<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -211,8 +211,8 @@ impl Stepper {
         outcome
     }
 
-    /// The error of the step that was attempted last: of the velocity, of the strain that it makes, and of what histories of
-    /// cells and nodes make of stresses and forces. Collective.
+    /// The error of the last attempted step: of the velocity, of the strain that it causes, and of the resulting histories of
+    /// cells and nodes. Collective.
     pub fn error<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -233,7 +233,7 @@ impl Stepper {
         self.workspace.error(session, body, state, solved)
     }
 
-    /// Writes displacement, trial histories and energies of the step that was attempted last, unless they are there. Collective.
+    /// Computes displacement, trial histories and energies of the last attempted step, unless they are available. Collective.
     fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
@@ -251,7 +251,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Commits the step that was attempted last, and completes its outcome. Collective.
+    /// Commits the last attempted step, and completes its outcome. Collective.
     pub fn accept<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -283,7 +283,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Loads and the other forces that the scheme knows before the step, zero at held components.
+    /// Loads and all other forces that are known before the step, zero at prescribed components.
     fn write_right_hand_side<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -311,7 +311,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Starts from the velocity extrapolated linearly in time, and prepares the contacts. Collective.
+    /// Sets the start velocity by linear extrapolation in time, and prepares the contacts. Collective.
     fn start<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
@@ -324,7 +324,8 @@ impl Stepper {
         Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
     }
 
-    /// Counts the pass over the cells, and the vectors: forces set to zero, the load added, the start copied and extrapolated.
+    /// Counts the pass over the cells, and the vectors: forces set to zero, addition of the load, copy and extrapolation of the
+    /// start value.
     fn count_history<const D: usize, const S: usize>(
         &mut self,
         body: &Body<D, S>,
@@ -347,12 +348,12 @@ impl Stepper {
     }
 }
 
-/// Whether there are two velocities to start a step from.
+/// Whether two velocities are available for extrapolation.
 fn extrapolates(state: &State, step: Step) -> bool {
     step.previous_length > 0.0 && state.step > 1
 }
 
-/// Bytes of the values that this rank owns of a vector.
+/// Bytes of the owned values of a vector on this rank.
 fn vector_bytes<const D: usize, const S: usize>(body: &Body<D, S>) -> u64 {
     (body.mesh.owned * D * size_of::<f64>()) as u64
 }
