@@ -50,7 +50,7 @@ pub(super) struct Newton {
     pub flow: Option<Flow>,
 }
 
-/// Limit of the descent of the friction graph while a step is solved, and its initial limit, as shares of the graph's parameter.
+/// Largest ratio of the friction graph's descent to its parameter while a step is solved, and the initial ratio.
 const STEEPEST: f64 = 0.8;
 const STEEP: f64 = 0.5;
 

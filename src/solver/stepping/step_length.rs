@@ -2,7 +2,7 @@
 
 use crate::fem::{effect::Step, state::State};
 
-/// A step that ends within this share of its length before a prescribed time is extended to that time.
+/// A step whose end differs from a prescribed time by at most this share of its length ends at that time.
 pub const SNAP: f64 = 1e-6;
 
 /// A time that a step must not pass.

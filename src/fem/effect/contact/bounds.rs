@@ -1,4 +1,4 @@
-//! Contacts whose laws are bounds on one velocity component each.
+//! Contacts whose laws are bounds on one velocity component at each point.
 
 use super::{
     Contact,
@@ -6,11 +6,11 @@ use super::{
 };
 use crate::laws::contact::NodeContext;
 
-/// How far a normal may be off an axis, as a part of its length.
+/// Largest deviation of a unit normal from an axis.
 const ALIGNED: f64 = 1e-9;
 
 impl<const D: usize> Contact<D> {
-    /// The first place in m where the law is more than a bound on a velocity component, if there is one.
+    /// The first position in m where the law is not merely a bound on a velocity component, if there is one.
     pub fn more_than_bounds(&self) -> Option<&[f64; D]> {
         let is_bound = self.law.velocity_bound(NodeContext::default()).is_some();
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
@@ -18,7 +18,8 @@ impl<const D: usize> Contact<D> {
         free.into_iter().find(|p| !is_simple(axis(&p.direction))).map(|p| &p.place)
     }
 
-    /// Lowers `upper` and raises `lower`, vectors of Newton's method with one entry a velocity component, to what the law allows.
+    /// Lowers `upper` and raises `lower`, vectors of Newton's method with one entry for each velocity component, to the bounds of
+    /// the law.
     pub fn add_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let Some((axis, bound)) = axis(&point.direction).zip(self.law.velocity_bound(point.context))
@@ -34,8 +35,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Sets the pressures at points on their bounds to those that balance the forces in N that are left there, elsewhere to zero. Both
-    /// are vectors of Newton's method.
+    /// Sets the pressures at points on their bounds to those that balance the remaining forces in N there, elsewhere to zero. Both
+    /// arguments are vectors of Newton's method.
     pub fn set_reactions(&mut self, velocity: &[f64], residual: &[f64]) {
         let law = &self.law;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {

@@ -1,4 +1,4 @@
-//! Contact points by what happens there.
+//! Contact points counted by state.
 
 use super::{
     Contact,
@@ -6,26 +6,26 @@ use super::{
     point::{Unknown, Vectors::Newton},
 };
 
-/// Branches of normal laws that are counted one by one; the last count includes all that follow.
+/// Number of branches of normal laws that are counted separately; the last count includes all further branches.
 const BRANCHES: usize = 8;
 
-/// How many numbers a [`PointCount`] is.
+/// Number of entries of a [`PointCount`].
 pub const COUNTS: usize = BRANCHES + 5;
 
-/// Points of contact boundaries by what happens there.
+/// Numbers of points of contact boundaries by state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PointCount {
-    /// On a vertical part of the normal graph: at rest in a jump, or held by an obstacle.
+    /// On a vertical part of the normal graph: at rest in a jump, or at an obstacle.
     pub held: usize,
     /// Without pressure.
     pub open: usize,
-    /// On each branch of the normal law, in the order of velocity; the last entry includes all that follow.
+    /// On each branch of the normal law, in the order of velocity; the last entry includes all further branches.
     pub branches: [usize; BRANCHES],
-    /// With friction and at rest under it.
+    /// With friction, sticking.
     pub sticking: usize,
     /// With friction and sliding.
     pub slipping: usize,
-    /// With friction whose bound follows the pressure, which is zero.
+    /// With friction whose bound depends on the pressure, which is zero.
     pub separated: usize,
 }
 
@@ -38,7 +38,7 @@ impl PointCount {
         out
     }
 
-    /// Back from the array.
+    /// From the array.
     pub fn from_array(numbers: [f64; COUNTS]) -> Self {
         let [held, open, sticking, slipping, separated, branches @ ..] = numbers.map(|n| n as usize);
         Self { held, open, branches, sticking, slipping, separated }
@@ -46,7 +46,7 @@ impl PointCount {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Counts the points here by what happens there, at velocities in a vector of Newton's method.
+    /// Counts the points on this rank by state, at velocities in a vector of Newton's method.
     pub fn count(&self, velocity: &[f64]) -> PointCount {
         let mut count = PointCount::default();
         for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {

@@ -11,15 +11,15 @@ use std::collections::BTreeMap;
 /// A node of contact boundaries with the directions in which their laws act.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactNode<const D: usize> {
-    /// Its number on this rank.
+    /// Local number.
     pub node: usize,
     /// Orthonormal directions; laws act along the first `seen` of them.
     pub frame: [Vector<D>; D],
-    /// Directions along which laws act: none where supports hold the node.
+    /// Number of directions along which laws act: zero where supports fix the node.
     pub seen: usize,
 }
 
-/// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag a local component.
+/// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag for each local component.
 pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) -> Vec<ContactNode<D>> {
     let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
     for contact in contacts {
@@ -56,8 +56,8 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) ->
 }
 
 impl<const D: usize> Contact<D> {
-    /// Nodes of this rank with directions along which the contact can hold a body at rest: the normal, unless the law never
-    /// presses or falls, and the tangents of friction.
+    /// Nodes of this rank with directions along which the contact can resist a motion of a body at rest: the normal, unless the law
+    /// never presses or descends, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
         let presses = !self.law.is_zero() && self.law.monotonicity_constant() == 0.0;
         let normal = |point: &Point<D>| {

@@ -1,4 +1,4 @@
-//! Energies that a contact stores, dissipates and takes from its obstacle, and its penetration.
+//! Energies that a contact stores, dissipates and exchanges with its obstacle, and its penetration.
 
 use super::{
     Contact,
@@ -7,12 +7,12 @@ use super::{
 use crate::{error::Result, linear_algebra::tensor::larger};
 
 impl<const D: usize> Contact<D> {
-    /// Energy in J that a step of this length dissipated, the scheme's own term, and the work of the obstacle on the body, from
-    /// velocities at its end (with ghosts).
+    /// Energy in J that a step of this length dissipated, its numerical part, and the work of the obstacle on the body, from
+    /// velocities at the end of the step (with ghosts).
     ///
-    /// With the penetrations `d`, the law's energy `e` and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
-    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored, given to the obstacle, lost to the scheme. Friction `q` on an obstacle
-    /// of the velocity `w` takes `k q . v = k q . (v - w) + k q . w`: dissipated, given to the obstacle.
+    /// With the penetrations `d`, the energy `e` of the law and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
+    /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored energy, work on the obstacle, numerical part. Friction `q` on an obstacle
+    /// with the velocity `w` absorbs `k q . v = k q . (v - w) + k q . w`: dissipation, work on the obstacle.
     pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 3] {
         let mut sums = [0.0; 3];
         for point in &self.points {
@@ -42,8 +42,8 @@ impl<const D: usize> Contact<D> {
         sums
     }
 
-    /// How deep in m points here lie in the obstacle at `time`, at the most; minus infinity where none can touch it. A gap that
-    /// is not a number does not count: the first step refuses it.
+    /// Largest penetration in m of points on this rank at `time`; minus infinity where none can touch the obstacle. A gap that
+    /// is NaN is ignored: the first step refuses it.
     pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
         let depth = |point: &Point<D>| {
             let gap = self.gap.at(time, &point.place, &point.normal);

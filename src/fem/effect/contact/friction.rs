@@ -1,17 +1,17 @@
 //! Friction at the nodal points of a contact boundary.
 //!
-//! Along the tangents of a point the unknown of a step is the parameter `s = c v + q` of the friction law's radial graph, over
-//! `c`; `v` is the sliding velocity, relative to an obstacle that moves, and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
+//! The unknown of a step along the tangents of a point is the parameter `s = c v + q` of the friction law's radial graph, divided
+//! by `c`; `v` is the sliding velocity relative to the obstacle, and `q = -sigma_tau`. With `e = s / |s|` and the graph's `V(|s|)`:
 //!
 //! ```text
 //! v = V(|s|, p) e                      dv = (V' e e^T + V / |s| (I - e e^T)) ds + V_p e dp
 //! q = s - c v                          dq = ds - c dv
 //! ```
 //!
-//! `p` is the contact pressure, which the bound follows in Newton's method, or a pressure that the fixed-point iteration
-//! holds. In terms of `dv`, where a point slides, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; where it sticks
+//! `p` is the contact pressure, on which the bound depends in Newton's method, or a pressure that the fixed-point iteration
+//! prescribes. In terms of `dv`, at a sliding point, `dq = g' e (e . dv) + g / V (I - e e^T) dv + mu e dp`; at a sticking point
 //! `dv = 0`. Where the normal graph is vertical, `dp` follows from the normal equation of the node: `mu e` times that
-//! equation is taken from the tangential ones ([`Friction::reduce`]).
+//! equation is subtracted from the tangential ones ([`Friction::reduce`]).
 
 use super::{
     point::{
@@ -34,26 +34,26 @@ pub(super) struct Friction<const D: usize> {
     pub law: FrictionLaw,
     /// `c` in the parameter `s = c v + q`, in Pa s/m.
     pub scale: f64,
-    /// Whether the bound follows the pressure while a step is solved.
+    /// Whether the bound depends on the pressure while a step is solved.
     pub follows: bool,
     pub points: Vec<TangentialPoint<D>>,
-    /// Velocity in m/s of the obstacle along the tangents of each point; empty where it does not move.
+    /// Velocity in m/s of the obstacle along the tangents of each point; empty where the obstacle does not move.
     pub drift: Vec<Vector<D>>,
-    /// Tangents that supports hold beside free ones, with the points of the contact; empty where the obstacle does not move.
+    /// Tangents that supports fix beside free ones, with the points of the contact; empty where the obstacle does not move.
     pub held: Vec<(usize, Vector<D>)>,
 }
 
-/// What happens at a point with friction.
+/// The state of a point with friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Motion {
     Sticks,
     Slides,
-    /// The law's bound follows the pressure, which is zero.
+    /// The law's bound depends on the pressure, which is zero.
     Separated,
 }
 
 impl<const D: usize> Friction<D> {
-    /// Puts the law on the points of a contact; refuses supports that leave no clear tangent, or no pressure.
+    /// Applies the law to the points of a contact; refuses supports that leave no unique tangent, and missing pressure.
     pub fn new(
         law: FrictionLaw,
         points: &[Point<D>],
@@ -108,7 +108,7 @@ impl<const D: usize> Friction<D> {
         self.points.retain(|point| point.count > 0);
     }
 
-    /// Takes the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
+    /// Reads the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
     pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
             point.traction = point.along(Body, traction);
@@ -116,18 +116,18 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Takes the pressures of `points` as those that the bounds follow.
+    /// Uses the pressures of `points` in the bounds.
     pub fn take_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
     }
 
-    /// Turns velocities into unknowns.
+    /// Converts velocities into unknowns.
     pub fn unmap(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, 1.0 / self.scale, &point.traction, values));
         self.add_drift(-1.0, values);
     }
 
-    /// Turns unknowns into velocities, after `points` took their pressures.
+    /// Converts unknowns into velocities, after `points` have computed their pressures.
     pub fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let (law, scale) = (self.law, self.scale);
         if self.follows {
@@ -138,13 +138,13 @@ impl<const D: usize> Friction<D> {
             let length = norm(&unknown);
             let found = law.resolve(scale * length, scale, point.pressure);
             let shares = if found.traction == 0.0 {
-                // Without traction the velocity is the unknown, to the last bit.
+                // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
             } else {
                 [found.speed / length, found.traction / length]
             };
             point.traction = unknown.map(|x| shares[1] * x);
-            // A point that sticks has no velocity, without rounding errors.
+            // The velocity of a sticking point is exactly zero.
             let back = unknown.map(|x| shares[0] * x);
             point.set(&back, values);
         }
@@ -170,10 +170,10 @@ impl<const D: usize> Friction<D> {
         })
     }
 
-    /// Takes the derivative of the law at these unknowns, after `points` took their pressures.
+    /// Computes the derivative of the law at these unknowns, after `points` have computed their pressures.
     ///
-    /// A point without pressure whose normal graph is vertical is about to be pressed: it sticks, which is one of the derivatives at
-    /// rest.
+    /// A point without pressure whose normal graph is vertical is assumed to come under pressure: it sticks, which is one of the
+    /// generalised derivatives at rest.
     pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
         let (law, scale, follows) = (self.law, self.scale, self.follows);
         for point in &mut self.points {
@@ -199,7 +199,7 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Turns a change of the unknowns into the change of the velocities, after `points` took the change of pressures.
+    /// Converts a change of the unknowns into the change of the velocities, after `points` have computed the change of pressures.
     pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;
         for point in &mut self.points {
@@ -230,7 +230,7 @@ impl<const D: usize> Friction<D> {
         self.points.iter().for_each(|point| point.add(Body, 1.0, &point.traction, nodal));
     }
 
-    /// Adds the change of the forces with the velocity where points slide, without that of the pressure of vertical graphs.
+    /// Adds the change of the forces with the velocity at sliding points, without that of the pressure of vertical graphs.
     pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
@@ -239,7 +239,7 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Takes the normal equations of nodes with a vertical normal graph from the tangential ones, where the bound follows
+    /// Subtracts the normal equations of nodes with a vertical normal graph from the tangential ones, where the bound depends on
     /// the pressure.
     pub fn reduce(&self, points: &[Point<D>], values: &mut [f64]) {
         for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
@@ -251,17 +251,17 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Removes from nodal values what moves points that stick.
+    /// Removes from nodal values the motions of sticking points.
     pub fn project(&self, values: &mut [f64]) {
         self.points.iter().filter(|p| p.tangent.sticks).for_each(|point| point.set(&[0.0; D], values));
     }
 
-    /// Removes from nodal values what moves any point along its tangents.
+    /// Removes from nodal values the motions of all points along their tangents.
     pub fn remove_motions(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.set(&[0.0; D], values));
     }
 
-    /// Turns a change of velocities into the change of the unknowns, after that was done along the normals.
+    /// Converts a change of velocities into the change of the unknowns, after the same has been done along the normals.
     pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
         for point in &self.points {
             if point.tangent.sticks {
@@ -275,23 +275,23 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// Whether, at the last linearisation, some point slides under a bound that follows the pressure.
+    /// Whether, at the last linearisation, some point slides with a bound that depends on the pressure.
     pub fn is_coupled(&self) -> bool {
         self.points.iter().any(|p| p.tangent.coefficient > 0.0)
     }
 
-    /// Numbers that differ between linearisations with different sets of branches.
+    /// Hash that differs between linearisations with different sets of branches.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
     }
 
-    /// Largest fall of the graphs of all points in Pa s/m, at the pressures that the bounds follow.
+    /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
     pub fn steepest_fall(&self) -> f64 {
         let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
         self.law.steepest_fall() * most
     }
 
-    /// What happens at each point, at velocities in a vector of Newton's method.
+    /// The state of each point, at velocities in a vector of Newton's method.
     pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
         self.sliding(Newton, velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
@@ -305,26 +305,26 @@ impl<const D: usize> Friction<D> {
 
     /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
     pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
-        // Points are ordered by node, at most one a node.
+        // Points are ordered by node, at most one for each node.
         let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
         found.map_or([0.0; D], |at| self.points[at].along(Body, nodal))
     }
 
-    /// Power in W that friction dissipates at these velocities.
+    /// Power in W dissipated by friction at these velocities.
     pub fn power(&self, velocity: &[f64]) -> f64 {
         let sliding = self.sliding(Body, velocity);
         sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
     }
 
-    /// Power in W that the obstacle gives the body by friction.
+    /// Power in W of the obstacle's friction on the body.
     pub fn driving_power(&self) -> f64 {
         let given = self.points.iter().zip(&self.drift).map(|(p, drift)| p.weight * dot(&p.traction, drift));
         -given.sum::<f64>()
     }
 
-    /// Largest sliding velocity and largest traction or bound at points here, at velocities in a vector of Newton's method.
+    /// Largest sliding velocity and largest traction or bound at points on this rank, at velocities in a vector of Newton's method.
     pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
-        // Beside the velocity of the obstacle a slower sliding is rounding.
+        // Sliding that is slower than the rounding of the obstacle's velocity is a rounding error.
         let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
         self.sliding(Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
@@ -333,8 +333,8 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
-    /// `range`; at most by a factor of the square root of 2 too large. `residual` holds the open forces in N; both are vectors of
-    /// Newton's method.
+    /// `range`; overestimated by at most a factor of the square root of 2. `residual` contains the unbalanced forces in N; both are
+    /// vectors of Newton's method.
     pub fn inclusion_residual(
         &self,
         points: &[Point<D>],
@@ -375,7 +375,7 @@ impl<const D: usize> Friction<D> {
         }
     }
 
-    /// `integral of w_tau^2` over the points here.
+    /// `integral of w_tau^2` over the points on this rank.
     pub fn square(&self, nodal: &[f64]) -> f64 {
         let square = |point: &TangentialPoint<D>| {
             point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
@@ -384,7 +384,7 @@ impl<const D: usize> Friction<D> {
     }
 }
 
-/// The directions along the boundary at a point that supports hold.
+/// The directions along the boundary that supports fix at a point.
 fn tangents_held<const D: usize>(point: &Point<D>, fixed: &[bool]) -> impl Iterator<Item = Vector<D>> {
     let normal = point.normal;
     (0..D).filter(|i| fixed[point.node() * D + i]).filter_map(move |axis| {

@@ -1,4 +1,4 @@
-//! How far velocities and tractions are off the graphs of the laws. All vectors are those of Newton's method.
+//! Distances of velocities and tractions from the graphs of the laws. All vectors are those of Newton's method.
 
 use super::{
     Contact,
@@ -7,12 +7,12 @@ use super::{
 };
 use crate::linear_algebra::tensor::larger;
 
-/// Share of the mean pressure of all forces of a step, beside which errors of the pressure count at least.
+/// Share of the mean pressure of all forces of a step that is the smallest reference for errors of the pressure.
 const FORCE_SHARE: f64 = 0.01;
 
 impl<const D: usize> Contact<D> {
-    /// Largest normal velocity and pressure, sliding velocity and friction traction at points here, without signs. Where the
-    /// law has no pressure, the velocity is that in any direction: its rounding bounds what can be resolved along the normal.
+    /// Largest normal velocity and pressure, sliding velocity and friction traction at points on this rank, as absolute values.
+    /// Where the law has no pressure, the velocity is that in any direction: its rounding limits the resolution along the normal.
     pub fn range(&self, velocity: &[f64]) -> [f64; 4] {
         let nothing = self.law.is_zero();
         let normal = self.points.iter().fold([0.0; 2], |[v, p], point| {
@@ -25,12 +25,12 @@ impl<const D: usize> Contact<D> {
         [normal[0], normal[1], sliding[0], sliding[1]]
     }
 
-    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` holds what is
-    /// left of the equations of motion, in N; `range` scales where the law has no range of its own or a smaller one.
+    /// Largest scaled distance of (velocity, traction from equilibrium) to the graphs of both laws. `residual` contains the
+    /// residual of the equations of motion, in N; `range` scales where the law has no range of its own or a smaller one.
     pub fn inclusion_residual(&self, velocity: &[f64], residual: &[f64], range: [f64; 4]) -> f64 {
         let sliding = [range[2], range[3]];
-        // The velocity that the pressures would change, and the pressure of the forces, count where there is no other; of the
-        // latter a share where the law has a range of its own.
+        // Without a range, the reference values are the mean pressure of the forces and the velocity that corresponds to the
+        // pressures; where the law has a range, a share of that pressure.
         let share = if self.law.is_zero() || self.law.depends_on_displacement() { 1.0 } else { FORCE_SHARE };
         let reference = self.reference;
         let range =

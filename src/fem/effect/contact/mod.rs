@@ -1,9 +1,9 @@
 //! Contact: a law at the quadrature points of a boundary.
 //!
-//! At nodal points the unknown `x` of a step carries, in place of the velocity along the normal, the parameter of the
-//! law's graph: `s = c v + p`, which is `c f (x . m)`, with `m` the normal without held components at length 1 and `f` the
-//! length it had. [`Contact::map`] turns unknowns into velocities: `v = x + (V(s) / f - x . m) m`. Graphs may then be
-//! vertical: constraints and sticking. With `theta = c V'(s)` between 0 and 1,
+//! At nodal points the unknown `x` of a step contains the parameter of the law's graph in place of the velocity along the
+//! normal: `s = c v + p`, which is `c f (x . m)`, where `m` is the normal without prescribed components, scaled to length 1, and
+//! `f` its length before scaling. [`Contact::map`] converts unknowns into velocities: `v = x + (V(s) / f - x . m) m`. Graphs may
+//! then be vertical: constraints and sticking. With `theta = c V'(s)` between 0 and 1,
 //!
 //! ```text
 //! R(x) = K v + sum w f p m - b
@@ -14,10 +14,10 @@
 //! With friction, the unknown along the tangents of nodal points is the parameter of the friction graph in the same way; see
 //! [`friction`].
 //!
-//! Vectors hold `D` values a node of the body on this rank; those of Newton's method, in `newton.rs`, may hold the nodes of
-//! contacts alone.
+//! Vectors contain `D` values for each node of the body on this rank; those of Newton's method, in `newton.rs`, may contain the
+//! nodes of contacts only.
 //!
-//! Points at which this can't be (Gauss quadrature; normals at a node that are not orthogonal) keep the velocity as their
+//! At points where this is impossible (Gauss quadrature; normals at a node that are not orthogonal) the velocity remains the
 //! unknown; their law must not have vertical parts.
 
 mod bounds;
@@ -52,7 +52,7 @@ pub use directions::{ContactNode, contact_nodes};
 pub use reference::ReferenceValues;
 pub use unknowns::choose_unknowns;
 
-/// What holds along the normal of a contact boundary, and at which points.
+/// The law along the normal of a contact boundary, and its points.
 #[derive(Debug)]
 pub struct ContactConditions {
     /// The points.
@@ -72,7 +72,7 @@ pub struct Contact<const D: usize> {
     pub gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
-    /// The sizes that errors of velocities and tractions are relative to where the laws have no range of their own.
+    /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
     facets: Vec<u32>,
     points: Vec<Point<D>>,
@@ -81,20 +81,20 @@ pub struct Contact<const D: usize> {
     derivatives: Derivatives,
 }
 
-/// Which derivatives of the laws the points hold. PETSc calls what takes and what uses them, so that the order of calls is checked in
-/// debug builds.
+/// The derivatives of the laws that the points store. PETSc calls the functions that compute and use them, so debug builds check
+/// the order of calls.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 enum Derivatives {
     /// Nothing yet.
     Unknown,
     /// Those of the last linearisation.
     Linearised,
-    /// These, and the changes along the direction last mapped.
+    /// The same, and the changes along the direction last mapped.
     AlongDirection,
 }
 
 impl<const D: usize> Contact<D> {
-    /// Puts the law on these facets of this rank. `fixed` has one flag a local component. Collective.
+    /// Applies the law to these facets of this rank. `fixed` has one flag for each local component. Collective.
     pub fn new(
         session: &Session,
         mesh: &Mesh<D>,
@@ -135,7 +135,7 @@ impl<const D: usize> Contact<D> {
         })
     }
 
-    /// Whether velocities of ghost nodes are read and forces on them written.
+    /// Whether velocities of ghost nodes are read and forces on them are written.
     pub fn needs_ghosts(&self) -> bool {
         self.needs_ghosts
     }
@@ -145,12 +145,12 @@ impl<const D: usize> Contact<D> {
         self.points.len()
     }
 
-    /// Facets of this rank, local numbers.
+    /// Facets of this rank, by local numbers.
     pub fn facets(&self) -> &[u32] {
         &self.facets
     }
 
-    /// Its size on this rank, in m^(D-1).
+    /// Size of the boundary on this rank, in m^(D-1).
     pub fn area(&self) -> f64 {
         self.points.iter().map(|point| point.weight).sum()
     }

@@ -1,7 +1,7 @@
-//! Contact in the equations that Newton's method solves. All vectors are those of Newton's method, `D` values a node at which it
-//! has unknowns, unless said otherwise: see [`Contact::number_unknowns`].
+//! Contact in the equations of Newton's method. All vectors are those of Newton's method, `D` values for each node at which it
+//! has unknowns, unless stated otherwise: see [`Contact::number_unknowns`].
 //!
-//! Points keep the pressures of the unknowns last mapped, the derivatives of the last linearisation, and the changes of the
+//! Points store the pressures of the unknowns last mapped, the derivatives of the last linearisation, and the changes of the
 //! pressures along the direction last mapped.
 
 use super::{
@@ -12,8 +12,8 @@ use super::{
 use xxhash_rust::xxh3::Xxh3;
 
 impl<const D: usize> Contact<D> {
-    /// Sets the numbers of all nodes in the vectors of Newton's method, given their numbers on this rank. Until then both are
-    /// the same. The solver of a run's steps calls it when it is made.
+    /// Sets the numbers of all nodes in the vectors of Newton's method, given their local numbers. Before this call both are
+    /// the same. The solver of a run's steps calls this function when it is created.
     pub fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
         self.points.iter_mut().for_each(|point| point.number_unknowns(&number));
         for point in self.friction.iter_mut().flat_map(|friction| &mut friction.points) {
@@ -21,8 +21,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Turns velocities into unknowns, with the pressures that the law gives them; where its graph has vertical parts,
-    /// with the pressures that the points have.
+    /// Converts velocities into unknowns, with the pressures of the law at these velocities; where its graph has vertical parts,
+    /// with the pressures of the points.
     pub fn unmap(&self, values: &mut [f64]) {
         let has_vertical_parts = self.law.has_vertical_parts();
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
@@ -38,14 +38,14 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Turns unknowns into velocities, and gives the points the pressures that go with them.
+    /// Converts unknowns into velocities, and sets the corresponding pressures of the points.
     pub fn map(&mut self, values: &mut [f64]) {
         let (law, scale) = (&self.law, self.scale);
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
             let found = point.resolve(law, scale, along);
             point.pressure = found.pressure;
-            // In two terms: the parameter may be much more than the velocity, which would drown in its rounding.
+            // In two terms: the parameter may be much larger than the velocity, which would be lost in its rounding.
             point.add_along(Newton, -along, values);
             point.add_along(Newton, found.velocity / point.stretch, values);
         }
@@ -54,8 +54,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Adds the contact forces in N to `forces`: of the points' pressures; at points whose unknown is the velocity, of the pressures
-    /// at `velocity`.
+    /// Adds the contact forces in N to `forces`: those of the pressures of the points, or, at points whose unknown is the velocity,
+    /// of the pressures at `velocity`.
     pub fn add_forces(&self, velocity: &[f64], forces: &mut [f64]) {
         for point in &self.points {
             point.add_force(Newton, point.pressure_at(&self.law, Newton, velocity), forces);
@@ -83,7 +83,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Removes from nodal values what moves any nodal point.
+    /// Removes from nodal values the motions of all nodal points.
     pub fn remove_motions(&self, values: &mut [f64]) {
         for point in &self.points {
             match point.unknown {
@@ -97,7 +97,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Takes the derivatives of the laws at these unknowns, and turns `velocity`, a copy of the unknowns, into velocities as
+    /// Computes the derivatives of the laws at these unknowns, and converts `velocity`, a copy of the unknowns, into velocities as
     /// [`map`](Self::map) does.
     pub fn linearise_parameters(&mut self, unknowns: &[f64], velocity: &mut [f64]) {
         self.map(velocity);
@@ -113,15 +113,15 @@ impl<const D: usize> Contact<D> {
         self.derivatives = Derivatives::Linearised;
     }
 
-    /// Takes the slopes of the law at these velocities, where the velocity is the unknown.
+    /// Computes the slopes of the law at these velocities, where the velocity is the unknown.
     pub fn linearise_velocities(&mut self, velocity: &[f64]) {
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Velocity) {
             point.slope = self.law.slope(point.normal_component(Newton, velocity), point.context);
         }
     }
 
-    /// Turns a change of the unknowns into the change of the velocities, and gives the points the changes of their pressures. After
-    /// [`linearise_parameters`](Self::linearise_parameters).
+    /// Converts a change of the unknowns into the change of the velocities, and sets the changes of the pressures of the points. To
+    /// be called after [`linearise_parameters`](Self::linearise_parameters).
     pub fn map_direction(&mut self, values: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         let scale = self.scale;
@@ -136,8 +136,8 @@ impl<const D: usize> Contact<D> {
         self.derivatives = Derivatives::AlongDirection;
     }
 
-    /// Adds the change of the contact forces: of the direction last mapped, where the unknown is the velocity that of the change
-    /// `direction` of the velocity. After [`map_direction`](Self::map_direction).
+    /// Adds the change of the contact forces: of the direction last mapped or, where the unknown is the velocity, of the change
+    /// `direction` of the velocity. To be called after [`map_direction`](Self::map_direction).
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
         debug_assert_eq!(self.derivatives, Derivatives::AlongDirection);
         for point in &self.points {
@@ -155,8 +155,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Adds the change of the contact forces with the velocity; nothing where the graph is vertical. After
-    /// [`linearise_parameters`](Self::linearise_parameters), as all that follow.
+    /// Adds the change of the contact forces with the velocity; zero where the graph is vertical. This and all following functions
+    /// are to be called after [`linearise_parameters`](Self::linearise_parameters).
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in &self.points {
@@ -177,8 +177,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Brings equations into the form in which unknown pressures of sliding points do not occur; then
-    /// [`project`](Self::project) leaves those of the velocities.
+    /// Eliminates the unknown pressures of sliding points from the equations; [`project`](Self::project) then leaves the equations
+    /// of the velocities.
     pub fn reduce(&self, values: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         if let Some(friction) = &self.friction {
@@ -186,7 +186,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Removes from nodal values what moves points on vertical parts of the graph.
+    /// Removes from nodal values the motions of points on vertical parts of the graph.
     pub fn project(&self, values: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.theta == 0.0) {
@@ -197,8 +197,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Turns a change of velocities into the change of the unknowns. `open` holds the forces in N that the change of velocities
-    /// leaves open.
+    /// Converts a change of velocities into the change of the unknowns. `open` contains the forces in N that remain unbalanced
+    /// after the change of velocities.
     pub fn unmap_direction(&self, open: &[f64], values: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
@@ -214,12 +214,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Whether the last linearisation is not symmetric at points here.
+    /// Whether the last linearisation is unsymmetric at points on this rank.
     pub fn is_coupled(&self) -> bool {
         self.friction.as_ref().is_some_and(Friction::is_coupled)
     }
 
-    /// A number that differs between linearisations whose points are on different branches.
+    /// Hash that differs between linearisations whose points are on different branches.
     pub fn set_digest(&self) -> u64 {
         let normal = self.points.iter().flat_map(|p| [p.theta, p.slope]);
         let numbers = normal.chain(self.friction.iter().flat_map(Friction::numbers));

@@ -1,6 +1,6 @@
 //! A quadrature point of a contact boundary.
 //!
-//! A point finds the values of its nodes in two kinds of vectors, [`Vectors`]. It holds the numbers of its nodes in both.
+//! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
 use crate::{
     fem::space::facet_rule,
@@ -16,50 +16,50 @@ pub(super) enum Unknown {
     Parameter,
     /// The velocity itself.
     Velocity,
-    /// None: supports hold all components along the normal.
+    /// None: supports fix all components along the normal.
     Held,
 }
 
-/// The vectors of nodal values that contacts read and write, `D` values a node.
+/// The vectors of nodal values that contacts read and write, `D` values for each node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Vectors {
     /// All nodes of the body on this rank.
     Body,
-    /// The nodes at which Newton's method has unknowns: all nodes, or those of the contacts alone.
+    /// The nodes at which Newton's method has unknowns: all nodes, or those of the contacts only.
     Newton,
 }
 
-/// A point where the law holds: its velocity is a mean of nodal ones, its pressure acts on the same nodes.
+/// A point at which the law is evaluated: its velocity is a mean of nodal ones, and its pressure acts on the same nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Point<const D: usize> {
     /// Numbers of its nodes in the vectors of the body and in those of Newton's method; `count` of them are used.
     numbers: [[u32; D]; 2],
     count: usize,
-    /// Share of each node.
+    /// Weight of each node in the mean.
     shares: [f64; D],
     pub normal: Vector<D>,
     /// Quadrature weight in m^(D-1).
     pub weight: f64,
-    /// Force on each node per pressure, without held components, in m^(D-1).
+    /// Force on each node per pressure, without prescribed components, in m^(D-1).
     force: [Vector<D>; D],
-    /// At nodal points: the normal without held components, of length 1.
+    /// At nodal points: the normal without prescribed components, scaled to length 1.
     pub direction: Vector<D>,
-    /// Length that the normal has left without held components.
+    /// Length of the normal without prescribed components before scaling.
     pub stretch: f64,
     pub unknown: Unknown,
-    /// Where the point was at first, in m.
+    /// Initial position, in m.
     pub place: Vector<D>,
-    /// Penetration and length of the step.
+    /// Penetration at the start of the step, and step length.
     pub context: NodeContext,
-    /// `u_nu - gap` in m at the start of the step, both as they were then.
+    /// `u_nu - gap` in m, with both values at the start of the step.
     pub penetration_before: f64,
-    /// How far the gap grew in the step, in m.
+    /// Growth of the gap in the step, in m.
     pub growth: f64,
-    /// What the blend of a two-step scheme adds to the penetration, in m.
+    /// Contribution of the blend of a two-step scheme to the penetration, in m.
     pub shift: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
     pub pressure: f64,
-    /// Share of a change of the unknown that is a change of velocity, at the last linearisation: `c V'(s)`.
+    /// Ratio of the change of velocity to the change of the unknown, at the last linearisation: `c V'(s)`.
     pub theta: f64,
     /// Slope of the law at the last linearisation, in Pa s/m.
     pub slope: f64,
@@ -107,7 +107,7 @@ impl<const D: usize> Point<D> {
         let free: Vector<D> =
             std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
         point.stretch = norm(&free);
-        // A shorter one is rounding in the normal of a face that supports hold.
+        // A smaller length is a rounding error in the normal of a face that supports fix.
         if point.stretch > 1e-9 {
             point.direction = free.map(|x| x / point.stretch);
             point.unknown = Unknown::Parameter;
@@ -118,7 +118,7 @@ impl<const D: usize> Point<D> {
         point
     }
 
-    /// The first of its nodes on this rank: the only one of a nodal point.
+    /// The local number of its first node; a nodal point has no other.
     pub fn node(&self) -> usize {
         self.first(Vectors::Body)
     }
@@ -135,12 +135,12 @@ impl<const D: usize> Point<D> {
             self.numbers[Vectors::Body as usize].map(|node| number(node as usize) as u32);
     }
 
-    /// Nodes of this rank and shares.
+    /// Local numbers of the nodes and their weights.
     pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
         self.places(Vectors::Body)
     }
 
-    /// Numbers of the nodes in these vectors, and shares.
+    /// Numbers of the nodes in these vectors, and their weights.
     fn places(&self, vectors: Vectors) -> impl Iterator<Item = (usize, f64)> {
         self.numbers[vectors as usize][..self.count].iter().map(|&node| node as usize).zip(self.shares)
     }
@@ -159,7 +159,7 @@ impl<const D: usize> Point<D> {
         sum
     }
 
-    /// Length of the mean of velocities in vectors of Newton's method.
+    /// Magnitude of the mean of velocities in vectors of Newton's method.
     pub fn speed(&self, nodal: &[f64]) -> f64 {
         let mean =
             |i: usize| self.places(Vectors::Newton).map(|(node, share)| share * nodal[node * D + i]).sum();
@@ -198,13 +198,13 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// The point of the law's graph that the unknown `along` the direction stands for.
+    /// The point of the law's graph for the unknown `along` the direction.
     #[inline]
     pub fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
         law.resolve(scale * self.stretch * along, scale, self.context)
     }
 
-    /// The normal velocity in m/s that would close the gap in the step, without its sign; 0 for laws without a gap.
+    /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.
     pub fn context_velocity(&self) -> f64 {
         if self.context.step_length > 0.0 && self.can_touch() {
             (self.context.penetration / self.context.step_length).abs()
@@ -227,7 +227,7 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// The normal force per area that a residual, a vector of Newton's method, leaves open here.
+    /// The unbalanced normal force per area at this point, from a residual, a vector of Newton's method.
     pub fn open_pressure(&self, residual: &[f64]) -> f64 {
         let mut largest = 0.0f64;
         for a in 0..self.count {

@@ -1,4 +1,4 @@
-//! What a step prepares at the points of a contact. Vectors are those of the body.
+//! Preparation of a step at the points of a contact. Vectors are those of the body.
 
 use super::{
     Contact,
@@ -26,14 +26,14 @@ impl<const D: usize> Contact<D> {
             point.context = NodeContext { penetration: along - gap, step_length: length };
             point.penetration_before = along - before;
             point.shift = 0.0;
-            // Without an obstacle at the start of the step, the gap counts as closed there: equal to the displacement.
+            // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
         self.set_drift(Rate::euler(time, length))
     }
 
-    /// After [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of the blend
-    /// and a nodal shift with ghosts. The obstacle's velocity follows from its places by the same formula.
+    /// To be called after [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of
+    /// the blend and a nodal shift with ghosts. The obstacle's velocity follows from its positions by the same formula.
     pub fn blend(&mut self, step: Step, blend: Blend, shift: &[f64]) -> Result<()> {
         if !self.law.depends_on_displacement() {
             return Ok(());
@@ -65,15 +65,15 @@ impl<const D: usize> Contact<D> {
         self.friction.is_some() && self.gap.may_drag()
     }
 
-    /// The sum over points here of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
+    /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
     pub fn drift_square(&self) -> f64 {
         let drift = self.friction.iter().flat_map(|friction| &friction.drift);
         drift.map(|drift| dot(drift, drift)).sum()
     }
 
-    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that hold one tangent
-    /// of a point along this motion and leave another free: the direction of sliding depends on both, and only the free one is an
-    /// unknown. Where supports hold all tangents, the friction does not matter.
+    /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that fix one tangent
+    /// of a point along this motion and leave another free: the direction of sliding depends on both, but only the free one is an
+    /// unknown. Where supports fix all tangents, friction has no effect.
     fn set_drift(&mut self, rate: Rate) -> Result<()> {
         let Some(friction) = self.friction.as_mut().filter(|_| self.gap.may_drag()) else { return Ok(()) };
         let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);

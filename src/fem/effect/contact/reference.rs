@@ -1,12 +1,12 @@
 //! Reference values for distances to the graphs of the laws.
 
-/// What errors of velocities and tractions of a contact are relative to where its laws have no range of their own. It follows from
-/// the step's matrix and forces alone, not from the way in which the step is solved.
+/// Reference values for errors of velocities and tractions of a contact where its laws have no range of their own. They depend only
+/// on the matrix and the forces of the step, not on the method of solving it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceValues {
-    /// What resists a motion of the boundary alone, along the normal and in sliding, in Pa s/m.
+    /// Resistance to a motion of the boundary alone, along the normal and in sliding, in Pa s/m.
     pub resistance: [f64; 2],
-    /// The boundary in m^(D-1), over all ranks.
+    /// Size of the boundary in m^(D-1), over all ranks.
     pub area: f64,
     /// The forces of the step, in N.
     pub forces: f64,
@@ -25,7 +25,7 @@ impl ReferenceValues {
     }
 }
 
-/// The largest distance; one that is not a number counts as infinite.
+/// The largest distance; infinite if one is NaN.
 pub(super) fn worst(distances: impl Iterator<Item = f64>) -> f64 {
     distances.fold(0.0, |worst, distance| if distance.is_nan() { f64::INFINITY } else { distance.max(worst) })
 }

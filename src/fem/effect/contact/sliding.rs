@@ -9,8 +9,9 @@ use crate::{
 };
 
 impl<const D: usize> Contact<D> {
-    /// Adds friction, for which `fixed` has one flag a local component; before [`choose_unknowns`](super::choose_unknowns). Refuses supports that
-    /// leave no tangent, or no pressure where the law needs one.
+    /// Adds friction, where `fixed` has one flag for each local component; to be called before
+    /// [`choose_unknowns`](super::choose_unknowns). Refuses supports that leave no tangent, and missing pressure where the law
+    /// needs one.
     pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, fixed: &[bool]) -> Result<()> {
         if self.needs_ghosts {
             return Err(Error::Refused(
@@ -31,7 +32,7 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0, |friction| friction.points.len())
     }
 
-    /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound follows the contact
+    /// Sets `c` in the parameter `s = c v + q` of the friction graph, in Pa s/m, and whether its bound depends on the contact
     /// pressure while a step is solved.
     pub fn set_friction(&mut self, scale: f64, follows: bool) {
         if let Some(friction) = &mut self.friction {
@@ -45,20 +46,20 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, |friction| friction.scale)
     }
 
-    /// Sets the pressures that friction bounds follow to those of the points.
+    /// Sets the pressures in the friction bounds to those of the points.
     pub fn take_pressures(&mut self) {
         if let Some(friction) = &mut self.friction {
             friction.take_pressures(&self.points);
         }
     }
 
-    /// Steepest fall of the friction graphs of points here in Pa s/m, at the pressures that its bounds follow.
+    /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
     pub fn steepest_friction_fall(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, Friction::steepest_fall)
     }
 
-    /// The steepest falls in Pa s/m of the normal and of the friction graph, as far as they are known before a step: friction
-    /// that follows a pressure without bounds counts as not falling; see [`unknown_fall`](Self::unknown_fall).
+    /// The steepest descents in Pa s/m of the normal and of the friction graph, as far as they are known before a step. Friction
+    /// that depends on an unbounded pressure counts as not descending; see [`unknown_fall`](Self::unknown_fall).
     pub fn known_falls(&self) -> [f64; 2] {
         let friction = self.friction().map_or(0.0, |friction| friction.steepest_fall());
         let most = self.law.greatest_pressure();
@@ -66,13 +67,14 @@ impl<const D: usize> Contact<D> {
         [self.law.monotonicity_constant(), tangential]
     }
 
-    /// The steepest fall of the friction coefficient in s/m, where the pressure that multiplies it has no bound.
+    /// The steepest descent of the friction coefficient in s/m, where the pressure that multiplies it is unbounded.
     pub fn unknown_fall(&self) -> Option<f64> {
         let fall = self.friction()?.steepest_fall();
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 
-    /// The largest contact pressure in Pa at points here, at least 0, in the step just solved, at its velocities with ghosts.
+    /// The largest contact pressure in Pa at points on this rank, at least 0, in the step just solved, at its velocities with
+    /// ghosts.
     pub fn largest_pressure(&self, velocity: &[f64]) -> f64 {
         self.points
             .iter()

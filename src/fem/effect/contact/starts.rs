@@ -1,17 +1,17 @@
-//! Other velocities for a step to start from, where it may have several solutions.
+//! Other start velocities of a step that may have several solutions.
 
 use super::{Contact, point::Vectors::Body};
 
 impl<const D: usize> Contact<D> {
-    /// The largest velocity in m/s at which a law here turns a corner; 0 where none is given.
+    /// The largest velocity in m/s at which a law on this rank has a kink; 0 where no law has one.
     pub fn corner_velocity(&self) -> f64 {
         let normal = self.law.corners().iter().fold(0.0, |most, p| f64::max(most, p[0].abs()));
         let sliding = self.friction().map_or(0.0, |friction| friction.corner_velocity());
         f64::max(normal, sliding)
     }
 
-    /// Sets the normal velocity of the nodal points to that of `velocity` for their node, in m/s, and as much along a tangent
-    /// where there is friction. `nodal` holds velocities at the owned nodes of the body.
+    /// Sets the normal velocity of the nodal points to the value of `velocity` for their node, in m/s, and the velocity along a
+    /// tangent to the same value where there is friction. `nodal` contains velocities at the owned nodes of the body.
     pub fn start_at(&self, velocity: impl Fn(usize) -> f64, nodal: &mut [f64]) {
         for point in self.points.iter().filter(|point| !self.needs_ghosts && point.stretch > 0.0) {
             let wanted = velocity(point.node()) / point.stretch;

@@ -1,12 +1,12 @@
-//! The tangential side of a contact point.
+//! Tangential data of a contact point.
 
 use super::point::Vectors::{self, Body, Newton};
 use crate::linear_algebra::tensor::{Vector, dot, norm};
 
-/// A length below which a direction is rounding.
+/// A direction shorter than this is a rounding error.
 pub(super) const ROUNDING: f64 = 1e-9;
 
-/// The tangential side of a nodal point.
+/// Tangential data of a nodal point.
 #[derive(Debug, Clone)]
 pub(super) struct TangentialPoint<const D: usize> {
     /// Its number among the points of the contact.
@@ -17,7 +17,7 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
     pub count: usize,
-    /// The contact pressure in Pa that the bound follows.
+    /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
     /// `q` in Pa at the last evaluation.
     pub traction: Vector<D>,
@@ -37,7 +37,7 @@ pub(super) struct Tangent<const D: usize> {
     pub theta: [f64; 2],
     /// `g'` and `g / V`.
     pub slopes: [f64; 2],
-    /// `mu`: change of the bound with the contact pressure, if it follows that.
+    /// `mu`: change of the bound with the contact pressure; zero if it does not depend on the pressure.
     pub coefficient: f64,
 }
 
@@ -53,7 +53,7 @@ impl<const D: usize> TangentialPoint<D> {
         self.numbers[Body as usize]
     }
 
-    /// Removes what is not orthogonal to this direction from the tangents.
+    /// Removes from the tangents the components along this direction.
     pub fn remove_direction(&mut self, direction: &Vector<D>) {
         let mut along = [0.0; D];
         for tangent in &self.tangents[..self.count] {
@@ -96,7 +96,7 @@ impl<const D: usize> TangentialPoint<D> {
         self.add(Newton, 1.0, &change, nodal);
     }
 
-    /// Change of the traction at a point that slides, with a change of the velocity, a vector of Newton's method, and of the pressure.
+    /// Change of the traction at a sliding point, with a change of the velocity, a vector of Newton's method, and of the pressure.
     pub fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
         let Tangent { toward, slopes, coefficient, .. } = self.tangent;
         let velocity = self.along(Newton, direction);
@@ -108,7 +108,7 @@ impl<const D: usize> TangentialPoint<D> {
     }
 }
 
-/// An orthonormal basis of what these orthonormal vectors span, without these orthonormal or zero directions.
+/// An orthonormal basis of the span of these orthonormal vectors, without these orthonormal or zero directions.
 pub(super) fn span_without<const D: usize>(
     vectors: &[Vector<D>],
     directions: &[Vector<D>],
@@ -116,14 +116,14 @@ pub(super) fn span_without<const D: usize>(
     let (mut basis, mut count) = ([[0.0; D]; D], 0);
     for vector in vectors {
         let mut left = *vector;
-        // Twice, so that what is left is orthogonal to rounding.
+        // Twice, so that the result is orthogonal up to rounding.
         for _ in 0..2 {
             for known in directions.iter().chain(&basis[..count]) {
                 let along = dot(known, &left);
                 (0..D).for_each(|i| left[i] -= along * known[i]);
             }
         }
-        // Of D vectors, those that lack a dimension of their span can't all be shorter than this.
+        // Of D vectors, those without one dimension of their span can't all be shorter than this.
         let size = norm(&left);
         if size > 0.9 / (D as f64).sqrt() {
             basis[count] = left.map(|x| x / size);

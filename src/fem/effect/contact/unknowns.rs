@@ -1,4 +1,4 @@
-//! At which points the parameter of the law's graph can be the unknown.
+//! Choice of the unknown at the points: the parameter of the law's graph or the velocity.
 
 use super::{Contact, point::Unknown};
 use crate::{
@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Cosine below which directions at a node count as orthogonal.
 const ORTHOGONAL: f64 = 1e-9;
 
-/// Decides at which points the unknown is the velocity, because directions at a node are not orthogonal; refuses laws
+/// Selects the velocity as the unknown at points where directions at a node are not orthogonal; refuses laws
 /// with vertical parts there and at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
     let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
@@ -61,7 +61,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
     Ok(())
 }
 
-/// Friction at an edge acts along what is a tangent of every contact boundary there.
+/// Friction at an edge acts along the direction that is tangential to every contact boundary there.
 fn keep_tangents_free_of_normals<const D: usize>(
     contacts: &mut [Contact<D>],
     around: &BTreeMap<usize, Vec<(usize, usize)>>,
@@ -80,7 +80,7 @@ fn keep_tangents_free_of_normals<const D: usize>(
     }
 }
 
-/// The nodes with friction; along one direction only that of one boundary can act.
+/// The nodes with friction; along one direction friction of one boundary only can act.
 fn refuse_shared_tangents<const D: usize>(
     contacts: &[Contact<D>],
     mesh: &Mesh<D>,
