@@ -1,4 +1,4 @@
-//! Pictures of the deformed body: coloured by its fields, and under arrows along its contact boundary.
+//! Pictures of the deformed body: coloured by its fields, and with arrows along its contact boundary.
 
 use super::{
     colour::{Colour, Shades, VIRIDIS, dimmed, hex},
@@ -19,15 +19,15 @@ use crate::{
 };
 use std::fmt::Write;
 
-/// Errors below this share of the largest are drawn as that.
+/// Lower limit of drawn errors, as a share of the largest error.
 const DECADES: f64 = 1e-4;
-/// Displacements are drawn at most this large, as a share of the body.
+/// Largest drawn displacement, as a share of the size of the body.
 const VISIBLE: f64 = 0.12;
 
-/// The body as it is drawn.
+/// The drawing of a body.
 pub struct Body<'a> {
     snapshot: &'a Snapshot,
-    /// What displacements are multiplied with.
+    /// Magnification factor of displacements.
     pub magnification: f64,
     view: View,
     axes: [&'static str; 2],
@@ -35,16 +35,16 @@ pub struct Body<'a> {
     places: Vec<[f64; 3]>,
 }
 
-/// A quantity that faces are coloured by.
+/// A quantity that determines the colours of faces.
 #[derive(Debug, Clone, Copy)]
 pub struct Coloured<'a> {
     /// Name of the picture.
     pub name: &'a str,
-    /// What it is.
+    /// Description.
     pub quantity: &'a str,
     /// Its unit.
     pub unit: &'a str,
-    /// Its shades.
+    /// Its colour scale.
     pub shades: Shades,
 }
 
@@ -62,12 +62,12 @@ impl<'a> Body<'a> {
         Self { snapshot, magnification, view, axes: ["x", "y"], faces: faces(snapshot), places }
     }
 
-    /// The same with other names of the axes.
+    /// The same with other names of axes.
     pub fn with_axes(self, axes: [&'static str; 2]) -> Self {
         Self { axes, ..self }
     }
 
-    /// Coloured by a field, if it has a picture and the file has it.
+    /// Coloured by a field, if the field has a picture and the file contains it.
     pub fn of_field(&self, field: &OutputField) -> Result<Option<Picture>> {
         let (Some(picture), Some(values)) = (field.picture, self.snapshot.values(field)) else {
             return Ok(None);
@@ -97,19 +97,19 @@ impl<'a> Body<'a> {
         Ok(Some(drawn))
     }
 
-    /// Coloured by a quantity of its nodes.
+    /// Coloured by a quantity at the nodes.
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         self.field(look, linear(extent(values.iter().copied())), |face| mean(face, values))
     }
 
-    /// Coloured by errors of its cells, by their powers of ten.
+    /// Coloured by the logarithms of the errors of the cells.
     pub fn errors(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let largest = extent(values.iter().copied()).map_or(1.0, |range| range.1);
         let shown = values.iter().map(|value| value.max(DECADES * largest));
         self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize])
     }
 
-    /// How much the displacement is magnified, in words.
+    /// A description of the magnification of the displacement.
     pub fn magnified(&self) -> String {
         match self.snapshot.vectors(&DISPLACEMENT) {
             None => "undeformed".into(),
@@ -160,7 +160,7 @@ impl<'a> Body<'a> {
         ))
     }
 
-    /// The mesh with arrows: each from a point to a point of the deformed body, both as they are drawn.
+    /// The mesh with arrows, each from a point to a point of the deformed body, both with magnified displacements.
     pub fn arrows(&self, heading: &str, colour: Colour, arrows: &[[[f64; 2]; 2]]) -> Result<String> {
         let ends: Vec<[f64; 2]> = arrows.iter().flatten().copied().collect();
         let frame = self.frame(24.0, &ends);
@@ -187,7 +187,7 @@ impl<'a> Body<'a> {
         Ok(svg + "</g>\n</svg>")
     }
 
-    /// Where a node of the body is drawn, in m, by its number.
+    /// The position in m at which the node with this number is drawn.
     pub fn place(&self, node: usize) -> [f64; 2] {
         let [x, y, _] = self.places[node];
         [x, y]
@@ -219,7 +219,7 @@ impl<'a> Body<'a> {
         seen.into_iter().map(|(_, triangle)| triangle).collect()
     }
 
-    /// Fits the deformed body, the undeformed one and these points, with room at the right.
+    /// Fits the deformed body, the undeformed one and these points into the drawing, with space on the right.
     fn frame(&self, right: f64, points: &[[f64; 2]]) -> Frame {
         let flat = |p: &[f64; 3]| {
             let [x, y, _] = self.view.project(*p);
@@ -233,7 +233,7 @@ impl<'a> Body<'a> {
         Frame::around(ranges, right)
     }
 
-    /// Axes and the undeformed outline of a plane body; directions of the axes in space.
+    /// Axes and the undeformed outline of a 2D body; directions of the axes in 3D.
     fn surroundings(&self, frame: &Frame) -> String {
         if self.view == View::Oblique {
             return self.directions(frame);
@@ -278,7 +278,7 @@ fn linear(range: Option<(f64, f64)>) -> Scale {
     Scale::linear(range.map_or([0.0; 2], |(low, high)| [low, high]).into_iter(), false)
 }
 
-/// Of errors, down to a hundredth of the largest.
+/// Colours of errors, down to a hundredth of the largest.
 fn of_errors(values: &[f64]) -> Scale {
     match extent(values.iter().copied()) {
         Some((_, largest)) if largest > 0.0 => {
@@ -288,7 +288,7 @@ fn of_errors(values: &[f64]) -> Scale {
     }
 }
 
-/// Of what nodes have, on a face.
+/// The mean of nodal values on a face.
 fn mean(face: &Face, nodal: &[f64]) -> f64 {
     face.nodes.iter().map(|n| nodal[*n as usize]).sum::<f64>() / 3.0
 }
@@ -304,7 +304,7 @@ fn size(snapshot: &Snapshot) -> f64 {
     (0..3).map(|axis| length(axis).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A round factor that makes displacements visible; never below 1.
+/// A round factor that makes displacements visible, at least 1.
 fn magnification(snapshot: &Snapshot) -> f64 {
     let lengths = snapshot.vectors(&DISPLACEMENT).into_iter().flatten().map(|u| length(u));
     let largest = extent(lengths).map_or(0.0, |range| range.1);
@@ -312,7 +312,7 @@ fn magnification(snapshot: &Snapshot) -> f64 {
     if wanted.is_finite() && wanted > 1.0 { leading_digit(wanted) } else { 1.0 }
 }
 
-/// The number with its leading digit only, about.
+/// The number rounded down to one significant digit.
 fn leading_digit(size: f64) -> f64 {
     let power = 10f64.powf(size.log10().floor());
     (size / power + 1e-9).floor() * power

@@ -1,5 +1,5 @@
-//! Charts: lines and points over axes, drawn by plotters. Its SVG needs no font; legend and axis names are set above the
-//! axes, where they cover no data and stay legible on a small screen.
+//! Charts: lines and points with axes, drawn by plotters. The SVG requires no font; legend and axis names are placed above the
+//! axes, where they cover no data and remain legible on a small screen.
 
 use super::{
     colour::{Colour, INK, LINES},
@@ -15,43 +15,43 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const HEIGHT: f64 = 380.0;
-/// Plotters rounds to whole pixels; it is given so many for a unit of the drawing that this is not seen.
+/// Plotters rounds to whole pixels; this many pixels per unit of the drawing make the rounding invisible.
 const FINE: i32 = 4;
-/// Points of a line beyond which it is thinned; more than twice the pixels of any screen it is read on.
+/// Number of points above which a line is thinned; more than twice the pixels of any screen.
 const ENOUGH: usize = 3000;
-/// Values that differ by less than this share of their size are steady.
+/// Values whose relative difference is below this share are constant.
 const STEADY: f64 = 0.02;
-/// Marks along a line that tell it from others without colour.
+/// Number of markers along a line that distinguish it from others without colour.
 const MARKS: usize = 9;
 
-/// How the points of a series are drawn.
+/// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
-    /// A line through them, with few marks.
+    /// A line with a few markers.
     Line,
-    /// A line, and a dot at each.
+    /// A line with a dot at each point.
     Dotted,
     /// Dots only.
     Dots,
 }
 
-/// Points with a name.
+/// Points with a name and a style.
 #[derive(Debug, Clone)]
 pub struct Series {
-    /// Name in the legend; none is shown if it is empty.
+    /// Name in the legend; not shown if it is empty.
     pub label: String,
     /// The points, unscaled.
     pub points: Vec<[f64; 2]>,
-    /// How they are drawn.
+    /// Their style.
     pub look: Look,
-    /// In which colour.
+    /// Their colour.
     pub colour: Colour,
-    /// Its place among its likes, which gives its marks their shape.
+    /// Index among similar series, which determines the shape of the markers.
     pub place: usize,
 }
 
 impl Series {
-    /// A series in the colour that belongs to its place among its likes.
+    /// A series in the colour of its index among similar series.
     pub fn new(place: usize, label: impl Into<String>, look: Look, points: Vec<[f64; 2]>) -> Self {
         Self { label: label.into(), points, look, colour: LINES[place % LINES.len()], place }
     }
@@ -60,39 +60,39 @@ impl Series {
 /// A quantity along an axis.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis<'a> {
-    /// What it is.
+    /// Description.
     pub quantity: &'a str,
-    /// Its unit, empty for pure numbers.
+    /// Its unit, empty for dimensionless numbers.
     pub unit: &'a str,
 }
 
 /// A part of the horizontal axis with a background.
 #[derive(Debug, Clone)]
 pub struct Band {
-    /// Where it starts and ends, unscaled.
+    /// Start and end, unscaled.
     pub span: [f64; 2],
-    /// Its background.
+    /// Background colour.
     pub colour: Colour,
-    /// What stands at its top.
+    /// Text at the top.
     pub label: String,
 }
 
 /// A chart.
 #[derive(Debug, Clone)]
 pub struct Chart<'a> {
-    /// To the right.
+    /// Horizontal axis.
     pub x: Axis<'a>,
-    /// Upwards.
+    /// Vertical axis.
     pub y: Axis<'a>,
-    /// Whether y is shown by its powers of ten.
+    /// Whether y is logarithmic.
     pub logarithmic: bool,
-    /// Whether x is.
+    /// Whether x is logarithmic.
     pub logarithmic_x: bool,
     /// Whether the vertical axis starts at zero.
     pub from_zero: bool,
-    /// What is drawn.
+    /// The series.
     pub series: Vec<Series>,
-    /// Behind it.
+    /// Bands in the background.
     pub bands: Vec<Band>,
     /// Horizontal lines with their names.
     pub levels: Vec<(f64, String)>,
@@ -101,7 +101,7 @@ pub struct Chart<'a> {
 type Axes = Cartesian2d<Marked, Marked>;
 type Area<'a, C> = DrawingArea<SVGBackend<'a>, C>;
 
-/// An axis that is marked where its scale says.
+/// An axis whose ticks are those of its scale.
 #[derive(Clone)]
 struct Marked {
     scale: Scale,
@@ -135,7 +135,7 @@ impl ValueFormatter<f64> for Marked {
 }
 
 impl<'a> Chart<'a> {
-    /// A chart of these series over linear axes.
+    /// A chart of these series with linear axes.
     pub fn new(x: Axis<'a>, y: Axis<'a>, series: Vec<Series>) -> Self {
         Self {
             x,
@@ -168,7 +168,7 @@ impl<'a> Chart<'a> {
             |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
         let levels = self.levels.iter().map(|level| level.0);
         let (low, high) = extent(coordinate(1)).unwrap_or((0.0, 0.0));
-        // What hardly changes is shown as that, not as a curve.
+        // For almost constant values the axis includes zero, so that their variation is not magnified.
         let steady = high - low < STEADY * low.abs().max(high.abs());
         let y = coordinate(1).chain(levels).chain((self.from_zero || steady).then_some(0.0));
         let y = if self.logarithmic { Scale::logarithmic(y) } else { Scale::linear(y, true) };
@@ -210,7 +210,7 @@ impl<'a> Chart<'a> {
         area.present().map_err(words)
     }
 
-    /// The name of the vertical axis, and below it the names of the series; gives the height they take.
+    /// The name of the vertical axis, and below it the names of the series; returns the height that they occupy.
     fn draw_legend(&self, area: &Area<Shift>, y: &Scale) -> std::result::Result<i32, String> {
         let row = 1.4 * LETTERS;
         let mut line = 4.0;
@@ -295,7 +295,7 @@ fn draw_series(plane: &Area<Axes>, series: &Series, x: &Scale, y: &Scale) -> std
     Ok(())
 }
 
-/// A mark whose shape tells series apart without colour.
+/// A marker whose shape distinguishes series without colour.
 fn mark(area: &Area<Shift>, at: (i32, i32), series: &Series) -> std::result::Result<(), String> {
     let style = rgb(series.colour).filled();
     let corners = |around: &[(i32, i32)]| {
@@ -310,7 +310,7 @@ fn mark(area: &Area<Shift>, at: (i32, i32), series: &Series) -> std::result::Res
     drawn.map_err(words)
 }
 
-/// So many points that no more could be seen: of each group the first, the lowest, the highest and the last.
+/// Thins a line without a visible difference: of each group the first, the lowest, the highest and the last point remain.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= ENOUGH {
         return points;
@@ -335,7 +335,7 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
-/// A place of the drawing in plotters' pixels.
+/// A point of the drawing in plotters' pixels.
 fn fine(x: f64, y: f64) -> (i32, i32) {
     let pixel = |along: f64| (along * f64::from(FINE)).round() as i32;
     (pixel(x), pixel(y))
@@ -345,7 +345,7 @@ fn rgb(colour: Colour) -> RGBColor {
     RGBColor(colour[0], colour[1], colour[2])
 }
 
-/// Plotters shows a text of size s in letters of s / 1.24.
+/// Plotters draws a text of size s with letters of size s / 1.24.
 fn letters() -> TextStyle<'static> {
     ("sans-serif", 1.24 * LETTERS * f64::from(FINE)).into_font().color(&rgb(INK))
 }

@@ -1,4 +1,4 @@
-//! Colours that stay apart for all common kinds of colour blindness, also in grey.
+//! Colours that can be distinguished with all common kinds of colour blindness, and in greyscale.
 
 /// Red, green and blue, 0 to 255.
 pub type Colour = [u8; 3];
@@ -17,10 +17,10 @@ pub const LINES: [Colour; 7] = [
 /// Text and axes.
 pub(super) const INK: Colour = [0x1a, 0x1a, 0x1a];
 
-/// Light backgrounds behind parts of a chart.
+/// Light backgrounds of parts of a chart.
 pub const BANDS: [Colour; 3] = [[0xdb, 0xe9, 0xf6], [0xfd, 0xeb, 0xd0], [0xe6, 0xe6, 0xe6]];
 
-/// Shades of a field, from the smallest value to the largest.
+/// The colour scale of a field, from the smallest value to the largest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shades(&'static [u32; 17]);
 
@@ -36,7 +36,7 @@ pub const CIVIDIS: Shades = Shades(&[
     0x9b9476, 0xaba072, 0xbcae6c, 0xcdbb63, 0xdec958, 0xf0d846, 0xfee838,
 ]);
 
-/// How many shades a picture tells apart.
+/// Number of different shades in a picture.
 const LEVELS: f64 = 96.0;
 
 impl Shades {
@@ -54,12 +54,12 @@ impl Shades {
     }
 }
 
-/// A colour as SVG and HTML write it.
+/// A colour in SVG and HTML notation.
 pub fn hex([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// A colour in less light.
+/// A darker colour.
 pub(super) fn dimmed(colour: Colour, light: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * light).round() as u8)
 }
@@ -68,7 +68,7 @@ pub(super) fn dimmed(colour: Colour, light: f64) -> Colour {
 mod tests {
     use super::*;
 
-    /// Perceived lightness, about.
+    /// Approximate perceived lightness.
     fn lightness([r, g, b]: Colour) -> f64 {
         0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
     }

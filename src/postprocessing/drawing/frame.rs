@@ -1,4 +1,4 @@
-//! What stands around a body in a drawing: its place, axes, a bar of colours.
+//! The surroundings of a body in a drawing: frame, axes and colour bar.
 
 use super::{
     colour::{Shades, hex},
@@ -11,7 +11,7 @@ const TALLEST: f64 = 620.0;
 const LEFT: f64 = 56.0;
 const TOP: f64 = 54.0;
 
-/// Where a body stands in a drawing, beside its axes and colour bar.
+/// The area of a body in a drawing, beside its axes and colour bar.
 pub(super) struct Frame {
     low: [f64; 2],
     zoom: f64,
@@ -21,7 +21,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Fits what lies in these ranges of m, to the right and upwards, with room at the right.
+    /// Fits these ranges in m, horizontal and vertical, into the frame, with space on the right.
     pub fn around(ranges: [(f64, f64); 2], right: f64) -> Self {
         let [(left, width), (bottom, height)] =
             ranges.map(|(low, high)| (low, (high - low).max(f64::MIN_POSITIVE)));
@@ -33,7 +33,7 @@ impl Frame {
         Self { low, zoom, width: room[0], height: TOP + tall + below }
     }
 
-    /// Where a point, in m, is drawn.
+    /// Position of a point, in m, in the drawing.
     pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
         let floor = self.height - 3.2 * LETTERS;
         [LEFT + self.zoom * (point[0] - self.low[0]), floor - self.zoom * (point[1] - self.low[1])]
@@ -44,7 +44,7 @@ impl Frame {
         Scale::linear([self.low[axis], high].into_iter(), false)
     }
 
-    /// Axes of a plane drawing with these names.
+    /// Axes with these names in a 2D drawing.
     pub fn axes(&self, names: [&str; 2]) -> String {
         // Writing to a String cannot fail.
         let mut out = String::new();
@@ -75,8 +75,8 @@ impl Frame {
     }
 }
 
-/// A bar with the shades of a field at the right of a drawing. Gradients are named, and pages hold many drawings: the
-/// name of the picture keeps them apart.
+/// The colour bar on the right of a drawing. The name of the picture makes the names of gradients unique, because a page contains
+/// many drawings.
 pub(super) fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
     let name = plain_name(name);
     let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);

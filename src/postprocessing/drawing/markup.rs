@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-/// Text as it stands in HTML and XML, in elements and in quoted attributes.
+/// Text escaped for HTML and XML, for elements and quoted attributes.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -19,7 +19,7 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// A table of two columns, what and how much; the words are escaped.
+/// A table of two columns, name and value; the texts are escaped.
 pub fn facts(caption: &str, rows: &[(String, String)]) -> String {
     let mut out = opening("facts", caption);
     for (what, value) in rows {
@@ -29,7 +29,7 @@ pub fn facts(caption: &str, rows: &[(String, String)]) -> String {
     out + "</table></div>\n"
 }
 
-/// A table with a header; the words are escaped.
+/// A table with a header; the texts are escaped.
 pub fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = opening("data", caption) + "<thead><tr>";
     for name in header {
@@ -46,12 +46,12 @@ pub fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
     out + "</tbody></table></div>\n"
 }
 
-/// Whether a cell is a number, maybe with its unit, that no line should break.
+/// Whether a cell is a number, possibly with a unit, which must not be broken across lines.
 fn is_short(cell: &str) -> bool {
     cell.len() <= 16 && cell.starts_with(|c: char| c.is_ascii_digit() || "-−".contains(c))
 }
 
-/// Wide tables scroll by themselves, also from the keyboard.
+/// A container in which wide tables can be scrolled, also by keyboard.
 fn opening(class: &str, caption: &str) -> String {
     let words = escape(if caption.is_empty() { "Table" } else { caption });
     format!(
@@ -61,7 +61,7 @@ fn opening(class: &str, caption: &str) -> String {
     )
 }
 
-/// A paragraph; the words are escaped.
+/// A paragraph; the text is escaped.
 pub fn paragraph(words: &str) -> String {
     format!("<p>{}</p>\n", escape(words))
 }

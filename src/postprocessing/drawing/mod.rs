@@ -1,8 +1,8 @@
 //! Pictures as SVG and PNG: charts, and bodies with their fields.
 //!
-//! Charts are drawn by plotters, bodies by this module, both as SVG: letters stay letters, set in the reader's own sans
-//! serif. PNG files are made of the same SVG by resvg with a font that the program carries, so that both agree and no font
-//! of the machine is needed.
+//! Charts are drawn by plotters, bodies by this module, both as SVG: text remains text, in the reader's own sans-serif
+//! font. PNG files are rendered from the same SVG by resvg with a font included in the program, so that both agree and no font
+//! of the computer is needed.
 
 pub mod body;
 pub mod chart;

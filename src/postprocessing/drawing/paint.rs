@@ -1,5 +1,5 @@
-//! Coloured triangles in a drawing, in the order in which they cover each other: as polygons while they are few, as an
-//! image where polygons would make the page heavy.
+//! Coloured triangles in a drawing, in the order in which they cover each other: polygons if they are few, otherwise an
+//! image, because many polygons would make the page large.
 
 use super::{
     colour::{Colour, dimmed, hex},
@@ -10,11 +10,11 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::tiny_skia::{Pixmap, PremultipliedColorU8};
 use std::fmt::Write;
 
-/// Triangles beyond which an image is drawn.
+/// Number of triangles above which an image is drawn.
 const POLYGONS: usize = 6000;
-/// Triangles beyond which their edges would hide the colours.
+/// Number of triangles above which their edges would hide the colours.
 const EDGES: usize = 5000;
-/// Pixels of an image for a unit of the drawing.
+/// Pixels of an image per unit of the drawing.
 const RESOLUTION: f64 = 2.0;
 
 /// A triangle of the drawing.
@@ -22,25 +22,25 @@ const RESOLUTION: f64 = 2.0;
 pub struct Triangle {
     /// Its corners.
     pub corners: [[f64; 2]; 3],
-    /// What it is filled with.
+    /// Its fill colour.
     pub colour: Colour,
 }
 
-/// How the edges of few triangles are drawn.
+/// Drawing of edges, for a small number of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Edges {
-    /// With each triangle, so that later ones cover them.
+    /// With each triangle, so that later triangles cover them.
     OfEach,
-    /// Over all triangles: for those that do not cover each other.
+    /// On top of all triangles, for triangles that do not cover each other.
     AboveAll,
 }
 
-/// The triangles as SVG elements; later ones cover earlier ones. `height` is that of the drawing.
+/// The triangles as SVG elements; later ones cover earlier ones. `height` is the height of the drawing.
 pub(super) fn paint(triangles: &[Triangle], edges: Edges, height: f64) -> Result<String> {
     if triangles.len() > POLYGONS { image(triangles, height) } else { Ok(polygons(triangles, edges)) }
 }
 
-/// One path for each run of triangles of a colour.
+/// One path for each sequence of triangles of the same colour.
 fn polygons(triangles: &[Triangle], edges: Edges) -> String {
     let mut out = String::from("<g stroke-width=\"0.5\" stroke-linejoin=\"round\">\n");
     let edges = (triangles.len() <= EDGES).then_some(edges);
@@ -89,7 +89,7 @@ fn image(triangles: &[Triangle], height: f64) -> Result<String> {
     ))
 }
 
-/// Fills the pixels whose middle lies in the triangle, and for slivers between middles the one that holds its centre.
+/// Fills the pixels whose centre is in the triangle; if there is none, the pixel that contains the centre of the triangle.
 fn fill(triangle: &Triangle, canvas: &mut [PremultipliedColorU8], wide: usize, high: usize) {
     let [red, green, blue] = triangle.colour;
     let Some(colour) = PremultipliedColorU8::from_rgba(red, green, blue, 255) else { return };
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use crate::postprocessing::drawing::picture::{Picture, open_svg};
 
-    /// Half of the drawing, and many triangles too small to be seen in its corner.
+    /// Half of the drawing, and many very small triangles in its corner.
     fn half(colour: Colour, count: usize) -> Vec<Triangle> {
         let speck = Triangle { corners: [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]], colour };
         let mut all = vec![speck; count];

@@ -1,51 +1,51 @@
-//! A picture: SVG, and the same as PNG.
+//! A picture as SVG and as PNG.
 
 use super::markup::escape;
 use crate::error::{Error, Result};
 use resvg::{tiny_skia, usvg};
 use std::sync::Arc;
 
-/// Width of all pictures in units of their view box.
+/// Width of all pictures in units of the view box.
 pub const WIDTH: f64 = 560.0;
-/// Height of letters in the same units: legible where the picture is 370 pixels wide.
+/// Height of letters in the same units: legible at a picture width of 370 pixels.
 pub const LETTERS: f64 = 16.0;
-/// Pixels of a PNG file for a unit of the view box.
+/// Pixels of a PNG file per unit of the view box.
 const RESOLUTION: f32 = 2.0;
-/// The letters of PNG files, so that they need no font of the machine.
+/// The font of PNG files, so that they need no font of the computer.
 const FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
 
-/// A picture with its words.
+/// A picture with its texts.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// Name of its files, without ending.
+    /// Name of its files, without extension.
     pub name: String,
-    /// What it shows, for those who cannot see it.
+    /// Alternative text for readers who cannot see the picture.
     pub alt: String,
-    /// What to know while looking at it.
+    /// Caption.
     pub caption: String,
-    /// The drawing: a whole `svg` element.
+    /// The drawing: a complete `svg` element.
     pub svg: String,
 }
 
 impl Picture {
-    /// A drawing with its words; the name is made fit for a file.
+    /// A drawing with its texts; the name is converted to a valid file name.
     pub fn new(name: &str, alt: impl Into<String>, caption: impl Into<String>, svg: String) -> Self {
         let name = plain_name(name);
         Self { name, alt: alt.into(), caption: caption.into(), svg }
     }
 
-    /// The drawing for an HTML page: named for screen readers, without the name space that only files need.
+    /// The drawing for an HTML page: labelled for screen readers, without the XML namespace, which only files need.
     pub fn inline(&self) -> String {
         let words = format!("<svg role=\"img\" aria-label=\"{}\" ", escape(&self.alt));
         self.svg.replacen("<svg ", &words, 1).replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
     }
 
-    /// The drawing as the text of an SVG file.
+    /// The drawing as the content of an SVG file.
     pub fn file(&self) -> String {
         format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", self.svg)
     }
 
-    /// The drawing as the bytes of a PNG file.
+    /// The drawing as the content of a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
         let fault =
             |words: String| Error::Internal(format!("the picture {} cannot be drawn: {words}", self.name));
@@ -64,7 +64,7 @@ impl Picture {
     }
 }
 
-/// A name fit for a file and for an id of a page.
+/// A valid file name that is also a valid id in a page.
 pub(super) fn plain_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
 }
@@ -86,7 +86,7 @@ pub fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
     )
 }
 
-/// About how wide a text is in a drawing.
+/// Approximate width of a text in a drawing.
 pub fn text_width(words: &str) -> f64 {
     0.6 * LETTERS * words.chars().count() as f64
 }

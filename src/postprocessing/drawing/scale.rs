@@ -1,24 +1,24 @@
-//! Numbers as they are read: axis scales with round ticks, powers of ten, digits.
+//! Scales and number formats: axis scales with round ticks, powers of ten, digits.
 
-/// The part of a number line that a picture shows, and where it is marked.
+/// The range of values of a picture, and its ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
     /// Smallest value shown, in shown units.
     pub low: f64,
     /// Largest value shown, in shown units.
     pub high: f64,
-    /// Marked values and their words.
+    /// Values and labels of the ticks.
     pub ticks: Vec<(f64, String)>,
-    /// What a value is multiplied with to be shown, a power of 1000.
+    /// The factor from values to shown values, a power of 1000.
     pub factor: f64,
-    /// Whether powers of ten stand at equal distances; values are then shown as their logarithms.
+    /// Whether the scale is logarithmic; values are then shown as their logarithms.
     pub logarithmic: bool,
-    /// The power of ten that goes with the unit, as in "10⁻³".
+    /// The power of ten before the unit, such as "10⁻³".
     pub power: Option<String>,
 }
 
 impl Scale {
-    /// Over these values; the ends are round numbers if `round`, else the extreme values.
+    /// A linear scale for these values; its ends are round numbers if `round`, otherwise the extreme values.
     pub fn linear(values: impl Iterator<Item = f64>, round: bool) -> Self {
         let (mut low, mut high) = extent(values).unwrap_or((0.0, 1.0));
         if high - low <= 1e-12 * low.abs().max(high.abs()) {
@@ -40,7 +40,7 @@ impl Scale {
         Self { low, high, ticks: (first..=last).map(tick).collect(), factor, logarithmic: false, power }
     }
 
-    /// Powers of ten around these values; those that are not above zero do not count.
+    /// A logarithmic scale for these values; values that are not positive are ignored.
     pub fn logarithmic(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values.filter(|v| *v > 0.0)).unwrap_or((1e-16, 1.0));
         let low = (low.log10() + 1e-9).floor();
@@ -51,13 +51,13 @@ impl Scale {
         Self { low, high, ticks, factor: 1.0, logarithmic: true, power: None }
     }
 
-    /// Where a value stands, in shown units; nothing for values that this scale has no place for.
+    /// Position of a value, in shown units; none for values that the scale cannot show.
     pub fn place(&self, value: f64) -> Option<f64> {
         let shown = if self.logarithmic { value.log10() } else { value * self.factor };
         shown.is_finite().then_some(shown)
     }
 
-    /// A quantity with its unit in the words of this scale.
+    /// The label of a quantity with its unit in this scale.
     pub fn words(&self, quantity: &str, unit: &str) -> String {
         match (&self.power, unit) {
             (None, "") => quantity.to_owned(),
@@ -79,7 +79,7 @@ pub fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is at most `size`, which is above zero.
+/// The largest of 1, 2 and 5 times a power of ten that is at most `size`, which is positive.
 fn round_below(size: f64) -> f64 {
     let power = 10f64.powf(size.log10().floor());
     let leading = size / power;
@@ -91,12 +91,12 @@ fn round_step(about: f64) -> f64 {
     if about <= below * (1.0 + 1e-9) { below } else { round_below(below * 2.6) }
 }
 
-/// The power of ten, a multiple of 3, that brings a size near 1; 0 for sizes that need none.
+/// The power of ten, a multiple of 3, that scales a size to about 1; 0 for sizes that need no scaling.
 fn thousands(size: f64) -> i32 {
     if size == 0.0 || (0.02..2e4).contains(&size) { 0 } else { ((size.log10() / 3.0).floor() * 3.0) as i32 }
 }
 
-/// `10ⁿ` for readers.
+/// `10ⁿ` as text.
 pub fn power_of_ten(exponent: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let digits = exponent.unsigned_abs().to_string();
@@ -104,7 +104,7 @@ pub fn power_of_ten(exponent: i32) -> String {
     format!("10{}{}", if exponent < 0 { "⁻" } else { "" }, raised.collect::<String>())
 }
 
-/// A number for readers: five significant digits, powers of ten where it is very small or large.
+/// A number as text: five significant digits, a power of ten if it is very small or large.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return value.to_string();
@@ -120,13 +120,13 @@ pub fn number(value: f64) -> String {
     with_minus(format!("{} × {power}", trimmed(digits)))
 }
 
-/// A number for readers who want its size only: three significant digits.
+/// A rounded number as text: three significant digits.
 pub fn size(value: f64) -> String {
     let digits = format!("{value:.2e}").parse::<f64>();
     number(digits.unwrap_or(value))
 }
 
-/// Without zeros behind the last digit that counts.
+/// Without trailing zeros.
 fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }

@@ -1,23 +1,23 @@
-//! What is seen of a body: the plane itself, or a solid from a fixed oblique direction.
+//! The visible part of a body: all cells in 2D, or a solid from a fixed oblique direction.
 
 use crate::io::output::field_snapshot::Snapshot;
 use std::collections::BTreeMap;
 
-/// Toward the viewer of a solid: from the front right and above (x to the right, y away, z up).
+/// Direction toward the viewer of a solid: from the front right and above (x to the right, y away, z up).
 const TOWARD_VIEWER: [f64; 3] = [0.48, -0.74, 0.47];
-/// Toward the light.
+/// Direction toward the light.
 const TOWARD_LIGHT: [f64; 3] = [0.35, -0.6, 0.72];
 
-/// A triangle of the body that may be seen, before it is drawn.
+/// A triangle of the body that may be visible.
 #[derive(Debug, Clone, Copy)]
 pub struct Face {
-    /// Its nodes; of a solid in an order that turns left seen from outside.
+    /// Its nodes; for a solid counterclockwise as seen from outside.
     pub nodes: [u32; 3],
-    /// The cell it belongs to.
+    /// Its cell.
     pub cell: u32,
 }
 
-/// The faces of a body: its cells in the plane, its surface in space.
+/// The faces of a body: its cells in 2D, its surface in 3D.
 pub fn faces(snapshot: &Snapshot) -> Vec<Face> {
     if snapshot.dimension() == 2 {
         let cells = snapshot.cells().enumerate();
@@ -38,8 +38,8 @@ pub fn faces(snapshot: &Snapshot) -> Vec<Face> {
     alone.map(|same| outward(snapshot, same[0])).collect()
 }
 
-/// The edges of a plane body that belong to one cell only, joined to lines: nodes in order, the first again at the end of a
-/// closed one.
+/// The edges of a 2D body that belong to one cell only, joined to lines: nodes in order; the first node of a closed line is
+/// repeated at its end.
 pub fn outline(snapshot: &Snapshot) -> Vec<Vec<u32>> {
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(snapshot.cells.len());
     for n in snapshot.cells() {
@@ -72,7 +72,7 @@ pub fn outline(snapshot: &Snapshot) -> Vec<Vec<u32>> {
     lines
 }
 
-/// Unit normals out of the body at nodes of its boundary: the mean over the facets between these nodes, by their size.
+/// Outward unit normals at boundary nodes: the mean over the facets between these nodes, weighted by their size.
 pub fn normals(snapshot: &Snapshot, nodes: &[usize]) -> Vec<[f64; 3]> {
     let mut sums: BTreeMap<u32, [f64; 3]> = nodes.iter().map(|node| (*node as u32, [0.0; 3])).collect();
     let mut add = |facet: &[u32], normal: [f64; 3]| {
@@ -115,7 +115,8 @@ fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> F
     Face { nodes, cell }
 }
 
-/// The axis along which faces between these points are seen widest: the greatest part of their summed area vector.
+/// The axis along which the faces between these points have the largest projection: the largest component of their summed area
+/// vector.
 pub fn widest_along(points: &[[f64; 3]], faces: &[u32]) -> usize {
     let mut area = [0.0; 3];
     for face in faces.chunks_exact(3) {
@@ -126,7 +127,7 @@ pub fn widest_along(points: &[[f64; 3]], faces: &[u32]) -> usize {
     (0..3).max_by(|a, b| area[*a].abs().total_cmp(&area[*b].abs())).unwrap_or(2)
 }
 
-/// How points of the body become points of the picture, before it is fitted to its frame.
+/// Projection of points of the body into the picture plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum View {
     /// x to the right, y up.
@@ -141,7 +142,7 @@ impl View {
         if snapshot.dimension() == 2 { Self::Plane } else { Self::Oblique }
     }
 
-    /// To the right, upwards, and toward the viewer.
+    /// Coordinates to the right, upwards, and toward the viewer.
     pub fn project(self, point: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Plane => point,
@@ -153,7 +154,7 @@ impl View {
         }
     }
 
-    /// How much light falls on a face with these corners, from 0 to 1; nothing if it looks away from the viewer.
+    /// Intensity of light on a face with these corners, from 0 to 1; none if it faces away from the viewer.
     pub fn light(self, [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
         if self == Self::Plane {
             return Some(1.0);

@@ -1,12 +1,12 @@
-//! The nodes of a boundary in the order in which they follow each other.
+//! The order of the nodes along a boundary.
 
-/// Beyond this many nodes they are taken in the order of the file.
+/// Above this number of nodes the order of the file is kept.
 const MANY: usize = 5000;
-/// Steps between nodes longer than this many times the usual one are gaps.
+/// Distances between nodes longer than this multiple of the usual distance are gaps.
 const GAP: f64 = 6.0;
 
-/// The order of points along a curve, and the length of the curve up to each; the pieces of a curve with gaps follow each
-/// other.
+/// The order of points along a curve, and the length of the curve up to each point; the pieces of a curve with gaps are
+/// appended to each other.
 pub(super) fn along_curve(points: &[[f64; 3]]) -> (Vec<usize>, Vec<f64>) {
     let order = if points.len() > MANY { (0..points.len()).collect() } else { chain(points) };
     let steps: Vec<f64> = order.windows(2).map(|pair| distance(points[pair[0]], points[pair[1]])).collect();
@@ -22,7 +22,7 @@ pub(super) fn along_curve(points: &[[f64; 3]]) -> (Vec<usize>, Vec<f64>) {
     (order, lengths)
 }
 
-/// Grows a chain at both ends, always by the nearest point that is left; it starts at its end with the smaller
+/// Extends a chain at both ends, always by the nearest remaining point; the result starts at the end with the smaller
 /// coordinates.
 fn chain(points: &[[f64; 3]]) -> Vec<usize> {
     let mut chain = std::collections::VecDeque::new();

@@ -1,4 +1,4 @@
-//! What a run left in its folder, as far as it can be read.
+//! The output files of a run, as far as they are readable.
 
 use super::table::Table;
 use crate::{
@@ -9,21 +9,21 @@ use crate::{
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Files that only a run leaves; a folder with none of them is none of a run.
+/// Files that only a run creates; a folder without any of them does not belong to a run.
 const SIGNS: [&str; 5] = ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv"];
 
-/// A file that is not there or cannot be read.
+/// A file that is missing or cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Gap {
     /// Its name.
     pub file: &'static str,
-    /// Why, in words.
+    /// The reason, as text.
     pub why: String,
-    /// What the page lacks without it.
+    /// The parts of the page that are missing without it.
     pub lacking: &'static str,
 }
 
-/// The files, read.
+/// The contents of the files.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     /// The folder.
@@ -42,12 +42,12 @@ pub(super) struct Found {
     pub profiles: Option<Table>,
     /// `fields.vtkhdf` at its last time.
     pub snapshot: Option<Snapshot>,
-    /// What is not there.
+    /// Files that are missing.
     pub gaps: Vec<Gap>,
 }
 
 impl Found {
-    /// Reads what is there. A folder that is none of a run is refused.
+    /// Reads the available files. A folder that does not belong to a run is refused.
     pub fn read(folder: &Path) -> Result<Self> {
         refuse_what_is_no_run(folder)?;
         let mut found = Self { folder: folder.to_owned(), ..Self::default() };
@@ -77,7 +77,7 @@ impl Found {
         Ok(found)
     }
 
-    /// 2 or 3, as far as it is known.
+    /// 2 or 3, if it is known.
     pub fn dimension(&self) -> Option<usize> {
         let summary = self.summary.as_ref().and_then(|summary| summary.get("dimension")?.as_u64());
         summary.map(|d| d as usize).or_else(|| self.snapshot.as_ref().map(Snapshot::dimension))

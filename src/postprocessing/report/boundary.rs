@@ -1,4 +1,4 @@
-//! Pictures of what happens along a boundary, at the last time of its profile.
+//! Pictures of quantities along a boundary, at the last time of its profile.
 
 use super::{
     arc::along_curve,
@@ -19,22 +19,22 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// Bands behind a chart beyond which they would only confuse.
+/// Number of bands in a chart above which none are drawn.
 const MOST_BANDS: usize = 12;
-/// Nodes beyond which the dots of a curve merge.
+/// Number of nodes above which the dots of a curve merge.
 const MOST_DOTS: usize = 150;
-/// Arrows beyond which they would hide each other.
+/// Number of arrows above which they would hide each other.
 const MOST_ARROWS: usize = 70;
 
 /// A boundary at the last time in `profiles.csv`.
 pub(super) struct Boundary<'a> {
     /// Its name.
     pub name: &'a str,
-    /// When, in s.
+    /// The time in s.
     pub time: f64,
     law: Option<&'a Law>,
     friction: Option<FrictionLaw>,
-    /// Length in s of the step that ended then.
+    /// Length in s of the step that ended at this time.
     step: Option<f64>,
     table: Table,
     points: Vec<[f64; 3]>,
@@ -43,25 +43,25 @@ pub(super) struct Boundary<'a> {
     behind: Option<Behind<'a>>,
 }
 
-/// The body at the same time, with the numbers of the boundary's nodes and normals out of it there.
+/// The body at the same time, with the numbers of the boundary's nodes and the outward normals there.
 struct Behind<'a> {
     snapshot: &'a Snapshot,
     nodes: Vec<usize>,
     normals: Vec<[f64; 3]>,
 }
 
-/// What acts on a boundary.
+/// The laws on a boundary.
 pub(super) struct Laws {
-    /// Along the normal.
+    /// The normal law.
     pub normal: Law,
-    /// In sliding.
+    /// The friction law.
     pub friction: Option<FrictionLaw>,
     /// Times in s at the ends of the steps, and their lengths in s.
     pub steps: Vec<[f64; 2]>,
 }
 
 impl<'a> Boundary<'a> {
-    /// The profile of this name, with the laws that act there.
+    /// The profile with this name, and the laws on its boundary.
     pub fn new(
         profiles: &Table,
         name: &'a str,
@@ -92,7 +92,7 @@ impl<'a> Boundary<'a> {
         boundary
     }
 
-    /// The numbers of the boundary's nodes in the body, if all are there.
+    /// The numbers of the boundary's nodes in the body, if all are found.
     fn nodes_of(&self, snapshot: &Snapshot) -> Option<Vec<usize>> {
         let bits = |p: &[f64; 3]| p.map(f64::to_bits);
         let nodes: HashMap<[u64; 3], usize> =
@@ -100,7 +100,7 @@ impl<'a> Boundary<'a> {
         self.points.iter().map(|p| nodes.get(&bits(p)).copied()).collect()
     }
 
-    /// All pictures: quantities along the boundary (on its surface in space), and its nodes on the law.
+    /// All pictures: quantities along the boundary (on its surface in 3D), and its nodes on the graph of the law.
     pub fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Vec<Picture>> {
         let mut out = Vec::new();
         let columns: Vec<&String> = self.table.header().iter().filter(|name| is_quantity(name)).collect();
@@ -118,7 +118,7 @@ impl<'a> Boundary<'a> {
         Ok(out)
     }
 
-    /// How many nodes sit on which part of the law, as a table.
+    /// The number of nodes on each branch of the law, as a table.
     pub fn branch_table(&self) -> String {
         let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return String::new() };
         let rows = law.branches().into_iter().enumerate().map(|(at, branch)| {
@@ -181,7 +181,7 @@ impl<'a> Boundary<'a> {
         self.points.first().map(from).unwrap_or_default()
     }
 
-    /// The quantity on the boundary's own faces, seen along the axis that shows most of them.
+    /// The quantity on the faces of the boundary, seen along the axis of their largest projection.
     fn map(
         &self,
         name: &str,
@@ -224,7 +224,7 @@ impl<'a> Boundary<'a> {
         Ok(Some(picture))
     }
 
-    /// The nodes in the plane of the law, and the branch of each.
+    /// The nodes in the plane of the law's graph, and the branch of each node.
     fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<usize>)> {
         let law = self.law?;
         let column = |name: &str| self.table.column(name);
@@ -276,7 +276,7 @@ impl<'a> Boundary<'a> {
         )))
     }
 
-    /// Which parts of the boundary are on which branch; borders lie half way between nodes.
+    /// The parts of the boundary on each branch; borders are half way between nodes.
     fn bands(&self) -> Vec<Band> {
         let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return Vec::new() };
         let names = law.branches();
@@ -294,7 +294,7 @@ impl<'a> Boundary<'a> {
         if bands.len() > MOST_BANDS || bands.len() < 2 { Vec::new() } else { bands }
     }
 
-    /// The nodes on the graph of friction.
+    /// The nodes on the graph of the friction law.
     fn on_friction(&self) -> Result<Option<Picture>> {
         let (Some(law), Some(Behind { snapshot, nodes, normals })) = (&self.friction, &self.behind) else {
             return Ok(None);
@@ -324,7 +324,7 @@ impl<'a> Boundary<'a> {
         friction::picture(self.name, self.time, law, &rubbing)
     }
 
-    /// The deformed mesh of a plane body with the boundary's normal velocity and contact pressure as arrows.
+    /// The deformed mesh of a 2D body with the boundary's normal velocity and contact pressure as arrows.
     pub fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
         let Some(Behind { nodes, normals, .. }) =
             self.behind.as_ref().filter(|behind| behind.nodes.len() > 1)
@@ -372,7 +372,7 @@ impl<'a> Boundary<'a> {
     }
 }
 
-/// The colour of a branch's nodes, that of its background in strong.
+/// The colour of the nodes of a branch: a stronger version of its background colour.
 fn branch_colour(branch: usize) -> Colour {
     [LINES[0], LINES[1], LINES[6]][branch % BANDS.len()]
 }
@@ -388,7 +388,7 @@ pub(super) fn unit_of(column: &str) -> &'static str {
     known.iter().find(|(word, _)| column.contains(word)).map_or("", |(_, unit)| unit)
 }
 
-/// With a capital letter in front.
+/// With an initial capital letter.
 pub(super) fn capital(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()

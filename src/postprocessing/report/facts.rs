@@ -1,4 +1,4 @@
-//! The numbers of a run in words: status, sizes, certificates, seconds.
+//! The numbers of a run as text: status, sizes, certificates, times.
 
 use super::{
     artifacts::Found,
@@ -14,7 +14,7 @@ use crate::{
 use serde_json::Value;
 use std::fmt::Write;
 
-/// Members of `summary.json` with their words and units, in the order of the page: those before the figures of fields.
+/// Members of `summary.json` with their descriptions and units, in the order of the page: those before the figures of fields.
 const MEMBERS: [(&str, &str, &str); 10] = [
     ("status", "status", ""),
     ("error", "error", ""),
@@ -28,7 +28,7 @@ const MEMBERS: [(&str, &str, &str); 10] = [
     ("max_strain", "largest strain of the run", ""),
 ];
 
-/// Those behind the figures of fields.
+/// Those after the figures of fields.
 const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
@@ -45,7 +45,7 @@ const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("petsc_version", "version of PETSc", ""),
 ];
 
-/// Status in one sentence, and the table of everything that `summary.json` says about the run.
+/// The status in one sentence, and a table of the contents of `summary.json`.
 pub(super) fn summary(summary: &Value) -> String {
     let mut rows: Vec<(String, String)> = Vec::new();
     let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
@@ -71,7 +71,7 @@ pub(super) fn summary(summary: &Value) -> String {
     facts("The run", &rows)
 }
 
-/// How the run ended, in a sentence.
+/// The outcome of the run in a sentence.
 pub(super) fn ending(summary: &Value) -> String {
     let status = summary.get("status").and_then(Value::as_str).unwrap_or("unknown");
     let value = |name: &str| summary.get(name).map_or_else(|| "?".into(), plain);
@@ -88,7 +88,7 @@ pub(super) fn ending(summary: &Value) -> String {
     format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
 }
 
-/// What the run warned of, if it did.
+/// The warnings of the run, if there are any.
 pub(super) fn warnings(summary: &Value) -> String {
     let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let items: String =
@@ -99,7 +99,7 @@ pub(super) fn warnings(summary: &Value) -> String {
     format!("<div class=\"missing\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</div>\n")
 }
 
-/// The certificates and what they mean for the run.
+/// The certificates and their meaning for the run.
 pub(super) fn certificates(found: &Found) -> String {
     let Some(object) = found.summary.as_ref().and_then(|summary| summary.get("certificates")) else {
         return paragraph("No certificates: they are in summary.json.");
@@ -154,7 +154,7 @@ pub(super) fn certificates(found: &Found) -> String {
     out
 }
 
-/// The seconds of each phase as bars.
+/// The seconds of each phase as a bar chart.
 pub(super) fn phases(summary: &Value) -> Option<Picture> {
     let seconds = summary.get("wall_seconds")?.as_object()?;
     let total = seconds.get("total").and_then(Value::as_f64);
@@ -199,7 +199,7 @@ pub(super) fn phases(summary: &Value) -> Option<Picture> {
     ))
 }
 
-/// The traffic of a phase over its seconds, if it is known.
+/// The traffic of a phase per second, if it is known.
 fn rate(summary: &Value, phase: &str, seconds: f64) -> String {
     let bytes = summary.get("traffic_bytes").and_then(|all| all.get(phase)).and_then(Value::as_f64);
     match bytes {

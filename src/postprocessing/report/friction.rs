@@ -8,13 +8,13 @@ use super::{
 };
 use crate::{error::Result, laws::contact::FrictionLaw};
 
-/// Points of a curved law that are joined by straight lines.
+/// Number of points on a curved law that are joined by straight lines.
 const SAMPLES: usize = 120;
-/// A node that slides slower than this share of the fastest sticks.
+/// A node that slides more slowly than this share of the fastest one sticks.
 const STICKING: f64 = 1e-6;
 const GREY: Colour = [0x55; 3];
 
-/// What rubs at a node.
+/// Friction at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rubbing {
     /// Sliding velocity in m/s, not negative.
@@ -25,7 +25,8 @@ pub(super) struct Rubbing {
     pub pressure: f64,
 }
 
-/// The law over the sliding velocity, and the nodes: their traction, or that over their pressure where the law follows it.
+/// The law as a function of the sliding velocity, and the nodes: their traction, or traction over pressure if the law depends on
+/// pressure.
 pub(super) fn picture(
     name: &str,
     time: f64,

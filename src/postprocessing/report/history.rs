@@ -1,4 +1,4 @@
-//! Pictures of what happened over time: probes, energies, steps.
+//! Pictures of quantities over time: probes, energies, steps.
 
 use super::{
     boundary::{capital, unit_of},
@@ -13,10 +13,10 @@ use crate::{
 };
 
 const TIME: Axis = Axis { quantity: "t", unit: "s" };
-/// Probes in one chart beyond which lines are not told apart.
+/// Number of probes in one chart above which lines cannot be distinguished.
 const MOST_PROBES: usize = 7;
 
-/// Each quantity of the probes over time, a line a probe.
+/// Each quantity of the probes over time, with a line for each probe.
 pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
@@ -49,7 +49,7 @@ pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
     Ok(out)
 }
 
-/// Energies, dissipations with work, and what is missing in their balance. `unit` is that of energies.
+/// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
 pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     let columns = |roles: &[Role]| -> Vec<&str> {
         let all = Energy::COLUMNS.into_iter().zip(Energy::ROLES);
@@ -101,7 +101,7 @@ fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str])
     Ok(Some(Picture::new(name, alt, format!("{}. At the end: {ends}.{zero}", capital(quantity)), svg)))
 }
 
-/// How the steps went: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
+/// Properties of the steps: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
 pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture>> {
     let mut out = Vec::new();
     for (column, quantity, unit, caption) in [
@@ -127,18 +127,18 @@ pub(super) fn steps(table: &Table, tolerance: Option<f64>) -> Result<Vec<Picture
     Ok(out)
 }
 
-/// A column of the history, and how it is drawn.
+/// A column of the history, and its style.
 struct Curve<'a> {
     column: &'a str,
     quantity: &'a str,
     unit: &'a str,
     caption: &'a str,
     is_logarithmic: bool,
-    /// A level that is drawn as a line.
+    /// A constant value that is drawn as a line.
     tolerance: Option<f64>,
 }
 
-/// A column over time; nothing where all its values are 0.
+/// A column over time; none if all its values are 0.
 fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
     let Curve { column, quantity, unit, caption, is_logarithmic, tolerance } = curve;
     let points = table.curve("time", column);

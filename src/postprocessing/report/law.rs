@@ -1,4 +1,4 @@
-//! The graph of a contact law, for pictures: its branches, and which of them a node sits on.
+//! The graph of a contact law, for pictures: its branches, and the branch of a node.
 
 use super::scale::{extent, number};
 use crate::{
@@ -8,11 +8,11 @@ use crate::{
     run::normal_law,
 };
 
-/// A law whose pressure is a graph over one quantity of the node.
+/// A law whose pressure is a graph over one quantity at the node.
 #[derive(Debug, Clone)]
 pub(super) struct Law {
     law: NormalResponse,
-    /// The distance that the body may move before it is felt, where the law is one of the displacement.
+    /// The initial gap, if the law depends on the displacement.
     gap: Option<Gap>,
 }
 
@@ -24,12 +24,12 @@ impl Law {
         Ok(Self { law, gap })
     }
 
-    /// What the pressure is a graph of, and its unit.
+    /// The quantity on which the pressure depends, and its unit.
     pub fn quantity(&self) -> (&'static str, &'static str) {
         if self.gap.is_some() { ("penetration", "m") } else { ("normal velocity", "m/s") }
     }
 
-    /// That quantity of a node with this outward normal; not a number where there is no gap.
+    /// The value of that quantity at a node with this outward normal; NaN where there is no gap.
     pub fn abscissa(
         &self,
         time: f64,
@@ -41,8 +41,8 @@ impl Law {
         gap.at(time, point, normal).map_or(f64::NAN, |gap| displacement - gap)
     }
 
-    /// Velocity in m/s of the obstacle's material where the normal of a node meets it, at the end of a step of this length; zero
-    /// where nothing is known of it.
+    /// Velocity in m/s of the obstacle's material at the point where the normal of a node meets it, at the end of a step of this
+    /// length; zero if it is unknown.
     pub fn obstacle_velocity(
         &self,
         time: f64,
@@ -57,31 +57,31 @@ impl Law {
         velocity.unwrap_or_default()
     }
 
-    /// Whether the normals of the nodes matter.
+    /// Whether the law depends on the normals of the nodes.
     pub fn needs_normals(&self) -> bool {
         self.gap.as_ref().is_some_and(|gap| !matches!(gap, Gap::Distance(_)))
     }
 
-    /// Its branches in words, from left to right.
+    /// Descriptions of its branches, from left to right.
     pub fn branches(&self) -> Vec<Branch> {
         self.law.branches(number)
     }
 
-    /// The branch that each of these nodes, abscissa and pressure, sits on.
+    /// The branch of each of these nodes, given by abscissa and pressure.
     pub fn branches_of(&self, nodes: &[[f64; 2]]) -> Vec<usize> {
         let all = || self.law.corners().iter().chain(nodes);
         let reach = |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let steep = reach(1) / reach(0);
         let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
         let c = steep.max(2.0 * self.law.monotonicity_constant());
-        // A node that has not touched the wall may lie beyond it by rounding.
+        // A node that has not touched the wall may be beyond it by rounding.
         let is_wall = self.gap.is_some() && self.law.has_vertical_parts();
         let slack = if is_wall { 1e-9 * c * reach(0) } else { 0.0 };
         let branch = |s: f64| self.law.resolve(s, c, NodeContext::AT_THE_GAP).branch;
         nodes.iter().map(|[x, p]| branch(c * x + p - slack)).collect()
     }
 
-    /// The graph over the nodes and a little more, as a line through these points.
+    /// The graph over a range slightly larger than that of the nodes, as a line through these points.
     pub fn line(&self, nodes: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let all = || self.law.corners().iter().chain(nodes);
         let along = |axis: usize| {
@@ -188,7 +188,7 @@ mod tests {
             NormalLaw::Compliance(Compliance { stiffness: 100.0, exponent: 1.0, gap: None }),
             Some(Gap::Sphere(disc)),
         );
-        // To the left on top, however far the node is above.
+        // The material at the top of the disc moves to the left, for any height of the node above it.
         let found = law.obstacle_velocity(1.0, 0.1, (&[0.0, 0.5, 0.0], &DOWN));
         assert!((found[0] + 6.0).abs() < 1e-14 && found[1] == 0.0 && found[2] == 0.0, "{found:?}");
     }

@@ -1,4 +1,4 @@
-//! `solver report`: pictures and one self-contained page from the files that a run or a study left.
+//! `solver report`: pictures and one self-contained page from the output files of a run or a study.
 
 mod arc;
 mod boundary;
@@ -29,18 +29,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What was made.
+/// The result of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// The page.
     pub page: PathBuf,
-    /// How many pictures stand in it, each also beside it (beside its study) as SVG and PNG.
+    /// Number of pictures in the page; each is also a separate SVG and PNG file beside it (beside the study).
     pub pictures: usize,
-    /// Files that are missing or unreadable, in words.
+    /// Descriptions of files that are missing or unreadable.
     pub missing: Vec<String>,
 }
 
-/// Makes `report/index.html` and the pictures beside it in the output folder of a run, or of a study.
+/// Writes `report/index.html` and the pictures beside it in the output folder of a run, or of a study.
 pub fn report(folder: &Path) -> Result<Made> {
     let (page, missing) = if study::is_study(folder) {
         (study::page(folder)?, Vec::new())

@@ -1,4 +1,4 @@
-//! The page: one HTML document that needs nothing beside it.
+//! The page: one self-contained HTML document.
 
 use super::{
     markup::{escape, paragraph},
@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");
 
-/// A page as it grows.
+/// A page under construction.
 #[derive(Debug, Default)]
 pub(super) struct Page {
     title: String,
@@ -18,12 +18,12 @@ pub(super) struct Page {
 }
 
 impl Page {
-    /// An empty page; `head` is HTML that stands before all sections.
+    /// An empty page; `head` is HTML before all sections.
     pub fn new(title: &str, head: String) -> Self {
         Self { title: title.to_owned(), head, ..Self::default() }
     }
 
-    /// Adds a section of HTML and pictures; one that has neither is left out.
+    /// Adds a section of HTML and pictures; an empty section is omitted.
     pub fn section(&mut self, heading: &str, html: &str, pictures: Vec<Picture>) {
         if html.is_empty() && pictures.is_empty() {
             return;
@@ -53,7 +53,7 @@ impl Page {
         &self.pictures
     }
 
-    /// The document.
+    /// The complete document.
     pub fn html(&self, made_by: &str) -> String {
         let title = escape(&self.title);
         let mut out = format!(

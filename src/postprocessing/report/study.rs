@@ -12,12 +12,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Whether a study left this folder.
+/// Whether this folder contains the output of a study.
 pub(super) fn is_study(folder: &Path) -> bool {
     ["study.json", "study.md"].iter().any(|name| folder.join(name).is_file())
 }
 
-/// The page: what `study.md` says, or the tables of `study.json` where there is none; and all SVG files of the folder.
+/// The page: the contents of `study.md`, or, if it is missing, the tables of `study.json`; and all SVG files of the folder.
 pub(super) fn page(folder: &Path) -> Result<Page> {
     let words = folder.join("study.md");
     let mut captions = Vec::new();
@@ -38,7 +38,7 @@ pub(super) fn page(folder: &Path) -> Result<Page> {
     Ok(page)
 }
 
-/// The SVG files as images, in the order of their captions: nothing in them can reach the page.
+/// The SVG files as images, in the order of their captions; as images they cannot affect the page.
 fn pictures(folder: &Path, captions: &[(String, String)]) -> Result<String> {
     let unreadable = |error: std::io::Error| Error::unreadable(folder, error);
     let mut files: Vec<PathBuf> = Vec::new();
@@ -68,7 +68,7 @@ fn pictures(folder: &Path, captions: &[(String, String)]) -> Result<String> {
     Ok(if out.is_empty() { out } else { format!("<div class=\"figures\">\n{out}</div>\n") })
 }
 
-/// Every list of objects in the value as a table, and the plain members of objects as a list.
+/// Every list of objects in the value as a table, and the simple members of objects as a list.
 fn tables(out: &mut String, name: &str, value: &Value) {
     match value {
         Value::Array(items) if items.iter().any(Value::is_object) => {
@@ -102,7 +102,7 @@ fn plain(value: &Value) -> String {
 }
 
 /// Headings, paragraphs, lists and tables of a Markdown text as HTML; its first heading and the captions of its pictures
-/// apart.
+/// are returned separately.
 fn markdown(text: &str, captions: &mut Vec<(String, String)>) -> (Option<String>, String) {
     let text = plain_words(text);
     let (mut title, mut out) = (None, String::new());
@@ -146,13 +146,13 @@ fn markdown(text: &str, captions: &mut Vec<(String, String)>) -> (Option<String>
     (title, out)
 }
 
-/// Without the marks of emphasis and code.
+/// Without the markup of emphasis and code.
 fn plain_words(text: &str) -> String {
     text.replace("**", "").replace('`', "")
 }
 
 fn cells(line: &str) -> Vec<String> {
-    // Bars that belong to the words stand behind a backslash.
+    // Bars that are part of the text have a backslash before them.
     let bar = "\u{fffe}";
     let line = line.replace("\\|", bar);
     line.trim().trim_matches('|').split('|').map(|cell| cell.trim().replace(bar, "|")).collect()

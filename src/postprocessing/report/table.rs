@@ -1,20 +1,20 @@
-//! The tables a run leaves, read back.
+//! Reads the tables that a run writes.
 
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Columns of numbers and words.
+/// Columns of numbers and text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Table {
     header: Vec<String>,
     rows: Vec<Vec<f64>>,
-    /// The words of the one column that has words, by row.
+    /// The entries of the one text column, by row.
     words: Vec<String>,
 }
 
 impl Table {
-    /// Reads a table whose column `named`, if it has one, holds words and all others numbers. A last row that is not
-    /// whole, as a run leaves it that died, does not count.
+    /// Reads a table whose column `named`, if it has one, contains text and all others numbers. An incomplete last row, left by a
+    /// run that was interrupted, is ignored.
     pub fn read(path: &Path, named: &str) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
         Self::parse(&text, named).map_err(|words| Error::unreadable(path, words))
@@ -70,19 +70,19 @@ impl Table {
         self.rows.len()
     }
 
-    /// A column, if there is one of this name.
+    /// The column with this name, if there is one.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let at = self.header.iter().position(|column| column == name)?;
         Some(self.rows.iter().map(|row| row[at]).collect())
     }
 
-    /// Points of one column over another.
+    /// Points of one column as a function of another.
     pub fn curve(&self, x: &str, y: &str) -> Vec<[f64; 2]> {
         let (x, y) = (self.column(x).unwrap_or_default(), self.column(y).unwrap_or_default());
         x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()
     }
 
-    /// The words of the rows, each once, in order.
+    /// The entries of the text column, each once, in order.
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for word in &self.words {
@@ -93,7 +93,7 @@ impl Table {
         names
     }
 
-    /// The rows of this name.
+    /// The rows with this entry.
     pub fn of(&self, name: &str) -> Self {
         self.filtered(|at| self.words[at] == name)
     }
