@@ -1,4 +1,4 @@
-//! From text to the stack machine's program, by recursive descent.
+//! Compiles an expression to the program of the stack machine, by recursive descent.
 //!
 //! `sum = product {(+|-) product}`, `product = signed {(*|/) signed}`, `signed = (+|-) signed | power`,
 //! `power = atom [^ signed]`, `atom = number | name | name(sum, ...) | (sum)`: so -x^2 is -(x^2), and
@@ -10,9 +10,9 @@ use super::functions::{Meaning, meaning, names};
 use super::program::{Binary, Instruction, Unary};
 use crate::laws::nearest::nearest;
 
-/// Longest expression in bytes.
+/// Longest permitted expression in bytes.
 const LONGEST: usize = 10_000;
-/// Deepest nesting of parentheses, signs and powers.
+/// Deepest permitted nesting of parentheses, signs and powers.
 const DEEPEST: usize = 200;
 
 const ADD: Binary = Binary::smooth(|a, b| a + b);
@@ -22,14 +22,14 @@ const DIVIDE: Binary = Binary::smooth(|a, b| a / b);
 const POWER: Binary = Binary::smooth(f64::powf);
 const NEGATE: Unary = Unary::smooth(|a| -a);
 
-/// What is wrong with an expression, and where in its text.
+/// An error in an expression, and its position in the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// Bytes of the text.
+    /// Range of bytes of the text.
     pub at: Range<usize>,
-    /// What is wrong.
+    /// The error.
     pub message: String,
-    /// What to do.
+    /// The remedy.
     pub help: String,
 }
 
@@ -224,7 +224,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A parenthesised list of `least` to `most` arguments; `then` is called after each but the first.
+    /// A parenthesised list of `least` to `most` arguments; `then` is called after each argument except the first.
     fn arguments(
         &mut self,
         name: &Range<usize>,

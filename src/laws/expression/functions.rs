@@ -1,8 +1,8 @@
-//! The names an expression may use.
+//! The names that an expression may use.
 
 use super::program::{Binary, Instruction, Unary, Variable};
 
-/// What a name stands for.
+/// Meaning of a name.
 #[derive(Clone, Copy)]
 pub(super) enum Meaning {
     /// A variable or a constant.
@@ -47,7 +47,7 @@ const NAMES: &[(&str, Meaning)] = &[
     ("tanh", Meaning::One(Unary::smooth(f64::tanh))),
 ];
 
-/// What `name` stands for.
+/// The meaning of `name`.
 pub(super) fn meaning(name: &str) -> Option<Meaning> {
     NAMES.iter().find(|(known, _)| *known == name).map(|(_, meaning)| *meaning)
 }
@@ -67,7 +67,7 @@ fn negative(number: f64) -> f64 {
     f64::from(u8::from(number < 0.0))
 }
 
-/// Whether the left number is below the right one.
+/// Whether the left number is less than the right one.
 fn below(left: f64, right: f64) -> f64 {
     f64::from(u8::from(left < right))
 }

@@ -29,7 +29,7 @@ pub enum Scalar {
 }
 
 impl Scalar {
-    /// Value at `time` and `point` (one coordinate an axis; missing ones are zero).
+    /// Value at `time` and `point` (one coordinate for each axis; missing ones are zero).
     pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
         match self {
             Self::Number(number) => *number,
@@ -37,22 +37,22 @@ impl Scalar {
         }
     }
 
-    /// Whether t occurs in it.
+    /// Whether it contains t.
     pub fn depends_on_time(&self) -> bool {
         self.uses(Variable::T)
     }
 
-    /// Whether x, y or z occurs in it.
+    /// Whether it contains x, y or z.
     pub fn depends_on_position(&self) -> bool {
         [Variable::X, Variable::Y, Variable::Z].into_iter().any(|variable| self.uses(variable))
     }
 
-    /// Whether it is made of pieces, as by min or abs.
+    /// Whether it is piecewise, for example because of min or abs.
     pub fn has_pieces(&self) -> bool {
         matches!(self, Self::Expression(expression) if expression.program.has_pieces())
     }
 
-    /// A digest of the pieces that its value at `time` and `point` comes from: another one where another piece holds.
+    /// A digest of the pieces that determine its value at `time` and `point`; it differs where another piece is active.
     pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
         match self {
             Self::Number(_) => 0,
@@ -60,7 +60,7 @@ impl Scalar {
         }
     }
 
-    /// Whether `variable` occurs in it.
+    /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
         matches!(self, Self::Expression(expression) if expression.program.uses(variable))
     }
@@ -80,17 +80,17 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// Compiles `text`; a fault says where in the text it is.
+    /// Compiles `text`; an error contains its position in the text.
     pub fn parse(text: &str) -> Result<Self, Fault> {
         Ok(Self { text: text.into(), program: Program::new(compile::compile(text)?) })
     }
 
-    /// The expression as it was written.
+    /// The expression as written.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Value at `time` and `point`; not finite where the expression has no value, as in sqrt(-1).
+    /// Value at `time` and `point`; not finite where the expression is undefined, as in sqrt(-1).
     pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
         self.program.evaluate(time, point)
     }

@@ -3,10 +3,10 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// Values on the stack that need no allocation to evaluate.
+/// Largest stack that is evaluated without allocation.
 const SMALL: usize = 32;
 
-/// What an expression may depend on.
+/// The variables of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Variable {
     /// Time in seconds.
@@ -32,12 +32,12 @@ impl Program {
         Self { instructions: instructions.into(), depth }
     }
 
-    /// Whether `variable` occurs in it.
+    /// Whether it contains `variable`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.instructions.contains(&Instruction::Variable(variable))
     }
 
-    /// Whether one of its functions is made of pieces.
+    /// Whether one of its functions is piecewise.
     pub fn has_pieces(&self) -> bool {
         self.instructions.iter().any(|instruction| match instruction {
             Instruction::Unary(function) => function.piece.is_some(),
@@ -51,7 +51,7 @@ impl Program {
         self.with_stack(|stack| self.run::<false>(stack, time, point).0)
     }
 
-    /// A digest of the pieces that the value at `time` and `point` comes from.
+    /// A digest of the pieces that determine the value at `time` and `point`.
     pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
         self.with_stack(|stack| self.run::<true>(stack, time, point).1)
     }
@@ -60,7 +60,7 @@ impl Program {
         if self.depth <= SMALL { run(&mut [0.0; SMALL]) } else { run(&mut vec![0.0; self.depth]) }
     }
 
-    /// The value, and the digest of its pieces if that is wanted.
+    /// The value, and the digest of its pieces if it is requested.
     fn run<const PIECES: bool>(&self, stack: &mut [f64], time: f64, point: &[f64]) -> (f64, u64) {
         let (mut top, mut digest) = (0, 0);
         let mut note = |piece: f64| digest = mix(digest, piece);
@@ -111,7 +111,7 @@ pub(super) enum Instruction {
 #[derive(Clone, Copy)]
 pub(super) struct Unary {
     value: fn(f64) -> f64,
-    /// Tells which piece holds, if it has several.
+    /// Records which piece is active, for piecewise functions.
     piece: Option<fn(f64) -> f64>,
 }
 
@@ -129,7 +129,7 @@ impl Unary {
 #[derive(Clone, Copy)]
 pub(super) struct Binary {
     value: fn(f64, f64) -> f64,
-    /// Tells which piece holds, if it has several.
+    /// Records which piece is active, for piecewise functions.
     piece: Option<fn(f64, f64) -> f64>,
 }
 
@@ -143,7 +143,7 @@ impl Binary {
     }
 }
 
-/// A digest with one more number in it.
+/// A digest extended by one number.
 fn mix(digest: u64, number: f64) -> u64 {
     (digest ^ number.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }

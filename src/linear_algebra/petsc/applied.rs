@@ -36,8 +36,8 @@ fn is_one_of(name: *const c_char, names: &[&CStr]) -> bool {
     !name.is_null() && names.contains(&unsafe { CStr::from_ptr(name) })
 }
 
-/// Bytes of a V-cycle: on each level but the coarsest the smoother before the coarse correction, which starts from zero, the residual,
-/// the smoother after it, restriction and interpolation.
+/// Bytes of a V-cycle: on each level except the coarsest the pre-smoother, which starts from zero, the residual,
+/// the post-smoother, restriction and interpolation.
 fn cycle(pc: sys::PC, copies: &[Level]) -> Result<Option<u64>> {
     let mut levels = 0;
     // SAFETY: a live preconditioner that is multigrid.
@@ -66,7 +66,7 @@ fn cycle(pc: sys::PC, copies: &[Level]) -> Result<Option<u64>> {
     Ok(Some(bytes))
 }
 
-/// Bytes of a product with a matrix of PETSc's.
+/// Bytes of a product with a PETSc matrix.
 fn product(matrix: sys::Mat) -> Result<u64> {
     let mut counts = MaybeUninit::<sys::MatInfo>::zeroed();
     let (mut block, mut rows, mut columns) = (1, 0, 0);
@@ -81,7 +81,7 @@ fn product(matrix: sys::Mat) -> Result<u64> {
     Ok(bytes_of_a_product(entries as usize, count(block), [count(rows), count(columns)]))
 }
 
-/// Bytes of a forward and a backward substitution with a factor of PETSc's.
+/// Bytes of a forward and a backward substitution with a PETSc factor.
 fn factor(pc: sys::PC) -> Result<Option<u64>> {
     let (mut matrix, mut counts) = (ptr::null_mut(), MaybeUninit::<sys::MatInfo>::zeroed());
     // SAFETY: a live factorisation, which owns its matrix.

@@ -9,19 +9,19 @@ use crate::{
     linear_algebra::sparse::{Product, Stored, product},
 };
 
-/// Products with a symmetric matrix of PETSc's, from a copy of its entries: blocks for the columns of this rank, single entries for
+/// Products with a symmetric PETSc matrix, from a copy of its entries: blocks for the columns of this rank, single entries for
 /// those of other ranks.
 pub(super) struct BlockProduct {
     own: Box<dyn Product>,
     others: Option<Others>,
 }
 
-/// The sizes of blocks that products are compiled for.
+/// The block sizes for which products are compiled.
 const SIZES: [sys::PetscInt; 4] = [1, 2, 3, 6];
 
 impl BlockProduct {
-    /// A shell matrix that multiplies as this matrix in compressed rows does, with entries stored as `T`. `None`, on all ranks alike,
-    /// for other formats and other sizes of blocks. Collective.
+    /// A shell matrix with the products of this matrix in compressed rows, with entries stored as `T`. `None`, on all ranks alike,
+    /// for other formats and block sizes. Collective.
     pub fn shell<T: Stored>(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut block = 0;
         // SAFETY: live matrix; PETSc writes a number.

@@ -16,12 +16,12 @@ pub(super) struct BlockTransfer {
     others: Option<Others>,
 }
 
-/// The sizes of blocks that products are compiled for.
+/// The block sizes for which products are compiled.
 const SIZES: [[sys::PetscInt; 2]; 4] = [[2, 3], [3, 3], [3, 6], [6, 6]];
 
 impl BlockTransfer {
-    /// A shell matrix that multiplies as this matrix in compressed rows and its transpose do. `None`, on all ranks alike, for other
-    /// formats and other sizes of blocks. Collective.
+    /// A shell matrix with the products of this matrix in compressed rows and of its transpose. `None`, on all ranks alike, for
+    /// other formats and block sizes. Collective.
     pub fn shell(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut blocks = [0; 2];
         let [rows, columns] = &mut blocks;

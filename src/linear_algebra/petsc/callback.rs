@@ -1,4 +1,4 @@
-//! Callbacks from PETSc: an error is kept and returned, a panic is resumed, after PETSc has returned.
+//! Callbacks from PETSc: an error is stored and returned, and a panic is resumed, after PETSc has returned.
 
 use super::{DistributedVector, sys};
 use crate::error::{Error, Result};
@@ -10,10 +10,10 @@ use std::{
     ptr,
 };
 
-/// What a callback returns to make PETSc stop.
+/// The return code of a callback that stops PETSc.
 pub(super) const USER_ERROR: sys::PetscErrorCode = sys::PETSC_ERR_USER as sys::PetscErrorCode;
 
-/// The object that the callbacks of a solve work on; it lives on the stack frame of the solve.
+/// The object on which the callbacks of a solve operate; it is on the stack frame of the solve.
 pub(super) struct Callback<'a, T: ?Sized> {
     target: RefCell<&'a mut T>,
     error: RefCell<Option<Error>>,
@@ -30,7 +30,7 @@ impl<'a, T: ?Sized> Callback<'a, T> {
         ptr::from_ref(self).cast_mut().cast()
     }
 
-    /// Runs a callback; keeps the first error, or a panic.
+    /// Runs a callback; stores the first error, or a panic.
     pub fn run(&self, body: impl FnOnce(&mut T) -> Result<()>) -> sys::PetscErrorCode {
         match catch_unwind(AssertUnwindSafe(|| body(&mut self.target.borrow_mut()))) {
             Ok(result) => {

@@ -1,4 +1,4 @@
-//! The arrays of PETSc's matrices in compressed rows.
+//! The arrays of PETSc matrices in compressed rows.
 
 use super::{DistributedVector, check, reference::Reference, sys};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
 };
 use std::{ffi::CStr, ptr, slice};
 
-/// The parts of a matrix: the columns that belong to this rank, and the others.
+/// The parts of a matrix: the columns that belong to this rank, and all others.
 pub(super) struct Parts {
     /// Rows and columns of this rank.
     pub own: sys::Mat,
@@ -42,7 +42,7 @@ fn is_type(matrix: sys::Mat, name: &CStr) -> Result<bool> {
     Ok(found != 0)
 }
 
-/// Calls a function with the rows of a matrix that is on this rank alone.
+/// Calls a function with the rows of a matrix that is stored on this rank alone.
 pub(super) fn own_rows<T>(
     matrix: sys::Mat,
     look: impl FnOnce(ScalarRows<'_>) -> Option<T>,
@@ -73,7 +73,7 @@ pub(super) fn own_rows<T>(
 pub(super) struct Others {
     entries: Entries,
     exchange: Reference<sys::_p_PetscSF>,
-    /// A value for each of these columns.
+    /// Work space with a value for each of these columns.
     values: DistributedVector,
 }
 
@@ -91,7 +91,7 @@ pub(super) fn multiply(
     others.map_or(Ok(()), |others| others.end_adding(x, y))
 }
 
-/// The rows that have entries.
+/// The rows with entries.
 #[derive(Default)]
 struct Entries {
     rows: Vec<u32>,
@@ -168,7 +168,7 @@ impl Others {
         }
     }
 
-    /// Begins to send the values of `x`, laid out like the columns of the matrix, to ranks that need them. Collective.
+    /// Starts sending the values of `x`, with the layout of the columns of the matrix, to ranks that need them. Collective.
     fn begin(&self, x: &DistributedVector) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         // SAFETY: live objects, as below.
@@ -188,8 +188,8 @@ impl Others {
         Ok(())
     }
 
-    /// Adds the product of the transposed columns with `x`, laid out like the rows, to `y` on the ranks that own the columns.
-    /// Collective.
+    /// Adds the product of the transposed columns with `x`, which has the layout of the rows, to `y` on the ranks that own the
+    /// columns. Collective.
     pub fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         // SAFETY: live vector.
         let mut values = unsafe { DistributedVector::view(self.values.raw.get())? };

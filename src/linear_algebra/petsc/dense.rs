@@ -2,7 +2,7 @@ use super::{check, index, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::ptr;
 
-/// Cholesky factors of a dense matrix that is whole on this rank.
+/// Cholesky factors of a dense matrix that is stored completely on this rank.
 #[derive(Debug)]
 pub struct DenseCholesky {
     factor: Reference<sys::_p_Mat>,
@@ -11,7 +11,7 @@ pub struct DenseCholesky {
 }
 
 impl DenseCholesky {
-    /// Factors a symmetric positive definite matrix, given column after column.
+    /// Factors a symmetric positive definite matrix, given column by column.
     pub fn new(size: usize, columns: &[f64]) -> Result<Self> {
         let factor = sequential(size, columns)?;
         let raw = factor.get();
@@ -49,7 +49,7 @@ impl DenseCholesky {
     }
 }
 
-/// `L L^T` of a square matrix `L`; both are given column after column.
+/// `L L^T` of a square matrix `L`; both are stored column by column.
 pub fn times_own_transpose(size: usize, columns: &[f64]) -> Result<Vec<f64>> {
     let matrix = sequential(size, columns)?;
     let mut array = ptr::null();

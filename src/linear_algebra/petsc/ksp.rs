@@ -8,22 +8,22 @@ use super::{
 use crate::error::Result;
 use std::ptr;
 
-/// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number before it
-/// falls, and the condition number of a body that is held by contact alone is large.
+/// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
+/// before it decreases, and the condition number of a body that only contact holds is large.
 const DIVERGENCE: f64 = 1e12;
 
 /// A Krylov solver with its preconditioner.
 ///
-/// The preconditioner is set up at the first solve (or [`Ksp::set_up`]) and kept for as long as the matrix stands.
+/// The preconditioner is set up at the first solve (or by [`Ksp::set_up`]) and reused until the matrix is replaced.
 #[derive(Debug)]
 pub struct Ksp {
     pub(super) raw: Reference<sys::_p_KSP>,
-    /// The matrices that smoothers and transfers of multigrid multiply with.
+    /// The matrices used by the smoothers and transfers of multigrid.
     pub(super) levels: Vec<Level>,
     applications: u64,
 }
 
-/// How a linear solve ended.
+/// Outcome of a linear solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearOutcome {
     /// PETSc's reason: positive is converged, negative is not.
@@ -40,18 +40,18 @@ impl LinearOutcome {
         self.reason > 0
     }
 
-    /// The reason in words.
+    /// The reason as text.
     pub fn words(&self) -> &'static str {
         linear_reason(self.reason)
     }
 
-    /// The outcome of two solves one after the other.
+    /// The combined outcome of two consecutive solves.
     pub(super) fn followed_by(self, next: Self) -> Self {
         Self { iterations: self.iterations + next.iterations, ..next }
     }
 }
 
-/// PETSc's `KSPConvergedReason` in words.
+/// PETSc's `KSPConvergedReason` as text.
 pub(super) fn linear_reason(reason: i32) -> &'static str {
     match reason {
         1.. => "converged",
@@ -68,7 +68,7 @@ pub(super) fn linear_reason(reason: i32) -> &'static str {
 }
 
 impl Ksp {
-    /// A solver whose options carry this prefix.
+    /// A solver with this prefix of its options.
     pub fn new(prefix: &str) -> Result<Self> {
         let prefix = c_string(prefix)?;
         // SAFETY: PETSc copies the prefix.
@@ -79,7 +79,7 @@ impl Ksp {
         }
     }
 
-    /// A solver by another method with the same operator and preconditioner, whose options carry this prefix. It tests the norm of
+    /// A solver by another method with the same operator and preconditioner, with this prefix of its options. It tests the norm of
     /// the preconditioned residual.
     pub(super) fn sharing_preconditioner(&self, prefix: &str, method: &str) -> Result<Self> {
         let other = Self::new(prefix)?;
@@ -100,12 +100,12 @@ impl Ksp {
         Ok(pc)
     }
 
-    /// Solves with this matrix, which also makes the preconditioner.
+    /// Sets the matrix of the system, from which the preconditioner is also built.
     pub fn set_matrix(&mut self, matrix: &Matrix) -> Result<()> {
         self.set_matrices(matrix, matrix)
     }
 
-    /// Solves with the first matrix; the preconditioner is made from the second, again if that is not the matrix of before.
+    /// Sets the first matrix as that of the system; the preconditioner is built from the second, and rebuilt if that has changed.
     pub fn set_matrices(&mut self, matrix: &Matrix, preconditioned: &Matrix) -> Result<()> {
         // SAFETY: live objects; PETSc keeps its own references.
         check(unsafe { sys::KSPSetOperators(self.raw.get(), matrix.operator(), preconditioned.raw.get()) })
@@ -141,14 +141,14 @@ impl Ksp {
         check(unsafe { sys::KSPSetTolerances(self.raw.get(), relative, absolute, DIVERGENCE, iterations) })
     }
 
-    /// Starts from the values already in the solution; what counts as divergence is then measured against the residual there.
+    /// Starts from the current values of the solution; divergence is then measured relative to the residual of these values.
     pub fn start_from_solution(&mut self) -> Result<()> {
         // SAFETY: live object with PETSc's own test of convergence.
         check(unsafe { sys::KSPConvergedDefaultSetUIRNorm(self.raw.get()) })?;
         self.start(true)
     }
 
-    /// Starts from the values already in the solution, or from zero.
+    /// Starts from the current values of the solution, or from zero.
     pub(super) fn start(&mut self, from_solution: bool) -> Result<()> {
         // SAFETY: live object.
         check(unsafe {
@@ -156,13 +156,13 @@ impl Ksp {
         })
     }
 
-    /// Lets PETSc options override what was set.
+    /// PETSc options override the settings made so far.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::KSPSetFromOptions(self.raw.get()) })
     }
 
-    /// Sets up the preconditioner now; to be called after each change of its matrix. Collective.
+    /// Sets up the preconditioner; required after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
         levels::give_back(pc, &self.levels)?;
@@ -202,7 +202,7 @@ impl Ksp {
         check(unsafe { sys::PCApply(self.preconditioner()?, r.raw.get(), z.raw.get()) })
     }
 
-    /// How the last solve ended.
+    /// The outcome of the last solve.
     pub fn outcome(&self) -> Result<LinearOutcome> {
         let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
         // SAFETY: live object, live numbers.

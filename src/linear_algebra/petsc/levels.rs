@@ -1,4 +1,4 @@
-//! Copies in single precision of the matrices of PETSc's multigrid: the speed of smoothers and interpolations is bounded by memory
+//! Copies in single precision of the matrices of PETSc's multigrid: the speed of smoothers and interpolations is limited by memory
 //! bandwidth, and single precision is accurate enough for them.
 
 use super::{
@@ -16,7 +16,7 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Bytes that a product of the smoother and a restriction or interpolation move on this rank; `None` for matrices of PETSc's own.
+    /// Bytes moved on this rank by a product of the smoother and a restriction or interpolation; `None` for PETSc's own matrices.
     pub fn bytes(&self) -> [Option<u64>; 2] {
         [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
     }
@@ -32,8 +32,8 @@ fn is_multigrid(pc: sys::PC) -> Result<bool> {
     }
 }
 
-/// Replaces the matrices of each level of a preconditioner that is set up by copies; an empty list for preconditioners other than
-/// algebraic multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
+/// Replaces the matrices of each level of a preconditioner that is set up by copies; the list is empty for preconditioners other
+/// than algebraic multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
 pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     let mut levels = Vec::new();
     if !is_multigrid(pc)? {

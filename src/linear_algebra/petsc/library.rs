@@ -33,7 +33,7 @@ impl Drop for Started {
     }
 }
 
-/// Keeps PETSc started; fails where it is not.
+/// Keeps PETSc initialised; fails if it is not initialised.
 pub(super) fn started() -> Result<Rc<Started>> {
     let started = STARTED.with_borrow(Weak::upgrade);
     started.ok_or_else(|| Error::Internal("PETSc is not started on this thread".into()))
@@ -70,7 +70,7 @@ impl Petsc {
         Ok(Self { _started: started })
     }
 
-    /// Version of the PETSc that is linked, such as `3.18.5`.
+    /// Version of the linked PETSc, such as `3.18.5`.
     pub fn version(&self) -> Result<String> {
         let (mut major, mut minor, mut patch) = (0, 0, 0);
         // SAFETY: the pointers are to live integers; the last argument may be NULL.
@@ -79,7 +79,7 @@ impl Petsc {
     }
 }
 
-/// The communicator all handles are created on.
+/// The communicator of all handles.
 pub(super) fn communicator() -> sys::MPI_Comm {
     // SAFETY: written by the thread that starts PETSc, which is the only one with handles.
     unsafe { sys::PETSC_COMM_WORLD }
@@ -93,13 +93,13 @@ pub fn set_option(name: &str, value: &str) -> Result<()> {
     // SAFETY: PETSc is started; NUL-terminated strings that it copies; NULL is the global options database.
     check(unsafe { sys::PetscOptionsSetValue(ptr::null_mut(), name.as_ptr(), value.as_ptr()) })?;
     if name.as_c_str() == c"-log_view" {
-        // SAFETY: PETSc looks for this option when it starts, so logging is begun here.
+        // SAFETY: PETSc is started. It reads this option only when it starts, so logging is started here.
         check(unsafe { sys::PetscLogDefaultBegin() })?;
     }
     Ok(())
 }
 
-/// Takes a PETSc option back, if it is set; the name is without the leading dash.
+/// Removes a PETSc option if it is set; the name is without the leading dash.
 pub fn clear_option(name: &str) -> Result<()> {
     let name = c_string(&format!("-{}", name.trim_start_matches('-')))?;
     let _started = started()?;
@@ -121,12 +121,12 @@ pub(super) fn is_set(key: &CStr) -> Result<bool> {
     Ok(set != 0)
 }
 
-/// Sets a PETSc option unless the user has set it already.
+/// Sets a PETSc option unless the user has already set it.
 pub fn set_default_option(name: &str, value: &str) -> Result<()> {
     if has_option(name)? { Ok(()) } else { set_option(name, value) }
 }
 
-/// A named stage of PETSc's `-log_view`; what runs while it is entered is attributed to it.
+/// A named stage of PETSc's `-log_view`; the work done while it is entered is attributed to it.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage(i32);
 

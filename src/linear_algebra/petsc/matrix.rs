@@ -5,13 +5,13 @@ use super::{
 use crate::error::{Error, Result};
 use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
 
-/// A sparse matrix spread over the ranks by rows.
+/// A sparse matrix distributed over the ranks by rows.
 #[derive(Debug)]
 pub struct Matrix {
     pub(super) raw: Reference<sys::_p_Mat>,
     /// A copy with faster products.
     blocks: Option<Rc<Shell>>,
-    /// Bytes of this rank that a product moves at the least.
+    /// Least number of bytes that a product moves on this rank.
     bytes: u64,
     products: Cell<u64>,
 }
@@ -47,7 +47,7 @@ impl Matrix {
         Ok(Self { raw, blocks: self.blocks.clone(), bytes: self.bytes, products: Cell::new(0) })
     }
 
-    /// Attaches the rigid motions of the nodes at these owned coordinates (`block` a node) for algebraic multigrid.
+    /// Attaches the rigid motions of the nodes at these owned coordinates (`block` for each node) for algebraic multigrid.
     pub fn attach_rigid_motions(&mut self, block: usize, coordinates: &[f64]) -> Result<()> {
         let (mut rows, mut columns, mut size) = (0, 0, 0);
         // SAFETY: live matrix and live numbers.
@@ -70,7 +70,7 @@ impl Matrix {
         }
     }
 
-    /// Makes later products faster with a copy of half the size of the matrix. Collective.
+    /// Accelerates later products by a copy of half the size of the matrix. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
         self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
         self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
@@ -123,8 +123,8 @@ impl Matrix {
     }
 }
 
-/// Bytes that a product with a matrix moves at the least: entries, a column index for those of each column of a block (PETSc reads
-/// rows of one pattern together), and the two vectors once.
+/// Least number of bytes that a product with a matrix moves: entries, one index for each column of a block (PETSc reads
+/// rows with the same pattern together), and the two vectors once.
 pub(super) fn bytes_of_a_product(entries: usize, block: usize, sizes: [usize; 2]) -> u64 {
     let indices = entries / block.max(1) * size_of::<sys::PetscInt>();
     (entries * size_of::<f64>() + indices + (sizes[0] + sizes[1]) * size_of::<f64>()) as u64

@@ -1,9 +1,9 @@
-//! PETSc: owned, safe handles for what the solver calls. One file a PETSc class.
+//! PETSc: safe handles that own PETSc objects, one file for each PETSc class.
 //!
 //! Every call that can fail returns `Result` with PETSc's own message and trace. All handles are collective over
-//! the ranks of the MPI universe given to [`Petsc::start`]: every rank creates, uses and drops them in the same order. PETSc stays
-//! started for as long as one is alive; making one where PETSc is not started is an error.
-//! Solver failure is not an error here: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
+//! the ranks of the MPI universe given to [`Petsc::start`]: every rank creates, uses and drops them in the same order. PETSc
+//! remains initialised while a handle exists; creating one while PETSc is not initialised is an error.
+//! Failure of a solver to converge is not an error: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
 
 mod applied;
@@ -78,7 +78,7 @@ unsafe extern "C" fn keep_fault(
     code
 }
 
-/// Turns a PETSc return code into a result with the message and trace that the error handler kept.
+/// Converts a PETSc return code into a result with the message and trace that the error handler stored.
 fn check(code: sys::PetscErrorCode) -> Result<()> {
     if code == 0 {
         return Ok(());

@@ -12,12 +12,12 @@ use super::{
 use crate::error::Result;
 use std::ptr;
 
-/// A Krylov solver on a subspace that changes from solve to solve, preconditioned by a constant matrix.
+/// A Krylov solver on a subspace that changes between solves, preconditioned by a constant matrix.
 ///
-/// PETSc sees the operator as a shell matrix whose null space is the complement of the subspace, and so projects every result
-/// of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] uses the preconditioner of the constant
-/// matrix or, if the dimension of the complement is [`MISSING_DIRECTIONS`] or more, one made for the subspace. In later solves the
-/// preconditioner is made again only if a solve has not converged within the iterations that this is worth
+/// PETSc treats the operator as a shell matrix whose null space is the complement of the subspace, and therefore projects every
+/// result of the preconditioner. The first solve after [`ProjectedKsp::set_tolerances`] uses the preconditioner of the constant
+/// matrix or, if the dimension of the complement is [`MISSING_DIRECTIONS`] or more, one built for the subspace. In later solves the
+/// preconditioner is rebuilt only if a solve has not converged within a number of iterations equal to the cost of rebuilding
 /// ([`ProjectedKsp::set_refresh_threshold`]); the solve then continues from its last iterate.
 #[derive(Debug)]
 pub struct ProjectedKsp {
@@ -25,7 +25,7 @@ pub struct ProjectedKsp {
     fallback: Option<Ksp>,
     shell: Reference<sys::_p_Mat>,
     complement: Reference<sys::_p_MatNullSpace>,
-    /// The operator's own preconditioner, if that is in use; inside `ksp`.
+    /// The operator's own preconditioner, if it is in use; inside `ksp`.
     own: sys::PC,
     constant: Option<Matrix>,
     reduced: Option<ReducedMatrix>,
@@ -36,25 +36,25 @@ pub struct ProjectedKsp {
     refresh_threshold: usize,
     /// Whether the next solve is the first since the tolerances were set.
     first: bool,
-    /// Whether the preconditioner is one for subspaces.
+    /// Whether the preconditioner was built for a subspace.
     reducing: bool,
 }
 
-/// PETSc's reasons of CG for negative curvature: of the preconditioner, of the matrix.
+/// PETSc's reasons for negative curvature in CG: of the preconditioner, of the matrix.
 const INDEFINITE: [i32; 2] = [-8, -10];
 
-/// PETSc's reason for a solve that has used up its iterations.
+/// PETSc's reason for a solve that has reached the maximum number of iterations.
 const TOO_MANY: i32 = -3;
 
-/// Dimension of the complement of a subspace from which on a preconditioner is made for the subspace. With a smaller complement the
-/// preconditioner of the whole space needs at most as many more iterations as the complement has dimensions.
+/// Dimension of the complement from which a preconditioner is built for the subspace. With a smaller complement the
+/// preconditioner of the whole space needs at most as many additional iterations as the complement has dimensions.
 pub const MISSING_DIRECTIONS: f64 = 16.0;
 
-/// A solve of no iterations.
+/// A solve without iterations.
 const NOTHING: LinearOutcome = LinearOutcome { reason: TOO_MANY, iterations: 0, residual: f64::INFINITY };
 
 impl ProjectedKsp {
-    /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
+    /// A solver for vectors with the layout of `like` (block size `block`), with this prefix of its options.
     pub fn new(prefix: &str, like: &DistributedVector, block: usize) -> Result<Self> {
         // SAFETY: a space of no vectors.
         let complement =
@@ -76,7 +76,7 @@ impl ProjectedKsp {
         })
     }
 
-    /// The solver inside, to choose method, preconditioner and tolerances.
+    /// The inner solver, to select method, preconditioner and tolerances.
     pub fn linear_solver(&mut self) -> &mut Ksp {
         &mut self.ksp
     }
@@ -102,14 +102,15 @@ impl ProjectedKsp {
         Ok(())
     }
 
-    /// Sets the number of iterations with the preconditioner of another subspace after which one is made for the current subspace.
+    /// Sets the number of iterations with the preconditioner of another subspace after which it is rebuilt for the current
+    /// subspace.
     pub fn set_refresh_threshold(&mut self, iterations: usize) {
         self.refresh_threshold = iterations;
     }
 
-    /// Takes the constant matrix and sets up its preconditioner. Collective.
+    /// Sets the constant matrix and sets up its preconditioner. Collective.
     ///
-    /// The preconditioner is set up with the constant matrix alone: multigrid would smooth with the operator otherwise.
+    /// The preconditioner is set up with the constant matrix alone; otherwise multigrid would smooth with the operator.
     pub fn set_constant(&mut self, constant: &Matrix) -> Result<()> {
         self.reduced = None;
         self.reducing = false;
@@ -117,7 +118,7 @@ impl ProjectedKsp {
         self.precondition_with(constant.raw.get())
     }
 
-    /// Uses the operator's own preconditioner in later solves.
+    /// Later solves use the operator's own preconditioner.
     pub fn precondition_by_operator(&mut self) -> Result<()> {
         self.ksp.set_preconditioner("shell", None)?;
         self.own = self.ksp.preconditioner()?;
@@ -139,7 +140,7 @@ impl ProjectedKsp {
         self.ksp.set_up()
     }
 
-    /// Reads the current subspace; returns whether the preconditioner belongs to another subspace, and whether it was made again for
+    /// Reads the current subspace; returns whether the preconditioner belongs to another subspace, and whether it was rebuilt for
     /// this one. Collective.
     fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<[bool; 2]> {
         let Some(constant) = &self.constant else { return Ok([false; 2]) };
@@ -154,7 +155,8 @@ impl ProjectedKsp {
         if !std::mem::take(&mut self.first) {
             return Ok([stale && self.reducing, false]);
         }
-        // What a step starts with depends on its own subspace alone, not on steps before, which a restart does not know.
+        // The initial preconditioner of a step depends on its own subspace alone, not on earlier steps, which a restart does not
+        // have.
         let worth = reduced.removed()? >= MISSING_DIRECTIONS;
         if worth && stale {
             self.refresh()?;
@@ -209,7 +211,7 @@ impl ProjectedKsp {
         })
     }
 
-    /// Reads the subspace, then runs a solve, which is told whether the preconditioner belongs to another subspace.
+    /// Reads the subspace, then runs a solve; its argument is whether the preconditioner belongs to another subspace.
     fn looking_at(
         &mut self,
         operator: &mut dyn ProjectedOperator,
@@ -253,7 +255,7 @@ impl ProjectedKsp {
         outcome
     }
 
-    /// The residual norm at which a solve stops, and its share of the right-hand side.
+    /// The residual norm at which a solve stops, and its ratio to the right-hand side.
     fn target(&mut self, right_hand_side: &DistributedVector) -> Result<(f64, f64)> {
         let norm = right_hand_side.norm()?;
         self.smallest = self.smallest.min(norm);
@@ -328,7 +330,7 @@ impl ProjectedKsp {
         Ok(gmres)
     }
 
-    /// Makes the preconditioner for the subspace in use. Collective.
+    /// Builds the preconditioner for the current subspace. Collective.
     fn refresh(&mut self) -> Result<()> {
         let (Some(constant), Some(reduced)) = (&self.constant, &mut self.reduced) else { return Ok(()) };
         reduced.make(constant)?;

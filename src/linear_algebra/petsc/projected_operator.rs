@@ -15,25 +15,25 @@ pub trait ProjectedOperator {
     /// `x = P x`: the orthogonal projection on the subspace, node by node.
     fn project(&mut self, x: &mut DistributedVector) -> Result<()>;
 
-    /// Whether the subspace may be a proper one.
+    /// Whether the subspace may differ from the whole space.
     fn may_project(&self) -> bool {
         true
     }
 
-    /// `z = M^-1 r`, where [`super::ProjectedKsp::precondition_by_operator`] asks for it.
+    /// `z = M^-1 r`, if [`super::ProjectedKsp::precondition_by_operator`] was called.
     fn precondition(&mut self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
         Err(Error::Internal("an operator without a preconditioner was asked for one".into()))
     }
 }
 
-/// How a solve on a subspace ended.
+/// Outcome of a solve on a subspace.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProjectedOutcome {
     /// The outcome, iterations of both methods together.
     pub linear: LinearOutcome,
-    /// Whether CG met negative curvature, so that GMRES had to solve.
+    /// Whether CG found negative curvature, so that GMRES was used.
     pub indefinite: bool,
-    /// Whether the preconditioner was made anew.
+    /// Whether the preconditioner was rebuilt.
     pub refreshed: bool,
 }
 

@@ -5,27 +5,27 @@ use std::{
     ptr,
 };
 
-/// `P K P + k (I - P)`: a constant matrix on a subspace, with a number of its own size on the complement.
+/// `P K P + k (I - P)`: a constant matrix on a subspace, with a factor `k` of the magnitude of `K` on the complement.
 ///
 /// `P` acts on each node separately. The pattern of stored entries is that of `K`, so that an ordering or an interpolation that was
-/// set up for one matrix serves the other.
+/// set up for one of the matrices is valid for the other.
 #[derive(Debug)]
 pub(super) struct ReducedMatrix {
     pub raw: Reference<sys::_p_Mat>,
-    /// Components a node.
+    /// Components of each node.
     block: usize,
-    /// Where ghost nodes stand behind the owned ones, by their global numbers.
+    /// Positions of ghost nodes after the owned ones, by their global numbers.
     ghosts: HashMap<usize, usize>,
     /// `P e_i` for each component `i`.
     columns: Vec<DistributedVector>,
     /// All components of all nodes.
     directions: f64,
-    /// The same of the projection that the matrix was made for.
+    /// The same for the projection for which the matrix was computed.
     made_for: Vec<DistributedVector>,
 }
 
 impl ReducedMatrix {
-    /// Starts with `P = I`, for vectors laid out like `like`. Collective.
+    /// Starts with `P = I`, for vectors with the layout of `like`. Collective.
     pub fn new(constant: &Matrix, like: &DistributedVector, block: usize) -> Result<Self> {
         let owned = like.owned()?.len() / block;
         let first = first_node(constant, block)?;
@@ -34,7 +34,7 @@ impl ReducedMatrix {
             let (columns, _) = block_row(constant, first + node, block)?;
             others.extend(columns.into_iter().filter(|node| !(first..first + owned).contains(node)));
         }
-        // A row reaches further than the cells of this rank: the ghosts here are all nodes that the rows name.
+        // A row extends beyond the cells of this rank: the ghosts here are all nodes in the columns of the rows.
         let list: Vec<u32> = others.iter().map(|&node| node as u32).collect();
         let unit = |i| {
             let mut column = DistributedVector::ghosted(block, owned, &list)?;
@@ -59,7 +59,7 @@ impl ReducedMatrix {
         Ok(Self { raw, block, ghosts, columns, directions: directions.round(), made_for })
     }
 
-    /// Reads the current projection; returns whether the matrix was made for another one. Collective.
+    /// Reads the current projection; returns whether the matrix was computed for another one. Collective.
     pub fn look(&mut self, mut project: impl FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut changed = false;
         for (i, column) in self.columns.iter_mut().enumerate() {
@@ -70,7 +70,7 @@ impl ReducedMatrix {
         Ok(changed)
     }
 
-    /// Forgets the projection that the matrix was made for.
+    /// Discards the projection for which the matrix was computed.
     pub fn forget(&mut self) -> Result<()> {
         for (i, made) in self.made_for.iter_mut().enumerate() {
             write_unit(made, i, self.block)?;
@@ -87,7 +87,7 @@ impl ReducedMatrix {
         Ok((self.directions - left).round())
     }
 
-    /// Makes the matrix for the projection that was last read. Collective.
+    /// Computes the matrix for the projection that was last read. Collective.
     pub fn make(&mut self, constant: &Matrix) -> Result<()> {
         for (made, column) in self.made_for.iter_mut().zip(&self.columns) {
             made.copy_from(column)?;

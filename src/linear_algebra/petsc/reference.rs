@@ -6,7 +6,7 @@ use super::{
 use crate::error::Result;
 use std::{ptr, rc::Rc};
 
-/// One counted reference to an object of PETSc's, given back on drop; PETSc and MPI stay for as long.
+/// One counted reference to a PETSc object, released on drop; PETSc and MPI remain initialised while it exists.
 #[derive(Debug)]
 pub(super) struct Reference<T> {
     raw: *mut T,
@@ -14,7 +14,7 @@ pub(super) struct Reference<T> {
 }
 
 impl<T> Reference<T> {
-    /// Owns the reference that `create` writes. Fails where PETSc is not started.
+    /// Owns the reference that `create` writes. Fails if PETSc is not initialised.
     ///
     /// # Safety
     /// `T` is a class of PETSc's. `create` fails, or writes a reference to a live object that nothing else gives back.

@@ -14,11 +14,11 @@ pub(super) trait Action {
         Err(Error::Internal("a product with a transpose that nothing was made for".into()))
     }
 
-    /// Bytes of this rank that a product moves at the least.
+    /// Least number of bytes that a product moves on this rank.
     fn bytes(&self) -> u64;
 }
 
-/// A shell matrix of PETSc's, which is given by its products.
+/// A PETSc shell matrix, which is defined by its products.
 pub(super) struct Shell {
     pub raw: Reference<sys::_p_Mat>,
     action: Box<Box<dyn Action>>,
@@ -33,7 +33,7 @@ impl fmt::Debug for Shell {
 type Multiply = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
 
 impl Shell {
-    /// A shell laid out like `matrix`. Once this handle is dropped, products with it are errors. Collective.
+    /// A shell with the layout of `matrix`. After this handle is dropped, products with the shell are errors. Collective.
     pub fn new(matrix: sys::Mat, action: Box<dyn Action>) -> Result<Self> {
         let action = Box::new(action);
         let (mut rows, mut columns, mut blocks) = (0, 0, [0; 2]);
@@ -53,7 +53,7 @@ impl Shell {
         Ok(shell)
     }
 
-    /// Bytes of this rank that a product moves at the least.
+    /// Least number of bytes that a product moves on this rank.
     pub fn bytes(&self) -> u64 {
         self.action.bytes()
     }
@@ -66,7 +66,7 @@ impl Drop for Shell {
     }
 }
 
-/// A symmetric shell laid out like a vector of this block size, to be multiplied with while its context is set. Collective.
+/// A symmetric shell with the layout of a vector of this block size, usable for products while its context is set. Collective.
 pub(super) fn symmetric_shell(
     like: &DistributedVector,
     block: usize,
@@ -79,7 +79,7 @@ pub(super) fn symmetric_shell(
     Ok(shell)
 }
 
-/// A shell with so many rows and columns on this rank, in blocks, and without a context.
+/// A shell with these numbers of rows and columns on this rank, in blocks, and without a context.
 fn create(
     [rows, columns]: [sys::PetscInt; 2],
     blocks: [sys::PetscInt; 2],

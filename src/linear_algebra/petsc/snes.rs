@@ -10,20 +10,20 @@ use super::{
 use crate::error::Result;
 use std::{ffi::c_void, ptr};
 
-/// A system of nonlinear equations `residual(x) = 0` with a generalised Jacobian given by its action and its solution.
+/// A system of nonlinear equations `residual(x) = 0` with a generalised Jacobian defined by its products and its solves.
 pub trait NonlinearProblem {
-    /// Writes the residual at `x`. `x` carries no ghost values of its own.
+    /// Writes the residual at `x`. `x` has no ghost values of its own.
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()>;
 
-    /// Takes `x` as the point of linearisation.
+    /// Sets `x` as the point of linearisation.
     fn linearise(&mut self, x: &DistributedVector) -> Result<()>;
 
     /// Writes the Jacobian at the last point of linearisation times `direction`.
     fn apply_jacobian(&mut self, direction: &DistributedVector, result: &mut DistributedVector)
     -> Result<()>;
 
-    /// Writes the `direction` that the Jacobian at the last point of linearisation takes to `residual`, as closely as
-    /// Newton's method needs it.
+    /// Solves for the `direction` whose product with the Jacobian at the last point of linearisation is `residual`, with the
+    /// accuracy that Newton's method requires.
     fn solve_jacobian(
         &mut self,
         residual: &DistributedVector,
@@ -31,7 +31,7 @@ pub trait NonlinearProblem {
     ) -> Result<()>;
 }
 
-/// How a nonlinear solve ended.
+/// Outcome of a nonlinear solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NonlinearOutcome {
     /// PETSc's reason: positive is converged, negative is not.
@@ -43,7 +43,7 @@ pub struct NonlinearOutcome {
 }
 
 impl NonlinearOutcome {
-    /// How the last solve of a live solver ended.
+    /// The outcome of the last solve of a live solver.
     pub(super) fn of(raw: sys::SNES) -> Result<Self> {
         let (mut reason, mut iterations, mut residual) = (0, 0, 0.0);
         // SAFETY: live object, live numbers.
@@ -61,7 +61,7 @@ impl NonlinearOutcome {
         self.reason > 0
     }
 
-    /// The reason in words.
+    /// The reason as text.
     pub fn words(&self) -> &'static str {
         match self.reason {
             1.. => "converged",
@@ -75,9 +75,9 @@ impl NonlinearOutcome {
     }
 }
 
-/// Newton's method; the problem applies its Jacobian and solves with it.
+/// Newton's method; the problem computes products with its Jacobian and solves with it.
 ///
-/// To PETSc the linear solve is a shell preconditioner, applied once; its own options carry the prefix `newton_`.
+/// For PETSc the linear solve is a shell preconditioner, applied once; its own options have the prefix `newton_`.
 #[derive(Debug)]
 pub struct Snes {
     raw: Reference<sys::_p_SNES>,
@@ -88,7 +88,7 @@ pub struct Snes {
 }
 
 impl Snes {
-    /// A solver for vectors laid out like `like` (block size `block`), whose options carry this prefix.
+    /// A solver for vectors with the layout of `like` (block size `block`), with this prefix of its options.
     pub fn new(prefix: &str, like: &DistributedVector, block: usize) -> Result<Self> {
         let prefix = c_string(prefix)?;
         let (mut ksp, mut pc, mut search) = (ptr::null_mut(), ptr::null_mut(), ptr::null_mut());
@@ -99,7 +99,7 @@ impl Snes {
             let raw = solver.get();
             check(sys::SNESSetOptionsPrefix(raw, prefix.as_ptr()))?;
             check(sys::SNESSetType(raw, c"newtonls".as_ptr()))?;
-            // A full step may take the residual up by orders of magnitude while the branches settle.
+            // A full step may increase the residual by orders of magnitude while the branches settle.
             check(sys::SNESSetDivergenceTolerance(raw, -1.0))?;
             check(sys::SNESGetKSP(raw, &mut ksp))?;
             check(sys::KSPSetOptionsPrefix(ksp, c"newton_".as_ptr()))?;
@@ -114,7 +114,7 @@ impl Snes {
         Ok(Self { raw, jacobian, preconditioner: pc, residual: like.like()? })
     }
 
-    /// Takes every step in full, or searches along it for a decrease of the residual.
+    /// Takes each step in full, or uses a line search for a decrease of the residual.
     pub fn search_along_steps(&mut self, search: bool) -> Result<()> {
         let mut line_search = ptr::null_mut();
         // SAFETY: live object, which owns its line search; the names are static.
@@ -124,14 +124,14 @@ impl Snes {
         }
     }
 
-    /// Lets PETSc options override what was set.
+    /// PETSc options override the settings made so far.
     pub fn apply_options(&mut self) -> Result<()> {
         // SAFETY: live object.
         check(unsafe { sys::SNESSetFromOptions(self.raw.get()) })
     }
 
-    /// Solves `problem` from and into `x`, down to a residual norm of `absolute`, or of `relative` times the first one.
-    /// Collective.
+    /// Solves `problem`, starting from `x`, where it writes the solution, down to a residual norm of `absolute`, or of `relative`
+    /// times the first one. Collective.
     ///
     /// A panic in a callback is resumed here; an error in a callback on this rank is returned on this rank, while the
     /// other ranks get an outcome that is not converged, unless this rank owns no values: agree on the result afterwards.

@@ -9,7 +9,7 @@ use super::{
 use crate::error::Result;
 use std::{ffi::c_void, ptr};
 
-/// PETSc's infinity: the upper bound of an entry without one; its negative is the lower bound.
+/// PETSc's infinity: the upper bound of an entry without an upper bound; its negative is the lower bound.
 pub const UNBOUNDED: f64 = f64::MAX / 4.0;
 
 /// PETSc's reduced-space active set method (`vinewtonrsls`) for a symmetric linear system with bounds:
@@ -20,14 +20,14 @@ pub struct BoundedSnes {
     residual: DistributedVector,
 }
 
-/// When the iterations of a nonlinear solver end.
+/// Stopping criteria of a nonlinear solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Norm of the residual that counts as zero.
     pub absolute: f64,
-    /// The same as a share of the first norm.
+    /// The same relative to the first norm.
     pub relative: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
 }
 
@@ -38,13 +38,13 @@ struct Linear<'a> {
 }
 
 impl BoundedSnes {
-    /// A solver for vectors laid out like `like`, whose options carry this prefix; it factors the rows without active
-    /// bound anew whenever the active set changes.
+    /// A solver for vectors with the layout of `like`, with this prefix of its options. It factors the rows without active
+    /// bounds again each time the active set changes.
     pub fn new(prefix: &str, like: &DistributedVector) -> Result<Self> {
         require(HAS_MUMPS, "[solver] method = \"vinewtonrsls\"", "MUMPS", "use \"newton\"")?;
         let name = c_string(prefix)?;
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
-        // The default is an absolute distance, whatever the unit of `x`; the method puts entries on their bounds exactly.
+        // The default is an absolute distance, independent of the unit of `x`; the method sets entries exactly to their bounds.
         set_default_option(&format!("{prefix}snes_vi_zero_tolerance"), "0")?;
         // SAFETY: linear solver and preconditioner belong to the solver; PETSc copies the names.
         let raw = unsafe {
@@ -63,7 +63,8 @@ impl BoundedSnes {
         Ok(Self { raw, residual: like.like()? })
     }
 
-    /// Solves from and into `x`; the norms are those of the residual of the entries that are not at their bounds. Collective.
+    /// Solves for `x`, starting from its values; the norms are those of the residual of the entries that are not at their bounds.
+    /// Collective.
     pub fn solve(
         &mut self,
         matrix: &Matrix,

@@ -6,7 +6,7 @@ use std::{
     ptr,
 };
 
-/// A nodal field spread over the ranks: owned values first, then copies of ghost values from other ranks.
+/// A nodal field distributed over the ranks: owned values first, then copies of ghost values from other ranks.
 ///
 /// Values are grouped by node: component `c` of local node `i` is at `i * block + c`.
 #[derive(Debug)]
@@ -15,7 +15,7 @@ pub struct DistributedVector {
 }
 
 impl DistributedVector {
-    /// A zero field of `block` values a node, for `owned` nodes here and ghosts with these global node numbers.
+    /// A zero field of `block` values for each node, for `owned` nodes on this rank and ghosts with these global node numbers.
     pub fn ghosted(block: usize, owned: usize, ghosts: &[u32]) -> Result<Self> {
         let ghost_blocks: Vec<sys::PetscInt> =
             ghosts.iter().map(|&g| index(g as usize, "ghost node number")).collect::<Result<_>>()?;
@@ -87,7 +87,7 @@ impl DistributedVector {
         self.exchange(sys::INSERT_VALUES, sys::SCATTER_FORWARD)
     }
 
-    /// Adds ghost values to their owners. Collective; ghost values here stay as they are.
+    /// Adds ghost values to those of their owners. Collective; ghost values on this rank are unchanged.
     pub fn add_ghosts_to_owners(&mut self) -> Result<()> {
         self.exchange(sys::ADD_VALUES, sys::SCATTER_REVERSE)
     }
