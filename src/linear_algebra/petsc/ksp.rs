@@ -9,7 +9,7 @@ use crate::error::Result;
 use std::ptr;
 
 /// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
-/// before it decreases, and the condition number of a body that only contact holds is large.
+/// before it decreases, and the condition number of a body supported by contact alone is large.
 const DIVERGENCE: f64 = 1e12;
 
 /// A Krylov solver with its preconditioner.

@@ -130,7 +130,7 @@ impl ReducedMatrix {
                         .for_each(|(k, value)| *value += size * (identity[k] - mine[k]));
                 }
                 self.insert(first + node, global, &values)?;
-                // A row that holds nothing itself is not visited; two that do are both.
+                // Rows of nodes with the identity projection are not visited, so their block is written here.
                 if theirs == identity {
                     let across: Vec<f64> =
                         (0..square).map(|k| values[(k % block) * block + k / block]).collect();

@@ -1,4 +1,4 @@
-//! Springs on contact nodes, for factors and preconditioners of bodies that only contact holds.
+//! Springs on contact nodes, for factors and preconditioners of bodies supported by contact alone.
 //!
 //! Where neither supports nor inertia resist a rigid motion, the matrix `K` of a step is singular, or so nearly singular that its
 //! factor consists of rounding errors. `K + B` with soft springs `B` along the motions on which contact laws act is regular. It is

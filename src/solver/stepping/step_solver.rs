@@ -42,7 +42,7 @@ pub(super) struct StepSolver {
     is_broken: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
-    /// Springs that keep the factors of bodies that only contact holds regular.
+    /// Springs that keep the factors of bodies supported by contact alone regular.
     springs: Springs,
 }
 
