@@ -33,7 +33,7 @@ pub(super) struct Implicit {
     velocity: DistributedVector,
     /// `u_n`, with ghosts.
     end: DistributedVector,
-    /// Sums of squares of the forces of this rank's cells at the start.
+    /// Sum of squares of the forces of this rank's cells at the start.
     squares: f64,
     solved: Energy,
     /// `M v_n`, where the energy balance needs it.

@@ -49,7 +49,7 @@ pub(super) struct Point<const D: usize> {
     pub unknown: Unknown,
     /// Initial position, in m.
     pub place: Vector<D>,
-    /// Penetration at the start of the step, and step length.
+    /// Penetration from the displacement at the start and the gap at the end of the step, and step length.
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
     pub penetration_before: f64,
