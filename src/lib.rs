@@ -25,6 +25,8 @@
 #![doc = include_str!("../examples/job_in_memory.rs")]
 //! ```
 
+#![cfg_attr(not(test), warn(unreachable_pub))]
+
 pub mod error;
 pub mod linear_algebra;
 pub mod parallel;

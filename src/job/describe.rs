@@ -26,7 +26,7 @@ pub fn describe(table: Option<&str>) -> Result<String> {
 }
 
 /// As [`describe`], of another kind of document.
-pub fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
+pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
     let all = tables(kind);
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
     if let Some((path, key)) = wanted.rsplit_once('.') {
@@ -75,7 +75,7 @@ fn unknown_table(kind: Kind, wanted: &str, all: &[Table]) -> Error {
 }
 
 /// The tables that have a key of this name, as text.
-pub fn tables_with(kind: Kind, key: &str) -> Option<String> {
+pub(super) fn tables_with(kind: Kind, key: &str) -> Option<String> {
     let found: Vec<String> = tables(kind)
         .iter()
         .filter(|table| table.keys.iter().any(|(name, _)| *name == key))
@@ -178,7 +178,7 @@ fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -
 }
 
 /// What may stand here, in words.
-pub fn kind(schema: Schema) -> String {
+pub(super) fn kind(schema: Schema) -> String {
     let alternatives = schema.alternatives();
     if !alternatives.is_empty() {
         let mut kinds: Vec<String> = schema.words().iter().map(|word| format!("\"{word}\"")).collect();
@@ -211,7 +211,7 @@ pub fn kind(schema: Schema) -> String {
 }
 
 /// The range of a number, in words.
-pub fn range(schema: Schema) -> String {
+pub(super) fn range(schema: Schema) -> String {
     let bounds = [
         ("above", schema.number("exclusiveMinimum")),
         ("at least", schema.number("minimum")),
@@ -224,7 +224,7 @@ pub fn range(schema: Schema) -> String {
 }
 
 /// A JSON value as TOML spells it.
-pub fn toml(value: &Value) -> String {
+pub(super) fn toml(value: &Value) -> String {
     match value {
         Value::Object(object) if object.is_empty() => "{}".into(),
         Value::Object(object) => {

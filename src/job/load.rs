@@ -47,7 +47,7 @@ impl Job {
 }
 
 /// A document with what is wrong with it so far.
-pub struct Document {
+pub(crate) struct Document {
     /// Its keys.
     pub root: Node,
     /// What faults point into.
@@ -58,7 +58,13 @@ pub struct Document {
 
 impl Document {
     /// Parses `text`, writes `overrides` over it and holds every key against the schema.
-    pub fn new(kind: Kind, text: &str, name: &str, overrides: &[String], colour: bool) -> Result<Self> {
+    pub(crate) fn new(
+        kind: Kind,
+        text: &str,
+        name: &str,
+        overrides: &[String],
+        colour: bool,
+    ) -> Result<Self> {
         refuse_long(kind, text.len(), name)?;
         let texts = Texts::new(kind.name, name, text, overrides, colour);
         let mut root = parse(text).map_err(|fault| texts.refuse(vec![fault]))?;
@@ -71,12 +77,12 @@ impl Document {
     }
 
     /// A fault at the value under `path`, or at the deepest table on the way there.
-    pub fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
+    pub(crate) fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
     }
 
     /// The document's struct, or all its faults.
-    pub fn fill<T: DeserializeOwned>(self) -> Result<(T, Node, Texts)> {
+    pub(crate) fn fill<T: DeserializeOwned>(self) -> Result<(T, Node, Texts)> {
         if !self.faults.is_empty() {
             return Err(self.texts.refuse(self.faults));
         }
@@ -133,7 +139,7 @@ impl Job {
 }
 
 /// The path without `.` and, as far as they follow a name, without `..`.
-pub fn normal(path: &Path) -> PathBuf {
+pub(crate) fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {
         match part {
@@ -155,7 +161,7 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
 }
 
 /// The text of a file of this kind, and the folder it is in.
-pub fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
+pub(crate) fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
     let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
     let folder = absolute.parent().unwrap_or(Path::new("/")).to_owned();
     let mut bytes = Vec::new();

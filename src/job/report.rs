@@ -24,7 +24,7 @@ pub(crate) struct Place {
 
 impl Place {
     /// The bytes `range` of `file`.
-    pub fn new(file: usize, range: Range<usize>) -> Self {
+    pub(crate) fn new(file: usize, range: Range<usize>) -> Self {
         Self { file, start: range.start, end: range.end }
     }
 }
@@ -40,12 +40,12 @@ pub(crate) struct Fault {
 
 impl Fault {
     /// A fault that says `message`, with `label` under the place where it is.
-    pub fn new(at: Place, message: impl Into<String>, label: impl Into<String>) -> Self {
+    pub(crate) fn new(at: Place, message: impl Into<String>, label: impl Into<String>) -> Self {
         Self { at, message: message.into(), label: label.into(), notes: Vec::new() }
     }
 
     /// What to do about it.
-    pub fn help(mut self, help: impl AsRef<str>) -> Self {
+    pub(crate) fn help(mut self, help: impl AsRef<str>) -> Self {
         self.notes.push(format!("help: {}", help.as_ref()));
         self
     }
@@ -61,7 +61,13 @@ pub(crate) struct Texts {
 
 impl Texts {
     /// The file of this kind of document and, after it, the overrides.
-    pub fn new(kind: &'static str, name: &str, text: &str, overrides: &[String], colour: bool) -> Self {
+    pub(crate) fn new(
+        kind: &'static str,
+        name: &str,
+        text: &str,
+        overrides: &[String],
+        colour: bool,
+    ) -> Self {
         let mut files = SimpleFiles::new();
         files.add(printable(name), printable(text));
         for text in overrides {
@@ -71,7 +77,7 @@ impl Texts {
     }
 
     /// All `faults` as one refusal, in the order of their places.
-    pub fn refuse(&self, mut faults: Vec<Fault>) -> Error {
+    pub(crate) fn refuse(&self, mut faults: Vec<Fault>) -> Error {
         faults.sort();
         faults.dedup();
         let mut text = String::new();

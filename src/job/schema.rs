@@ -11,7 +11,7 @@ static JOB: LazyLock<Value> = LazyLock::new(schema_of::<Job>);
 
 /// A kind of document.
 #[derive(Clone, Copy)]
-pub struct Kind {
+pub(crate) struct Kind {
     /// What messages call it.
     pub name: &'static str,
     /// What stands before the name of a table on the command line.
@@ -24,12 +24,12 @@ pub struct Kind {
 
 impl Kind {
     /// Jobs.
-    pub fn job() -> Self {
+    pub(crate) fn job() -> Self {
         Self { name: "job", prefix: "", opening: OPENING, schema: &JOB }
     }
 
     /// The schema of the whole document.
-    pub fn root(&self) -> Schema {
+    pub(crate) fn root(&self) -> Schema {
         resolve(self.schema, self.schema)
     }
 }
@@ -41,7 +41,7 @@ is an effect that is not simulated. Lengths, forces and times are in SI units; p
 ";
 
 /// The schema of a whole document; no key may be null, as in TOML.
-pub fn schema_of<T: JsonSchema>() -> Value {
+pub(crate) fn schema_of<T: JsonSchema>() -> Value {
     let mut schema = schemars::schema_for!(T).to_value();
     remove_null(&mut schema);
     schema
@@ -55,7 +55,7 @@ fn resolve(root: &'static Value, schema: &'static Value) -> Schema {
 
 /// A schema and the place where it is used.
 #[derive(Clone, Copy)]
-pub struct Schema {
+pub(crate) struct Schema {
     root: &'static Value,
     own: &'static Value,
     target: &'static Value,
@@ -63,7 +63,7 @@ pub struct Schema {
 
 impl Schema {
     /// The keyword's value.
-    pub fn get(&self, keyword: &str) -> &'static Value {
+    pub(crate) fn get(&self, keyword: &str) -> &'static Value {
         match &self.own[keyword] {
             Value::Null => &self.target[keyword],
             value => value,
@@ -71,17 +71,17 @@ impl Schema {
     }
 
     /// The keyword's text.
-    pub fn text(&self, keyword: &str) -> Option<&'static str> {
+    pub(crate) fn text(&self, keyword: &str) -> Option<&'static str> {
         self.get(keyword).as_str()
     }
 
     /// The keyword's number.
-    pub fn number(&self, keyword: &str) -> Option<f64> {
+    pub(crate) fn number(&self, keyword: &str) -> Option<f64> {
         self.get(keyword).as_f64()
     }
 
     /// Whether a value of this JSON type may stand here.
-    pub fn accepts(&self, kind: &str) -> bool {
+    pub(crate) fn accepts(&self, kind: &str) -> bool {
         match self.get("type") {
             Value::String(only) => only == kind,
             Value::Array(several) => several.iter().any(|one| one == kind),
@@ -90,7 +90,7 @@ impl Schema {
     }
 
     /// The schemas of which one must hold, nested ones flattened; empty if there is no choice.
-    pub fn alternatives(&self) -> Vec<Schema> {
+    pub(crate) fn alternatives(&self) -> Vec<Schema> {
         let branches = self.get("oneOf").as_array().or_else(|| self.get("anyOf").as_array());
         let mut all = Vec::new();
         for branch in branches.into_iter().flatten() {
@@ -104,18 +104,18 @@ impl Schema {
     }
 
     /// The words of which one may stand here.
-    pub fn words(&self) -> Vec<&'static str> {
+    pub(crate) fn words(&self) -> Vec<&'static str> {
         self.alternatives().iter().filter_map(|branch| branch.text("const")).collect()
     }
 
     /// The tables of which exactly one may stand here: name and the branch's schema.
-    pub fn tagged(&self) -> Vec<(&'static str, Schema)> {
+    pub(crate) fn tagged(&self) -> Vec<(&'static str, Schema)> {
         let branches = self.alternatives().into_iter();
         branches.filter_map(|branch| Some((branch.get("required")[0].as_str()?, branch))).collect()
     }
 
     /// The keys of a table.
-    pub fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
+    pub(crate) fn properties(&self) -> impl Iterator<Item = (&'static String, Schema)> {
         let root = self.root;
         self.get("properties")
             .as_object()
@@ -125,17 +125,17 @@ impl Schema {
     }
 
     /// The schema of one key of a table.
-    pub fn property(&self, key: &str) -> Option<Schema> {
+    pub(crate) fn property(&self, key: &str) -> Option<Schema> {
         self.get("properties").get(key).map(|inner| resolve(self.root, inner))
     }
 
     /// Keys that a table must have.
-    pub fn required(&self) -> impl Iterator<Item = &'static str> {
+    pub(crate) fn required(&self) -> impl Iterator<Item = &'static str> {
         self.get("required").as_array().into_iter().flatten().filter_map(Value::as_str)
     }
 
     /// The schema of a list's items, or of the values of a table with free keys.
-    pub fn items(&self) -> Option<Schema> {
+    pub(crate) fn items(&self) -> Option<Schema> {
         [self.get("items"), self.get("additionalProperties")]
             .into_iter()
             .find(|inner| inner.is_object())

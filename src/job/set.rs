@@ -7,7 +7,7 @@ use super::source::{Node, Value, parse_value};
 use crate::laws::expression::Expression;
 
 /// Writes the override `text`, which is file `file`, over the document.
-pub fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Fault> {
+pub(super) fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Fault> {
     let fault =
         |message: &str, help: &str| Err(Fault::new(Place::new(file, 0..text.len()), message, "").help(help));
     let Some(equals) = equals_sign(text) else {

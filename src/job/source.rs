@@ -41,7 +41,7 @@ pub(crate) enum Value {
 
 impl Value {
     /// What a user calls this kind of value.
-    pub fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Text(_) => "a string",
             Self::Integer(_) => "a whole number",
@@ -56,7 +56,7 @@ impl Value {
 
 impl Node {
     /// The node under `path`, whose parts are keys and list positions, joined by dots.
-    pub fn find(&self, path: &str) -> Option<&Node> {
+    pub(crate) fn find(&self, path: &str) -> Option<&Node> {
         if path.is_empty() {
             return Some(self);
         }
@@ -64,7 +64,7 @@ impl Node {
     }
 
     /// The child called `part`, a key or a list position.
-    pub fn child(&self, part: &str) -> Option<&Node> {
+    pub(crate) fn child(&self, part: &str) -> Option<&Node> {
         match &self.value {
             Value::Table(table) => table.get(part),
             Value::Array(items) => items.get(part.parse::<usize>().ok()?),
@@ -73,7 +73,7 @@ impl Node {
     }
 
     /// The deepest node on the way to `path` that exists.
-    pub fn deepest(&self, path: &str) -> &Node {
+    pub(crate) fn deepest(&self, path: &str) -> &Node {
         let mut node = self;
         for part in path.split('.') {
             match node.child(part) {
@@ -85,7 +85,7 @@ impl Node {
     }
 
     /// Number of items of the list under `path`; 0 if there is none.
-    pub fn count(&self, path: &str) -> usize {
+    pub(crate) fn count(&self, path: &str) -> usize {
         match self.find(path).map(|node| &node.value) {
             Some(Value::Array(items)) => items.len(),
             _ => 0,
@@ -93,18 +93,18 @@ impl Node {
     }
 
     /// What stands under `path` as a `T`; `None` if nothing does, or something else.
-    pub fn read<T: DeserializeOwned>(&self, path: &str) -> Option<T> {
+    pub(crate) fn read<T: DeserializeOwned>(&self, path: &str) -> Option<T> {
         T::deserialize(self.find(path)?.plain()).ok()
     }
 
     /// The choice of this name under `path` as a `T`, whatever stands beside it.
-    pub fn read_choice<T: DeserializeOwned>(&self, path: &str, name: &str) -> Option<T> {
+    pub(crate) fn read_choice<T: DeserializeOwned>(&self, path: &str, name: &str) -> Option<T> {
         let chosen = self.find(path)?.child(name)?.plain();
         T::deserialize(toml::Value::Table([(name.to_owned(), chosen)].into_iter().collect())).ok()
     }
 
     /// The value without its places.
-    pub fn plain(&self) -> toml::Value {
+    pub(crate) fn plain(&self) -> toml::Value {
         match &self.value {
             Value::Text(text) => toml::Value::String(text.clone()),
             Value::Integer(number) => toml::Value::Integer(*number),

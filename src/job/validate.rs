@@ -9,7 +9,7 @@ use super::source::{Node, Value};
 use crate::laws::{expression::Expression, nearest::nearest};
 
 /// What is wrong with the document by itself, before keys are held against each other.
-pub fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
+pub(super) fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
     let mut walk = Walk { kind, text, faults: Vec::new() };
     walk.value(root, kind.root(), "");
     walk.faults

@@ -35,7 +35,7 @@ pub(super) struct Body<const D: usize> {
 
 impl<const D: usize> Skeleton<D> {
     /// The free motions of each body that can move, in words.
-    pub fn free_motions(mut self) -> Vec<String> {
+    pub(super) fn free_motions(mut self) -> Vec<String> {
         let mut loose: Vec<usize> = (0..self.bodies.len()).collect();
         loop {
             let before = loose.len();
@@ -78,7 +78,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// The displacement component of a unit motion at a point.
-    pub fn row(&self, component: usize, point: &Vector<D>) -> Motion {
+    pub(super) fn row(&self, component: usize, point: &Vector<D>) -> Motion {
         let from_centre = add_scaled(point, -1.0, &self.centre);
         let mut at = [0.0; 3];
         for i in 0..D {
@@ -92,7 +92,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// The displacement along a direction of a unit motion at a point.
-    pub fn row_along(&self, direction: &Vector<D>, point: &Vector<D>) -> Motion {
+    pub(super) fn row_along(&self, direction: &Vector<D>, point: &Vector<D>) -> Motion {
         let rows = direction.iter().enumerate();
         rows.fold([0.0; 6], |sum, (i, share)| add_scaled(&sum, *share, &self.row(i, point)))
     }

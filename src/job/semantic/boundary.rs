@@ -16,7 +16,7 @@ fn names_in(root: &Node, table: &str) -> Vec<(String, String)> {
 }
 
 /// Whatever the mesh.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     for table in TABLES {
         for entry in items(root, table) {
@@ -37,7 +37,7 @@ pub fn check(findings: &mut Findings<'_>) {
 }
 
 /// No string twice in the list under `path`.
-pub fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
+pub(super) fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
     let mut seen = Vec::new();
     for key in items(findings.root, path) {
         let Some(name) = findings.root.read::<String>(&key) else { continue };
@@ -93,7 +93,7 @@ fn holds_all(fix: Option<Fix>, root: &Node) -> bool {
 }
 
 /// What depends on dimension and names of the mesh.
-pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     for table in TABLES {
         for (path, name) in names_in(root, table) {
@@ -116,7 +116,7 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
 }
 
 /// `name` must be one of `known`.
-pub fn check_name(findings: &mut Findings<'_>, path: &str, name: &str, known: &[&str], what: &str) {
+pub(super) fn check_name(findings: &mut Findings<'_>, path: &str, name: &str, known: &[&str], what: &str) {
     if known.contains(&name) || name.is_empty() {
         return;
     }
@@ -131,7 +131,7 @@ pub fn check_name(findings: &mut Findings<'_>, path: &str, name: &str, known: &[
 }
 
 /// One component an axis, and no z in 2D.
-pub fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: usize) {
+pub(super) fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: usize) {
     let root = findings.root;
     let Some(Value::Array(components)) = root.find(path).map(|node| &node.value) else { return };
     if components.len() != dimension {
@@ -144,7 +144,7 @@ pub fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: usize) {
 }
 
 /// An expression of a 2D body has no z.
-pub fn check_flat(findings: &mut Findings<'_>, path: &str, dimension: usize) {
+pub(super) fn check_flat(findings: &mut Findings<'_>, path: &str, dimension: usize) {
     let scalar: Option<Scalar> = findings.root.read(path);
     if dimension == 2 && scalar.is_some_and(|scalar| scalar.uses(Variable::Z)) {
         findings.fault(path, "a 2D body has no z", "use t, x and y only");

@@ -8,7 +8,7 @@ use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
 use crate::laws::expression::Scalar;
 
 /// Whatever the mesh.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     let tables: Vec<ContactTable> =
         items(root, "contact").into_iter().map(|path| table(root, path)).collect();
@@ -101,7 +101,7 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
 }
 
 /// What depends on the dimension.
-pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     for contact in items(findings.root, "contact") {
         let normal: Option<NormalLaw> = findings.root.read(&format!("{contact}.normal"));
         if let Some(gap) = normal.and_then(|law| law.gap_key()) {

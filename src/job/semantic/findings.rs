@@ -15,7 +15,7 @@ pub struct MeshNames<'a> {
 }
 
 /// Faults and warnings found so far.
-pub struct Findings<'a> {
+pub(crate) struct Findings<'a> {
     pub(super) root: &'a Node,
     /// What the job is refused for.
     pub faults: Vec<Fault>,

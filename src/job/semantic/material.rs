@@ -13,7 +13,7 @@ fn materials(findings: &Findings<'_>) -> Vec<String> {
 }
 
 /// Whatever the dimension.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     for path in materials(findings) {
         let Some(material) = root.find(&path) else { continue };
@@ -55,7 +55,7 @@ pub fn check(findings: &mut Findings<'_>) {
 }
 
 /// Cells that no region names are of the main material, which may be empty where there are none.
-pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
+pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     let names: Vec<String> =
         items(root, "region").into_iter().filter_map(|r| root.read(&format!("{r}.name"))).collect();
@@ -69,7 +69,7 @@ pub fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
 }
 
 /// What depends on the dimension.
-pub fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
+pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
     let root = findings.root;
     let hypothesis: Option<Hypothesis> = root.read("material.hypothesis");
     let given = root.find("material.hypothesis").is_some();

@@ -14,7 +14,7 @@ const CUBOID: MeshNames<'static> = MeshNames {
 };
 
 /// The names of a generated mesh; `None` for a file, or if the job leaves it open which it is.
-pub fn generated(root: &Node) -> Option<MeshNames<'static>> {
+pub(super) fn generated(root: &Node) -> Option<MeshNames<'static>> {
     let present = |key: &str| root.find(key).is_some();
     match (present("mesh.rectangle"), present("mesh.box"), present("mesh.file")) {
         (true, false, false) => Some(RECTANGLE),
@@ -24,7 +24,7 @@ pub fn generated(root: &Node) -> Option<MeshNames<'static>> {
 }
 
 /// Whatever is said about a generated mesh.
-pub fn check(findings: &mut Findings<'_>) {
+pub(super) fn check(findings: &mut Findings<'_>) {
     check_count(findings);
     check_grading(findings, "mesh.rectangle.grading", RECTANGLE, &["x", "y"]);
     check_grading(findings, "mesh.box.grading", CUBOID, &["x", "y", "z"]);

@@ -8,12 +8,13 @@ mod mesh;
 mod output;
 mod time;
 
-pub use findings::{Findings, MeshNames};
+pub(super) use findings::Findings;
+pub use findings::MeshNames;
 
 use super::source::Node;
 
 /// What can be said without the mesh, and with it if it is a generated one.
-pub fn check(root: &Node) -> Findings<'_> {
+pub(super) fn check(root: &Node) -> Findings<'_> {
     let mut findings = Findings::new(root);
     material::check(&mut findings);
     boundary::check(&mut findings);
@@ -28,7 +29,7 @@ pub fn check(root: &Node) -> Findings<'_> {
 }
 
 /// What can be said only once dimension and names of the mesh are known.
-pub fn check_names<'a>(root: &'a Node, names: MeshNames<'_>) -> Findings<'a> {
+pub(super) fn check_names<'a>(root: &'a Node, names: MeshNames<'_>) -> Findings<'a> {
     let mut findings = Findings::new(root);
     check_with_mesh(&mut findings, names);
     findings

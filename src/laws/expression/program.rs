@@ -27,18 +27,18 @@ pub(super) struct Program {
 }
 
 impl Program {
-    pub fn new(instructions: Vec<Instruction>) -> Self {
+    pub(super) fn new(instructions: Vec<Instruction>) -> Self {
         let depth = stack_depth(&instructions);
         Self { instructions: instructions.into(), depth }
     }
 
     /// Whether it contains `variable`.
-    pub fn uses(&self, variable: Variable) -> bool {
+    pub(super) fn uses(&self, variable: Variable) -> bool {
         self.instructions.contains(&Instruction::Variable(variable))
     }
 
     /// Whether one of its functions is piecewise.
-    pub fn has_pieces(&self) -> bool {
+    pub(super) fn has_pieces(&self) -> bool {
         self.instructions.iter().any(|instruction| match instruction {
             Instruction::Unary(function) => function.piece.is_some(),
             Instruction::Binary(function) => function.piece.is_some(),
@@ -47,12 +47,12 @@ impl Program {
     }
 
     /// Value at `time` and `point`.
-    pub fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
+    pub(super) fn evaluate(&self, time: f64, point: &[f64]) -> f64 {
         self.with_stack(|stack| self.run::<false>(stack, time, point).0)
     }
 
     /// A digest of the pieces that determine the value at `time` and `point`.
-    pub fn pieces(&self, time: f64, point: &[f64]) -> u64 {
+    pub(super) fn pieces(&self, time: f64, point: &[f64]) -> u64 {
         self.with_stack(|stack| self.run::<true>(stack, time, point).1)
     }
 
@@ -116,11 +116,11 @@ pub(super) struct Unary {
 }
 
 impl Unary {
-    pub const fn smooth(value: fn(f64) -> f64) -> Self {
+    pub(super) const fn smooth(value: fn(f64) -> f64) -> Self {
         Self { value, piece: None }
     }
 
-    pub const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
+    pub(super) const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
         Self { value, piece: Some(piece) }
     }
 }
@@ -134,11 +134,11 @@ pub(super) struct Binary {
 }
 
 impl Binary {
-    pub const fn smooth(value: fn(f64, f64) -> f64) -> Self {
+    pub(super) const fn smooth(value: fn(f64, f64) -> f64) -> Self {
         Self { value, piece: None }
     }
 
-    pub const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
+    pub(super) const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
         Self { value, piece: Some(piece) }
     }
 }

@@ -22,7 +22,7 @@ const SIZES: [sys::PetscInt; 4] = [1, 2, 3, 6];
 impl BlockProduct {
     /// A shell matrix with the products of this matrix in compressed rows, with entries stored as `T`. `None`, on all ranks alike,
     /// for other formats and block sizes. Collective.
-    pub fn shell<T: Stored>(matrix: sys::Mat) -> Result<Option<Shell>> {
+    pub(super) fn shell<T: Stored>(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut block = 0;
         // SAFETY: live matrix; PETSc writes a number.
         unsafe { check(sys::MatGetBlockSize(matrix, &mut block))? };

@@ -22,7 +22,7 @@ const SIZES: [[sys::PetscInt; 2]; 4] = [[2, 3], [3, 3], [3, 6], [6, 6]];
 impl BlockTransfer {
     /// A shell matrix with the products of this matrix in compressed rows and of its transpose. `None`, on all ranks alike, for
     /// other formats and block sizes. Collective.
-    pub fn shell(matrix: sys::Mat) -> Result<Option<Shell>> {
+    pub(super) fn shell(matrix: sys::Mat) -> Result<Option<Shell>> {
         let mut blocks = [0; 2];
         let [rows, columns] = &mut blocks;
         // SAFETY: live matrix; PETSc writes numbers.

@@ -21,17 +21,17 @@ pub(super) struct Callback<'a, T: ?Sized> {
 }
 
 impl<'a, T: ?Sized> Callback<'a, T> {
-    pub fn new(target: &'a mut T) -> Self {
+    pub(super) fn new(target: &'a mut T) -> Self {
         Self { target: RefCell::new(target), error: RefCell::new(None), panic: Cell::new(None) }
     }
 
     /// The context that PETSc passes to callbacks; valid while `self` is not moved.
-    pub fn pointer(&self) -> *mut c_void {
+    pub(super) fn pointer(&self) -> *mut c_void {
         ptr::from_ref(self).cast_mut().cast()
     }
 
     /// Runs a callback; stores the first error, or a panic.
-    pub fn run(&self, body: impl FnOnce(&mut T) -> Result<()>) -> sys::PetscErrorCode {
+    pub(super) fn run(&self, body: impl FnOnce(&mut T) -> Result<()>) -> sys::PetscErrorCode {
         match catch_unwind(AssertUnwindSafe(|| body(&mut self.target.borrow_mut()))) {
             Ok(result) => {
                 if let Err(error) = result {
@@ -47,7 +47,7 @@ impl<'a, T: ?Sized> Callback<'a, T> {
     }
 
     /// Resumes a panic, returns the first error.
-    pub fn finish(self) -> Result<()> {
+    pub(super) fn finish(self) -> Result<()> {
         if let Some(panic) = self.panic.take() {
             resume_unwind(panic);
         }

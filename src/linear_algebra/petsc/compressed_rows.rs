@@ -16,7 +16,7 @@ pub(super) struct Parts {
 
 impl Parts {
     /// `None` for other formats, on all ranks alike.
-    pub fn of(matrix: sys::Mat) -> Result<Option<Self>> {
+    pub(super) fn of(matrix: sys::Mat) -> Result<Option<Self>> {
         if is_type(matrix, c"seqaij")? {
             return Ok(Some(Self { own: matrix, others: None }));
         }
@@ -30,7 +30,7 @@ impl Parts {
     }
 
     /// Products with the columns of this matrix that belong to other ranks. Collective.
-    pub fn others(&self, matrix: sys::Mat) -> Result<Option<Others>> {
+    pub(super) fn others(&self, matrix: sys::Mat) -> Result<Option<Others>> {
         self.others.map(|(columns, numbers)| Others::new(matrix, columns, numbers)).transpose()
     }
 }
@@ -190,7 +190,7 @@ impl Others {
 
     /// Adds the product of the transposed columns with `x`, which has the layout of the rows, to `y` on the ranks that own the
     /// columns. Collective.
-    pub fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+    pub(super) fn add_transposed(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         // SAFETY: live vector.
         let mut values = unsafe { DistributedVector::view(self.values.raw.get())? };
         self.entries.transposed(&x.owned()?, &mut values.owned_mut()?);
@@ -209,7 +209,7 @@ impl Others {
     }
 
     /// Bytes of the columns.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         self.entries.bytes()
     }
 }

@@ -17,7 +17,7 @@ pub(super) struct Level {
 
 impl Level {
     /// Bytes moved on this rank by a product of the smoother and a restriction or interpolation; `None` for PETSc's own matrices.
-    pub fn bytes(&self) -> [Option<u64>; 2] {
+    pub(super) fn bytes(&self) -> [Option<u64>; 2] {
         [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
     }
 }

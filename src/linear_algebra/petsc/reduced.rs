@@ -26,7 +26,7 @@ pub(super) struct ReducedMatrix {
 
 impl ReducedMatrix {
     /// Starts with `P = I`, for vectors with the layout of `like`. Collective.
-    pub fn new(constant: &Matrix, like: &DistributedVector, block: usize) -> Result<Self> {
+    pub(super) fn new(constant: &Matrix, like: &DistributedVector, block: usize) -> Result<Self> {
         let owned = like.owned()?.len() / block;
         let first = first_node(constant, block)?;
         let mut others = BTreeSet::new();
@@ -60,7 +60,10 @@ impl ReducedMatrix {
     }
 
     /// Reads the current projection; returns whether the matrix was computed for another one. Collective.
-    pub fn look(&mut self, mut project: impl FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
+    pub(super) fn look(
+        &mut self,
+        mut project: impl FnMut(&mut DistributedVector) -> Result<()>,
+    ) -> Result<bool> {
         let mut changed = false;
         for (i, column) in self.columns.iter_mut().enumerate() {
             write_unit(column, i, self.block)?;
@@ -71,7 +74,7 @@ impl ReducedMatrix {
     }
 
     /// Discards the projection for which the matrix was computed.
-    pub fn forget(&mut self) -> Result<()> {
+    pub(super) fn forget(&mut self) -> Result<()> {
         for (i, made) in self.made_for.iter_mut().enumerate() {
             write_unit(made, i, self.block)?;
         }
@@ -79,7 +82,7 @@ impl ReducedMatrix {
     }
 
     /// Dimension of the complement of the projection that was last read. Collective.
-    pub fn removed(&self) -> Result<f64> {
+    pub(super) fn removed(&self) -> Result<f64> {
         let mut left = 0.0;
         for column in &self.columns {
             left += column.norm()?.powi(2);
@@ -88,7 +91,7 @@ impl ReducedMatrix {
     }
 
     /// Computes the matrix for the projection that was last read. Collective.
-    pub fn make(&mut self, constant: &Matrix) -> Result<()> {
+    pub(super) fn make(&mut self, constant: &Matrix) -> Result<()> {
         for (made, column) in self.made_for.iter_mut().zip(&self.columns) {
             made.copy_from(column)?;
         }

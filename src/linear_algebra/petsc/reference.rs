@@ -18,7 +18,7 @@ impl<T> Reference<T> {
     ///
     /// # Safety
     /// `T` is a class of PETSc's. `create` fails, or writes a reference to a live object that nothing else gives back.
-    pub unsafe fn new(create: impl FnOnce(*mut *mut T) -> sys::PetscErrorCode) -> Result<Self> {
+    pub(super) unsafe fn new(create: impl FnOnce(*mut *mut T) -> sys::PetscErrorCode) -> Result<Self> {
         let started = started()?;
         let mut raw = ptr::null_mut();
         check(create(&mut raw))?;
@@ -29,7 +29,7 @@ impl<T> Reference<T> {
     ///
     /// # Safety
     /// `object` is a live object of PETSc's.
-    pub unsafe fn to(object: *mut T) -> Result<Self> {
+    pub(super) unsafe fn to(object: *mut T) -> Result<Self> {
         // SAFETY: PETSc counts one reference more, which the handle owns.
         unsafe {
             Self::new(|raw| {
@@ -40,7 +40,7 @@ impl<T> Reference<T> {
     }
 
     /// The object, alive for as long as this handle.
-    pub fn get(&self) -> *mut T {
+    pub(super) fn get(&self) -> *mut T {
         self.raw
     }
 }

@@ -34,7 +34,7 @@ type Multiply = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::Petsc
 
 impl Shell {
     /// A shell with the layout of `matrix`. After this handle is dropped, products with the shell are errors. Collective.
-    pub fn new(matrix: sys::Mat, action: Box<dyn Action>) -> Result<Self> {
+    pub(super) fn new(matrix: sys::Mat, action: Box<dyn Action>) -> Result<Self> {
         let action = Box::new(action);
         let (mut rows, mut columns, mut blocks) = (0, 0, [0; 2]);
         let [high, wide] = &mut blocks;
@@ -54,7 +54,7 @@ impl Shell {
     }
 
     /// Least number of bytes that a product moves on this rank.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         self.action.bytes()
     }
 }

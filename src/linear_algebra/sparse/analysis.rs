@@ -28,26 +28,26 @@ pub(super) struct Supernodes<'a> {
 }
 
 impl<'a> Supernodes<'a> {
-    pub fn len(self) -> usize {
+    pub(super) fn len(self) -> usize {
         self.columns.len() - 1
     }
 
-    pub fn columns(self, node: usize) -> Range<usize> {
+    pub(super) fn columns(self, node: usize) -> Range<usize> {
         self.columns[node] as usize..self.columns[node + 1] as usize
     }
 
     /// The rows of a supernode; the first ones are those of its own columns.
-    pub fn rows(self, node: usize) -> &'a [sys::PetscInt] {
+    pub(super) fn rows(self, node: usize) -> &'a [sys::PetscInt] {
         &self.rows[self.rows_at[node] as usize..self.rows_at[node + 1] as usize]
     }
 
     /// Positions of the values of a supernode: column after column, each with all rows of the supernode.
-    pub fn panel(self, node: usize) -> Range<usize> {
+    pub(super) fn panel(self, node: usize) -> Range<usize> {
         self.values_at[node] as usize..self.values_at[node + 1] as usize
     }
 
     /// Number of entries of the factor, without those above the diagonal in the panels, and sum of the rows of all supernodes.
-    pub fn counts(self) -> [u64; 2] {
+    pub(super) fn counts(self) -> [u64; 2] {
         let mut counts = [0; 2];
         for node in 0..self.len() {
             let (columns, rows) = (self.columns(node).len() as u64, self.rows(node).len() as u64);
@@ -70,7 +70,7 @@ const DISSECTED: usize = 2_000;
 impl Analysis {
     /// Analyses the matrix of these block rows, given by its lower half, in a known order of elimination or in one with these
     /// unknowns last. `None` where CHOLMOD moves them: the other unknowns do not couple them.
-    pub fn new(
+    pub(super) fn new(
         block: usize,
         rows: &BlockRows,
         matrix: &mut sys::cholmod_sparse,
@@ -153,7 +153,7 @@ impl Analysis {
         Ok(order)
     }
 
-    pub fn supernodes(&self) -> Supernodes<'_> {
+    pub(super) fn supernodes(&self) -> Supernodes<'_> {
         // SAFETY: a supernodal factor; the lengths of its arrays are those that CHOLMOD documents.
         unsafe {
             let factor = &*self.factor;
@@ -170,7 +170,7 @@ impl Analysis {
         }
     }
 
-    pub fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         match self.common.status {
             status if status >= 0 => Ok(()),
             status if status == sys::CHOLMOD_OUT_OF_MEMORY => Err(Error::Failed(

@@ -12,7 +12,7 @@ pub(super) struct DoubleFactor {
 
 impl DoubleFactor {
     /// Factors the matrix that was analysed.
-    pub fn new(analysis: &mut Analysis, matrix: &mut sys::cholmod_sparse) -> Result<Self> {
+    pub(super) fn new(analysis: &mut Analysis, matrix: &mut sys::cholmod_sparse) -> Result<Self> {
         let size = analysis.order.len();
         let common = &mut *analysis.common;
         let kind = sys::CHOLMOD_REAL as c_int;
@@ -38,7 +38,7 @@ impl DoubleFactor {
     }
 
     /// The values of the factor.
-    pub fn values(analysis: &Analysis) -> &[f64] {
+    pub(super) fn values(analysis: &Analysis) -> &[f64] {
         // SAFETY: CHOLMOD has allocated so many numbers there.
         unsafe {
             let factor = &*analysis.factor;
@@ -46,7 +46,7 @@ impl DoubleFactor {
         }
     }
 
-    pub fn forward(&mut self, analysis: &mut Analysis, right_hand_side: &[f64]) -> Result<()> {
+    pub(super) fn forward(&mut self, analysis: &mut Analysis, right_hand_side: &[f64]) -> Result<()> {
         // SAFETY: the handle owns as many numbers as unknowns there.
         let given =
             unsafe { std::slice::from_raw_parts_mut((*self.given).x.cast::<f64>(), analysis.order.len()) };
@@ -56,7 +56,7 @@ impl DoubleFactor {
     }
 
     /// The result of the forward substitution from position `first` on.
-    pub fn tail_mut(&mut self, analysis: &Analysis, first: usize) -> &mut [f64] {
+    pub(super) fn tail_mut(&mut self, analysis: &Analysis, first: usize) -> &mut [f64] {
         if self.halfway.is_null() {
             return &mut [];
         }
@@ -67,7 +67,7 @@ impl DoubleFactor {
         }
     }
 
-    pub fn backward(&mut self, analysis: &mut Analysis, solution: &mut [f64]) -> Result<()> {
+    pub(super) fn backward(&mut self, analysis: &mut Analysis, solution: &mut [f64]) -> Result<()> {
         self.half(analysis, sys::CHOLMOD_Lt as c_int, false)?;
         // SAFETY: as in `forward`.
         let found =
@@ -98,7 +98,7 @@ impl DoubleFactor {
     }
 
     /// Frees the vectors.
-    pub fn free(&mut self, common: &mut sys::cholmod_common) {
+    pub(super) fn free(&mut self, common: &mut sys::cholmod_common) {
         for dense in self.work.iter_mut().chain([&mut self.given, &mut self.halfway]) {
             // SAFETY: the handle owns it; CHOLMOD takes null pointers and leaves one.
             unsafe { cholmod::cholmod_free_dense(dense, common) };

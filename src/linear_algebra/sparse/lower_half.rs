@@ -12,7 +12,7 @@ pub(super) struct Lower {
 impl Lower {
     /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on. Zeros are left out: held
     /// components are coupled to nothing.
-    pub fn of(block: usize, rows: &BlockRows) -> Result<Self> {
+    pub(super) fn of(block: usize, rows: &BlockRows) -> Result<Self> {
         let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
         let too_many = |_| {
             Error::Refused(format!(
@@ -47,12 +47,12 @@ impl Lower {
     }
 
     /// Stored entries.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.indices.len()
     }
 
     /// Column, row and value of each entry.
-    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+    pub(super) fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         self.starts.windows(2).enumerate().flat_map(|(column, range)| {
             let range = range[0] as usize..range[1] as usize;
             let rows = self.indices[range.clone()].iter().map(|&row| row as usize);
@@ -60,7 +60,7 @@ impl Lower {
         })
     }
 
-    pub fn view(&mut self) -> sys::cholmod_sparse {
+    pub(super) fn view(&mut self) -> sys::cholmod_sparse {
         view(self.starts.len() - 1, &mut self.starts, &mut self.indices, Some(&mut self.values))
     }
 }

@@ -28,7 +28,7 @@ const NONE: u32 = u32::MAX;
 
 impl SingleFactor {
     /// Factors the matrix that was analysed; `None` where it is not positive definite in single precision.
-    pub fn new(analysis: &Analysis, lower: &Lower, last: usize) -> Option<Self> {
+    pub(super) fn new(analysis: &Analysis, lower: &Lower, last: usize) -> Option<Self> {
         let (order, nodes) = (&analysis.order, analysis.supernodes());
         let columns = Columns::of(order, lower)?;
         let mut values = vec![0.0; (0..nodes.len()).map(|node| nodes.panel(node).len()).sum()];
@@ -45,7 +45,7 @@ impl SingleFactor {
         })
     }
 
-    pub fn forward(&mut self, analysis: &Analysis, right_hand_side: &[f64]) {
+    pub(super) fn forward(&mut self, analysis: &Analysis, right_hand_side: &[f64]) {
         let scaled = |(&unknown, scale): (&u32, &f64)| right_hand_side[unknown as usize] * scale;
         let places = analysis.order.iter().zip(&self.scales);
         let largest = places.clone().map(|place| scaled(place).abs()).fold(0.0, f64::max);
@@ -72,7 +72,7 @@ impl SingleFactor {
         }
     }
 
-    pub fn backward(&mut self, analysis: &Analysis, solution: &mut [f64]) {
+    pub(super) fn backward(&mut self, analysis: &Analysis, solution: &mut [f64]) {
         let first = self.vector.len() - self.last.len();
         for (last, value) in self.last.iter().zip(&mut self.vector[first..]) {
             *value = (last / self.size) as f32;

@@ -31,7 +31,7 @@ pub(crate) struct ScalarRows<'a> {
 }
 
 impl<'a> ScalarRows<'a> {
-    pub fn row(self, row: usize) -> impl Iterator<Item = (usize, f64)> + 'a {
+    pub(crate) fn row(self, row: usize) -> impl Iterator<Item = (usize, f64)> + 'a {
         let range = self.starts[row] as usize..self.starts[row + 1] as usize;
         self.columns[range.clone()]
             .iter()

@@ -64,7 +64,7 @@ pub(super) struct Bisection<const D: usize> {
 
 impl<const D: usize> Bisection<D> {
     /// Refused where there are fewer bricks than parts.
-    pub fn new(bricks: [usize; D], parts: usize) -> Result<Self> {
+    pub(super) fn new(bricks: [usize; D], parts: usize) -> Result<Self> {
         let count: usize = bricks.iter().product();
         if count < parts {
             return Err(Error::Refused(format!(
@@ -76,12 +76,12 @@ impl<const D: usize> Bisection<D> {
     }
 
     /// The box of a part.
-    pub fn range(&self, part: usize) -> [Range<usize>; D] {
+    pub(super) fn range(&self, part: usize) -> [Range<usize>; D] {
         self.descend(|_, _, first_high| part < first_high).1
     }
 
     /// The part of a brick.
-    pub fn part_of(&self, brick: [usize; D]) -> usize {
+    pub(super) fn part_of(&self, brick: [usize; D]) -> usize {
         self.descend(|axis, cut, _| brick[axis] < cut).0
     }
 

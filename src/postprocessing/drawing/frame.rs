@@ -22,7 +22,7 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Fits these ranges in m, horizontal and vertical, into the frame, with space on the right.
-    pub fn around(ranges: [(f64, f64); 2], right: f64) -> Self {
+    pub(super) fn around(ranges: [(f64, f64); 2], right: f64) -> Self {
         let [(left, width), (bottom, height)] =
             ranges.map(|(low, high)| (low, (high - low).max(f64::MIN_POSITIVE)));
         let below = 3.2 * LETTERS;
@@ -34,7 +34,7 @@ impl Frame {
     }
 
     /// Position of a point, in m, in the drawing.
-    pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
+    pub(super) fn place(&self, point: [f64; 2]) -> [f64; 2] {
         let floor = self.height - 3.2 * LETTERS;
         [LEFT + self.zoom * (point[0] - self.low[0]), floor - self.zoom * (point[1] - self.low[1])]
     }
@@ -45,7 +45,7 @@ impl Frame {
     }
 
     /// Axes with these names in a 2D drawing.
-    pub fn axes(&self, names: [&str; 2]) -> String {
+    pub(super) fn axes(&self, names: [&str; 2]) -> String {
         // Writing to a String cannot fail.
         let mut out = String::new();
         let floor = self.height - 3.2 * LETTERS;

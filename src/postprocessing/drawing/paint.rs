@@ -19,7 +19,7 @@ const RESOLUTION: f64 = 2.0;
 
 /// A triangle of the drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Triangle {
+pub(super) struct Triangle {
     /// Its corners.
     pub corners: [[f64; 2]; 3],
     /// Its fill colour.

@@ -19,7 +19,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// A linear scale for these values; its ends are round numbers if `round`, otherwise the extreme values.
-    pub fn linear(values: impl Iterator<Item = f64>, round: bool) -> Self {
+    pub(super) fn linear(values: impl Iterator<Item = f64>, round: bool) -> Self {
         let (mut low, mut high) = extent(values).unwrap_or((0.0, 1.0));
         if high - low <= 1e-12 * low.abs().max(high.abs()) {
             let room = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
@@ -41,7 +41,7 @@ impl Scale {
     }
 
     /// A logarithmic scale for these values; values that are not positive are ignored.
-    pub fn logarithmic(values: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn logarithmic(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values.filter(|v| *v > 0.0)).unwrap_or((1e-16, 1.0));
         let low = (low.log10() + 1e-9).floor();
         let high = (high.log10() - 1e-9).ceil().max(low + 1.0);
@@ -52,13 +52,13 @@ impl Scale {
     }
 
     /// Position of a value, in shown units; none for values that the scale cannot show.
-    pub fn place(&self, value: f64) -> Option<f64> {
+    pub(super) fn place(&self, value: f64) -> Option<f64> {
         let shown = if self.logarithmic { value.log10() } else { value * self.factor };
         shown.is_finite().then_some(shown)
     }
 
     /// The label of a quantity with its unit in this scale.
-    pub fn words(&self, quantity: &str, unit: &str) -> String {
+    pub(super) fn words(&self, quantity: &str, unit: &str) -> String {
         match (&self.power, unit) {
             (None, "") => quantity.to_owned(),
             (None, unit) if unit.contains('/') && !unit.starts_with('√') => {

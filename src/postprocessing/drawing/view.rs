@@ -138,12 +138,12 @@ pub(super) enum View {
 
 impl View {
     /// The view of a body of this dimension.
-    pub fn of(snapshot: &Snapshot) -> Self {
+    pub(super) fn of(snapshot: &Snapshot) -> Self {
         if snapshot.dimension() == 2 { Self::Plane } else { Self::Oblique }
     }
 
     /// Coordinates to the right, upwards, and toward the viewer.
-    pub fn project(self, point: [f64; 3]) -> [f64; 3] {
+    pub(super) fn project(self, point: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Plane => point,
             Self::Oblique => {
@@ -155,7 +155,7 @@ impl View {
     }
 
     /// Intensity of light on a face with these corners, from 0 to 1; none if it faces away from the viewer.
-    pub fn light(self, [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
+    pub(super) fn light(self, [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
         if self == Self::Plane {
             return Some(1.0);
         }

@@ -48,7 +48,7 @@ pub(super) struct Found {
 
 impl Found {
     /// Reads the available files. A folder that does not belong to a run is refused.
-    pub fn read(folder: &Path) -> Result<Self> {
+    pub(super) fn read(folder: &Path) -> Result<Self> {
         refuse_what_is_no_run(folder)?;
         let mut found = Self { folder: folder.to_owned(), ..Self::default() };
         found.text = found.take("job.toml", "the job, its contact laws and tolerances", |path| {
@@ -78,7 +78,7 @@ impl Found {
     }
 
     /// 2 or 3, if it is known.
-    pub fn dimension(&self) -> Option<usize> {
+    pub(super) fn dimension(&self) -> Option<usize> {
         let summary = self.summary.as_ref().and_then(|summary| summary.get("dimension")?.as_u64());
         summary.map(|d| d as usize).or_else(|| self.snapshot.as_ref().map(Snapshot::dimension))
     }

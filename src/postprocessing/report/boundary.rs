@@ -62,7 +62,7 @@ pub(super) struct Laws {
 
 impl<'a> Boundary<'a> {
     /// The profile with this name, and the laws on its boundary.
-    pub fn new(
+    pub(super) fn new(
         profiles: &Table,
         name: &'a str,
         laws: Option<&'a Laws>,
@@ -101,7 +101,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// All pictures: quantities along the boundary (on its surface in 3D), and its nodes on the graph of the law.
-    pub fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Vec<Picture>> {
+    pub(super) fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Vec<Picture>> {
         let mut out = Vec::new();
         let columns: Vec<&String> = self.table.header().iter().filter(|name| is_quantity(name)).collect();
         for column in ["normal_velocity", "contact_pressure", "normal_displacement"] {
@@ -119,7 +119,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// The number of nodes on each branch of the law, as a table.
-    pub fn branch_table(&self) -> String {
+    pub(super) fn branch_table(&self) -> String {
         let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return String::new() };
         let rows = law.branches().into_iter().enumerate().map(|(at, branch)| {
             let count = on.iter().filter(|other| **other == at).count();
@@ -325,7 +325,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// The deformed mesh of a 2D body with the boundary's normal velocity and contact pressure as arrows.
-    pub fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
+    pub(super) fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
         let Some(Behind { nodes, normals, .. }) =
             self.behind.as_ref().filter(|behind| behind.nodes.len() > 1)
         else {

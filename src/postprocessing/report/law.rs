@@ -18,19 +18,19 @@ pub(super) struct Law {
 
 impl Law {
     /// The law of a contact of a job.
-    pub fn of(contact: &Contact) -> Result<Self> {
+    pub(super) fn of(contact: &Contact) -> Result<Self> {
         let (law, gap) = normal_law(contact)?;
         let gap = law.depends_on_displacement().then_some(gap);
         Ok(Self { law, gap })
     }
 
     /// The quantity on which the pressure depends, and its unit.
-    pub fn quantity(&self) -> (&'static str, &'static str) {
+    pub(super) fn quantity(&self) -> (&'static str, &'static str) {
         if self.gap.is_some() { ("penetration", "m") } else { ("normal velocity", "m/s") }
     }
 
     /// The value of that quantity at a node with this outward normal; NaN where there is no gap.
-    pub fn abscissa(
+    pub(super) fn abscissa(
         &self,
         time: f64,
         (point, normal): (&[f64; 3], &[f64; 3]),
@@ -43,7 +43,7 @@ impl Law {
 
     /// Velocity in m/s of the obstacle's material at the point where the normal of a node meets it, at the end of a step of this
     /// length; zero if it is unknown.
-    pub fn obstacle_velocity(
+    pub(super) fn obstacle_velocity(
         &self,
         time: f64,
         length: f64,
@@ -58,17 +58,17 @@ impl Law {
     }
 
     /// Whether the law depends on the normals of the nodes.
-    pub fn needs_normals(&self) -> bool {
+    pub(super) fn needs_normals(&self) -> bool {
         self.gap.as_ref().is_some_and(|gap| !matches!(gap, Gap::Distance(_)))
     }
 
     /// Descriptions of its branches, from left to right.
-    pub fn branches(&self) -> Vec<Branch> {
+    pub(super) fn branches(&self) -> Vec<Branch> {
         self.law.branches(number)
     }
 
     /// The branch of each of these nodes, given by abscissa and pressure.
-    pub fn branches_of(&self, nodes: &[[f64; 2]]) -> Vec<usize> {
+    pub(super) fn branches_of(&self, nodes: &[[f64; 2]]) -> Vec<usize> {
         let all = || self.law.corners().iter().chain(nodes);
         let reach = |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let steep = reach(1) / reach(0);
@@ -82,7 +82,7 @@ impl Law {
     }
 
     /// The graph over a range slightly larger than that of the nodes, as a line through these points.
-    pub fn line(&self, nodes: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    pub(super) fn line(&self, nodes: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let all = || self.law.corners().iter().chain(nodes);
         let along = |axis: usize| {
             let (low, high) = extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0));

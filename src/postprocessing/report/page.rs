@@ -19,12 +19,12 @@ pub(super) struct Page {
 
 impl Page {
     /// An empty page; `head` is HTML before all sections.
-    pub fn new(title: &str, head: String) -> Self {
+    pub(super) fn new(title: &str, head: String) -> Self {
         Self { title: title.to_owned(), head, ..Self::default() }
     }
 
     /// Adds a section of HTML and pictures; an empty section is omitted.
-    pub fn section(&mut self, heading: &str, html: &str, pictures: Vec<Picture>) {
+    pub(super) fn section(&mut self, heading: &str, html: &str, pictures: Vec<Picture>) {
         if html.is_empty() && pictures.is_empty() {
             return;
         }
@@ -49,12 +49,12 @@ impl Page {
     }
 
     /// The pictures, each once.
-    pub fn pictures(&self) -> &[Picture] {
+    pub(super) fn pictures(&self) -> &[Picture] {
         &self.pictures
     }
 
     /// The complete document.
-    pub fn html(&self, made_by: &str) -> String {
+    pub(super) fn html(&self, made_by: &str) -> String {
         let title = escape(&self.title);
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<title>{title}</title>\n\

@@ -15,7 +15,7 @@ pub(super) struct Table {
 impl Table {
     /// Reads a table whose column `named`, if it has one, contains text and all others numbers. An incomplete last row, left by a
     /// run that was interrupted, is ignored.
-    pub fn read(path: &Path, named: &str) -> Result<Self> {
+    pub(super) fn read(path: &Path, named: &str) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
         Self::parse(&text, named).map_err(|words| Error::unreadable(path, words))
     }
@@ -56,34 +56,34 @@ impl Table {
     }
 
     /// Names of the columns.
-    pub fn header(&self) -> &[String] {
+    pub(super) fn header(&self) -> &[String] {
         &self.header
     }
 
     /// Whether it has no rows.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Number of rows.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// The column with this name, if there is one.
-    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+    pub(super) fn column(&self, name: &str) -> Option<Vec<f64>> {
         let at = self.header.iter().position(|column| column == name)?;
         Some(self.rows.iter().map(|row| row[at]).collect())
     }
 
     /// Points of one column as a function of another.
-    pub fn curve(&self, x: &str, y: &str) -> Vec<[f64; 2]> {
+    pub(super) fn curve(&self, x: &str, y: &str) -> Vec<[f64; 2]> {
         let (x, y) = (self.column(x).unwrap_or_default(), self.column(y).unwrap_or_default());
         x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()
     }
 
     /// The entries of the text column, each once, in order.
-    pub fn names(&self) -> Vec<String> {
+    pub(super) fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for word in &self.words {
             if names.last() != Some(word) && !names.contains(word) {
@@ -94,12 +94,12 @@ impl Table {
     }
 
     /// The rows with this entry.
-    pub fn of(&self, name: &str) -> Self {
+    pub(super) fn of(&self, name: &str) -> Self {
         self.filtered(|at| self.words[at] == name)
     }
 
     /// The rows with the largest number in this column.
-    pub fn last(&self, column: &str) -> Self {
+    pub(super) fn last(&self, column: &str) -> Self {
         let values = self.column(column).unwrap_or_default();
         let last = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         self.filtered(|at| values.get(at) == Some(&last))
@@ -110,7 +110,7 @@ impl Table {
     }
 
     /// The rows with these numbers, in this order.
-    pub fn picked(&self, rows: &[usize]) -> Self {
+    pub(super) fn picked(&self, rows: &[usize]) -> Self {
         Self {
             header: self.header.clone(),
             rows: rows.iter().map(|at| self.rows[*at].clone()).collect(),

@@ -75,7 +75,7 @@ pub struct Seconds {
 }
 
 /// A finished run.
-pub struct Ran {
+pub(super) struct Ran {
     /// Its record.
     pub record: Record,
     /// Whether an earlier study left it.
@@ -83,7 +83,7 @@ pub struct Ran {
 }
 
 /// The seconds of the best or the median repetition.
-pub fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
+pub(super) fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
     let mut all = record.seconds.clone();
     all.sort_by(|a, b| a.computing.total_cmp(&b.computing));
     match take {

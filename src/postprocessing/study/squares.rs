@@ -25,21 +25,21 @@ impl Squares {
 }
 
 /// The value of a linear field where corners have these shares.
-pub fn mix<const D: usize>(corners: &[Vector<D>; 4], shares: &[f64; 4]) -> Vector<D> {
+pub(super) fn mix<const D: usize>(corners: &[Vector<D>; 4], shares: &[f64; 4]) -> Vector<D> {
     std::array::from_fn(|i| corners.iter().zip(shares).map(|(corner, share)| share * corner[i]).sum())
 }
 
 /// The symmetric part of a gradient as a stored tensor.
-pub fn symmetric<const D: usize>(gradient: &[[f64; D]; D]) -> [f64; 6] {
+pub(super) fn symmetric<const D: usize>(gradient: &[[f64; D]; D]) -> [f64; 6] {
     PLACES.map(|(i, j)| if i < D && j < D { 0.5 * (gradient[i][j] + gradient[j][i]) } else { 0.0 })
 }
 
 /// The difference of two stored tensors.
-pub fn minus(a: &[f64; 6], b: &[f64; 6]) -> [f64; 6] {
+pub(super) fn minus(a: &[f64; 6], b: &[f64; 6]) -> [f64; 6] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
 /// `t : t` of a stored tensor.
-pub fn tensor_square(tensor: &[f64; 6]) -> f64 {
+pub(super) fn tensor_square(tensor: &[f64; 6]) -> f64 {
     tensor.iter().zip(TWICE).map(|(value, times)| times * value * value).sum()
 }

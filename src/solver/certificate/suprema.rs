@@ -48,7 +48,7 @@ pub(super) struct Suprema<'a, const D: usize, const S: usize> {
 }
 
 impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
-    pub fn new(
+    pub(super) fn new(
         session: &'a Session,
         body: &'a Body<D, S>,
         state: &'a State,
@@ -58,7 +58,7 @@ impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
     }
 
     /// Approaches the supremum from below. Collective.
-    pub fn find(&mut self, supremum: Supremum) -> Result<f64> {
+    pub(super) fn find(&mut self, supremum: Supremum) -> Result<f64> {
         let (session, body, state) = (self.session, self.body, self.state);
         let mut pencil = Pencil { body, scheme: &mut *self.scheme, supremum };
         if supremum == Supremum::ExplicitStep {

@@ -24,14 +24,14 @@ pub(super) struct Bounded {
 
 impl Bounded {
     /// A solver for velocities with the layout of `like`.
-    pub fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
+    pub(super) fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
         let (lower, upper, residual) = (like.like()?, like.like()?, like.like()?);
         Ok(Self { snes: BoundedSnes::new("bounds_", like)?, settings, lower, upper, residual })
     }
 
     /// Solves for the velocity `trial`, starting from its values, and sets the pressures of the contacts; returns the iterations.
     /// Collective.
-    pub fn solve<const D: usize, const S: usize>(
+    pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
@@ -75,7 +75,7 @@ impl Bounded {
     }
 
     /// The residual of the equations of motion at the end of the last solve, in N.
-    pub fn residual(&self) -> &DistributedVector {
+    pub(super) fn residual(&self) -> &DistributedVector {
         &self.residual
     }
 }

@@ -118,7 +118,7 @@ impl Refinement {
 
 impl Condensed {
     /// A solver for the contacts of a body, which numbers their unknowns; the matrix is set by [`Condensed::prepare`]. Collective.
-    pub fn new<const D: usize, const S: usize>(
+    pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         settings: SolverSettings,
@@ -160,7 +160,7 @@ impl Condensed {
     /// graphs; returns whether this succeeded. Stiffness of springs in the rows is subtracted from products with the condensed
     /// matrix. With springs the condensed matrix has too little resistance to rigid motions to choose the parameters; then `matrix`
     /// of the whole body determines them, whose vectors have the layout of `like`. Collective.
-    pub fn prepare<const D: usize, const S: usize>(
+    pub(super) fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -224,12 +224,12 @@ impl Condensed {
     }
 
     /// The precision of the factor in use.
-    pub fn precision_in_use(&mut self) -> Result<Precision> {
+    pub(super) fn precision_in_use(&mut self) -> Result<Precision> {
         Ok(in_use(&mut self.elimination.factored)?.cholesky.precision())
     }
 
     /// Exchanges the factored matrix for another.
-    pub fn exchange(&mut self, other: &mut Option<Factored>) {
+    pub(super) fn exchange(&mut self, other: &mut Option<Factored>) {
         std::mem::swap(&mut self.elimination.factored, other);
         if let Some(factored) = &self.elimination.factored {
             self.newton.scales.clone_from(&factored.scales);
@@ -237,7 +237,7 @@ impl Condensed {
     }
 
     /// `x = K^-1 b`. Collective.
-    pub fn solve_linear(
+    pub(super) fn solve_linear(
         &mut self,
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
@@ -247,13 +247,13 @@ impl Condensed {
     }
 
     /// Restarts the count of traffic.
-    pub fn restart_traffic(&mut self) {
+    pub(super) fn restart_traffic(&mut self) {
         self.elimination.halves = 0;
         self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
     }
 
     /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product.
-    pub fn traffic(&self) -> u64 {
+    pub(super) fn traffic(&self) -> u64 {
         let Elimination { factored, halves, .. } = &self.elimination;
         let of = |factored: &Factored| halves * factored.cholesky.bytes() + factored.condensed.traffic();
         factored.as_ref().map_or(0, of)
@@ -261,7 +261,7 @@ impl Condensed {
 
     /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails with a factor in single precision,
     /// [`Condensed::start_again`] resets `trial`. Collective.
-    pub fn solve<const D: usize, const S: usize>(
+    pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
@@ -351,7 +351,7 @@ impl Condensed {
     }
 
     /// Resets `trial` to the start value of the last step with a factor in single precision.
-    pub fn start_again(&self, trial: &mut DistributedVector) -> Result<()> {
+    pub(super) fn start_again(&self, trial: &mut DistributedVector) -> Result<()> {
         self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
     }
 }

@@ -56,7 +56,7 @@ pub(super) struct Workspace {
 
 impl Workspace {
     /// For these motions of this rank, and this number of motions of all ranks. Collective.
-    pub fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
+    pub(super) fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
         let world = SimpleCommunicator::world();
         let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
         let block_gathering = Gathering::new(&world, pairs)?;
@@ -85,7 +85,7 @@ pub(super) struct Subspace {
 
 impl Subspace {
     /// The whole space, for vectors with the layout of `like`.
-    pub fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
+    pub(super) fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
         let room = like.like()?;
         Ok(RefCell::new(Self { room, made_for: Vec::new(), factor: None, in_use: false }))
     }
@@ -93,7 +93,7 @@ impl Subspace {
 
 impl CondensedMatrix {
     /// Writes a vector of contact nodes with the motions `L x`.
-    pub fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
+    pub(super) fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         workspace.traffic += self.bytes();
         self.times_lower(x, &mut workspace.placed[0]);
@@ -101,7 +101,7 @@ impl CondensedMatrix {
     }
 
     /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
-    pub fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
+    pub(super) fn read_times_upper(&self, vector: &DistributedVector, product: &mut [f64]) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(vector, workspace)?;
         workspace.traffic += self.bytes();
@@ -110,12 +110,12 @@ impl CondensedMatrix {
     }
 
     /// Restarts the count of traffic.
-    pub fn restart_traffic(&self) {
+    pub(super) fn restart_traffic(&self) {
         self.workspace.borrow_mut().traffic = 0;
     }
 
     /// Bytes of `L`, or of the factor on a subspace, that products and solves have read since then.
-    pub fn traffic(&self) -> u64 {
+    pub(super) fn traffic(&self) -> u64 {
         self.workspace.borrow().traffic
     }
 

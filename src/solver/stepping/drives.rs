@@ -39,7 +39,7 @@ struct Drive<const D: usize> {
 
 impl<const D: usize> Drives<D> {
     /// The expressions of a body, in a run to the time `end`. Collective.
-    pub fn of<const S: usize>(session: &Session, body: &Body<D, S>, end: f64) -> Self {
+    pub(super) fn of<const S: usize>(session: &Session, body: &Body<D, S>, end: f64) -> Self {
         let lattice = lattice(session, &body.mesh.nodes);
         let mut all = Vec::new();
         let mut add = |what, values: &[Scalar], is_load: bool| {
@@ -65,7 +65,7 @@ impl<const D: usize> Drives<D> {
 
     /// The first time at which a piece of an expression ends, for a step from `start` that is at least `least` long and does not
     /// pass `last`; `length` is the length of a step. Collective.
-    pub fn first_end(
+    pub(super) fn first_end(
         &self,
         session: &Session,
         [start, last]: [f64; 2],
@@ -95,7 +95,7 @@ impl<const D: usize> Drives<D> {
     }
 
     /// The largest deviation within a step from the linear function between its ends, relative to the largest value. Collective.
-    pub fn departure(&self, session: &Session, step: Step) -> f64 {
+    pub(super) fn departure(&self, session: &Session, step: Step) -> f64 {
         if self.all.is_empty() {
             return 0.0;
         }

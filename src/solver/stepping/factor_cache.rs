@@ -43,7 +43,7 @@ pub(super) enum Krylov {
 
 impl Krylov {
     /// A solver like the one in use, not set up.
-    pub fn another<const D: usize>(
+    pub(super) fn another<const D: usize>(
         used: &Solver,
         session: &Session,
         chosen: Preconditioner,
@@ -60,7 +60,7 @@ impl Krylov {
     }
 
     /// Swaps the contents with the solver in use.
-    pub fn exchange(&mut self, used: &mut Solver) {
+    pub(super) fn exchange(&mut self, used: &mut Solver) {
         match (self, used) {
             (Self::Linear(mine), Solver::Linear(used)) => swap(mine, used),
             (Self::Newton(mine, mine_scales), Solver::Newton(newton)) => {
@@ -82,18 +82,18 @@ pub(super) struct FactorCache {
 
 impl FactorCache {
     /// An empty cache for this number of matrices besides the one in use.
-    pub fn new(most: usize) -> Self {
+    pub(super) fn new(most: usize) -> Self {
         Self { kept: Vec::new(), most }
     }
 
     /// Stores an entry; returns the least recently used one if there are too many.
-    pub fn put(&mut self, cached: Cached) -> Option<Cached> {
+    pub(super) fn put(&mut self, cached: Cached) -> Option<Cached> {
         self.kept.push(cached);
         (self.kept.len() > self.most).then(|| self.kept.remove(0))
     }
 
     /// Removes and returns the entry of this length.
-    pub fn take(&mut self, length: f64) -> Option<Cached> {
+    pub(super) fn take(&mut self, length: f64) -> Option<Cached> {
         let at = self.kept.iter().position(|cached| cached.length == length)?;
         Some(self.kept.remove(at))
     }

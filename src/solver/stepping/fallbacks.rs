@@ -63,7 +63,7 @@ pub(super) struct Conditions {
 
 impl Conditions {
     /// The fallbacks in order.
-    pub fn fallbacks(self) -> impl Iterator<Item = Fallback> {
+    pub(super) fn fallbacks(self) -> impl Iterator<Item = Fallback> {
         let applies = move |fallback: &Fallback| {
             let iteration = match fallback.iteration {
                 FrictionIteration::Newton => {

@@ -33,12 +33,12 @@ pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
 
 impl Flow {
     /// Vectors with the layout of `like`.
-    pub fn new(like: &DistributedVector) -> Result<Self> {
+    pub(super) fn new(like: &DistributedVector) -> Result<Self> {
         Ok(Self { values: like.like()?, forces: like.like()?, tangents: Tangents::default() })
     }
 
     /// For a step of these cells.
-    pub fn of<'a, const D: usize, const S: usize>(
+    pub(super) fn of<'a, const D: usize, const S: usize>(
         &'a mut self,
         cells: Cells<'a, D, S>,
         start: FlowStart<'a>,

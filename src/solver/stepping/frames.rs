@@ -25,7 +25,11 @@ const NONE: u32 = u32::MAX;
 
 impl Frames {
     /// The frames of the contact nodes of this rank and all others. Collective.
-    pub fn new<const D: usize>(session: &Session, mesh: &Mesh<D>, nodes: &[ContactNode<D>]) -> Result<Self> {
+    pub(super) fn new<const D: usize>(
+        session: &Session,
+        mesh: &Mesh<D>,
+        nodes: &[ContactNode<D>],
+    ) -> Result<Self> {
         let world = session.world();
         let mine: Vec<u64> = nodes.iter().map(|c| (mesh.first_node + c.node) as u64).collect();
         let all = gather(world, &mine)?;
@@ -44,7 +48,7 @@ impl Frames {
     }
 
     /// Number of unknowns of all nodes of all ranks.
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.at.len() * self.dimension
     }
 
@@ -55,7 +59,7 @@ impl Frames {
     }
 
     /// Transforms components along the axes into components along the directions, or back.
-    pub fn turn(&self, values: &mut [f64], back: bool) {
+    pub(super) fn turn(&self, values: &mut [f64], back: bool) {
         let d = self.dimension;
         for (node, value) in values.chunks_exact_mut(d).enumerate() {
             let Some(frame) = self.of(node) else { continue };
@@ -69,7 +73,7 @@ impl Frames {
     }
 
     /// The same for a matrix.
-    pub fn turn_matrix(&self, rows: &mut BlockRows) {
+    pub(super) fn turn_matrix(&self, rows: &mut BlockRows) {
         let d = self.dimension;
         for row in 0..rows.offsets.len() - 1 {
             for at in rows.offsets[row]..rows.offsets[row + 1] {

@@ -42,7 +42,7 @@ pub(super) struct Implicit {
 
 impl Implicit {
     /// Vectors with the layout of those of the state.
-    pub fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
+    pub(super) fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
         let like = || state.velocity.like();
         Ok(Self {
             formula,
@@ -57,12 +57,12 @@ impl Implicit {
     }
 
     /// `k'`.
-    pub fn matrix_length(&self, step: Step) -> f64 {
+    pub(super) fn matrix_length(&self, step: Step) -> f64 {
         (self.formula)(step).length
     }
 
     /// Adds `M v~ / k' - B^T s~`.
-    pub fn start<const D: usize, const S: usize>(
+    pub(super) fn start<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -86,7 +86,7 @@ impl Implicit {
     }
 
     /// Corrects prepared contacts for the blend from which the step starts.
-    pub fn prepare_contacts<const D: usize, const S: usize>(
+    pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -105,17 +105,17 @@ impl Implicit {
     }
 
     /// The displacement from which the step starts, for cells with flow.
-    pub fn flow_start(&self) -> FlowStart<'_> {
+    pub(super) fn flow_start(&self) -> FlowStart<'_> {
         FlowStart { displacement: &self.displacement, length: self.blend.length }
     }
 
     /// The residual norm in N due to rounding errors of the forces. Collective.
-    pub fn rounding(&self, session: &Session) -> f64 {
+    pub(super) fn rounding(&self, session: &Session) -> f64 {
         1e-13 * session.sum([self.squares])[0].sqrt()
     }
 
     /// Computes displacement, trial histories and the terms of the energy balance that need the previous state. Collective.
-    pub fn finish<const D: usize, const S: usize>(
+    pub(super) fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -143,11 +143,11 @@ impl Implicit {
     }
 
     /// Commits the solved step to the state. Collective.
-    pub fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
+    pub(super) fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         state.commit_both(solved, &self.end, step.time, step.length)
     }
 
-    pub fn energy<const D: usize, const S: usize>(
+    pub(super) fn energy<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,

@@ -27,7 +27,7 @@ pub(super) enum Integrator {
 
 impl Integrator {
     /// The integrator of a scheme, for vectors with the layout of those of the state.
-    pub fn new(scheme: Scheme, state: &State) -> Result<Self> {
+    pub(super) fn new(scheme: Scheme, state: &State) -> Result<Self> {
         let blend = match scheme {
             Scheme::LaggedEuler => return Ok(Self::LaggedEuler(LaggedEuler::default())),
             Scheme::ImplicitEuler => implicit_euler::blend,
@@ -37,7 +37,7 @@ impl Integrator {
     }
 
     /// The length for which the matrix of a step is assembled.
-    pub fn matrix_length(&self, step: Step) -> f64 {
+    pub(super) fn matrix_length(&self, step: Step) -> f64 {
         match self {
             Self::LaggedEuler(_) => step.length,
             Self::Implicit(scheme) => scheme.matrix_length(step),
@@ -45,12 +45,12 @@ impl Integrator {
     }
 
     /// The same for a step that follows others of its length.
-    pub fn steady_length(&self, length: f64) -> f64 {
+    pub(super) fn steady_length(&self, length: f64) -> f64 {
         self.matrix_length(Step { time: 0.0, length, previous_length: length })
     }
 
     /// Stores the start of the step, and adds its known forces to `forces` (with ghosts).
-    pub fn start<const D: usize, const S: usize>(
+    pub(super) fn start<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -64,7 +64,7 @@ impl Integrator {
     }
 
     /// Corrects prepared contacts for the blend from which the step starts.
-    pub fn prepare_contacts<const D: usize, const S: usize>(
+    pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -77,7 +77,7 @@ impl Integrator {
     }
 
     /// The displacement from which the step starts, for cells that flow at the end of the step.
-    pub fn flow_start(&self) -> Option<FlowStart<'_>> {
+    pub(super) fn flow_start(&self) -> Option<FlowStart<'_>> {
         match self {
             Self::LaggedEuler(_) => None,
             Self::Implicit(scheme) => Some(scheme.flow_start()),
@@ -85,7 +85,7 @@ impl Integrator {
     }
 
     /// The residual norm in N due to rounding errors of the forces. Collective.
-    pub fn rounding(&self, session: &Session) -> f64 {
+    pub(super) fn rounding(&self, session: &Session) -> f64 {
         match self {
             Self::LaggedEuler(_) => 0.0,
             Self::Implicit(scheme) => scheme.rounding(session),
@@ -93,7 +93,7 @@ impl Integrator {
     }
 
     /// Writes displacement, trial histories and energies of a solved step before it is committed. Collective.
-    pub fn finish<const D: usize, const S: usize>(
+    pub(super) fn finish<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -107,7 +107,7 @@ impl Integrator {
     }
 
     /// Commits the solved velocity to the state. Collective.
-    pub fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
+    pub(super) fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         match self {
             Self::LaggedEuler(_) => state.commit(solved, step.time, step.length),
             Self::Implicit(scheme) => scheme.commit(state, solved, step),
@@ -116,7 +116,7 @@ impl Integrator {
 
     /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks.
     /// Collective.
-    pub fn energy<const D: usize, const S: usize>(
+    pub(super) fn energy<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,

@@ -46,7 +46,7 @@ pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
 
 impl LaggedEuler {
     /// Adds `M v_{n-1} / k - B^T s_n`.
-    pub fn start<const D: usize, const S: usize>(
+    pub(super) fn start<const D: usize, const S: usize>(
         &mut self,
         body: &mut Body<D, S>,
         state: &State,
@@ -57,7 +57,7 @@ impl LaggedEuler {
         Ok(())
     }
 
-    pub fn energy<const D: usize, const S: usize>(
+    pub(super) fn energy<const D: usize, const S: usize>(
         &self,
         session: &Session,
         body: &Body<D, S>,

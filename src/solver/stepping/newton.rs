@@ -74,7 +74,7 @@ struct Attempt {
 
 impl Newton {
     /// Newton's method for unknowns with the layout of `like`.
-    pub fn new<const D: usize>(
+    pub(super) fn new<const D: usize>(
         like: &DistributedVector,
         contacts: &[Contact<D>],
         linear_solver: ProjectedKsp,
@@ -101,7 +101,7 @@ impl Newton {
 
     /// Solves a step from the velocity in `trial`, and writes the new one there: tries one fallback after the other, then checks
     /// that velocities and pressures lie on the contact graphs. Collective.
-    pub fn solve<const D: usize, const S: usize>(
+    pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,

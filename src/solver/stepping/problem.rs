@@ -40,7 +40,7 @@ pub(super) struct System<'a> {
 
 impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
     /// The message that the step failed, with the reason and a remedy.
-    pub fn failed(&self, why: &str, remedy: &str) -> Error {
+    pub(super) fn failed(&self, why: &str, remedy: &str) -> Error {
         let Step { time, length, .. } = self.step;
         Error::Failed(format!("step to t = {time:.6e} s (length {length:.3e} s) failed: {why}; {remedy}"))
     }
@@ -48,7 +48,7 @@ impl<const D: usize, const S: usize> StepProblem<'_, D, S> {
 
 impl System<'_> {
     /// Writes `b - K v`. Collective.
-    pub fn write_residual(
+    pub(super) fn write_residual(
         &self,
         velocity: &DistributedVector,
         residual: &mut DistributedVector,

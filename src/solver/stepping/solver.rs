@@ -33,7 +33,7 @@ pub(super) enum Solver {
 impl Solver {
     /// The solver for the steps of a body, with the preconditioner of the settings and factors of this precision. Vectors have the
     /// layout of `like`. Collective.
-    pub fn new<const D: usize, const S: usize>(
+    pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         like: &DistributedVector,
@@ -50,7 +50,7 @@ impl Solver {
     }
 
     /// Newton's method on the whole body, for velocities with the layout of `like`. Collective.
-    pub fn whole<const D: usize, const S: usize>(
+    pub(super) fn whole<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         like: &DistributedVector,

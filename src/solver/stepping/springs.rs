@@ -34,7 +34,7 @@ pub(super) struct SprungRows {
 
 impl Springs {
     /// Adds to the failure of a step the motions that only contact can prevent, if there are any.
-    pub fn explain(&self, failure: Agreed) -> Error {
+    pub(super) fn explain(&self, failure: Agreed) -> Error {
         match &self.free {
             Some(free) if failure.is_failure() && !free.is_empty() => Error::Failed(format!(
                 "{failure}; contact and friction alone hold these motions, and can't where the loads make a body slide away or \
@@ -46,7 +46,7 @@ impl Springs {
     }
 
     /// The rows of the matrix for steps of this length in s, with the springs. Collective.
-    pub fn rows<const D: usize, const S: usize>(
+    pub(super) fn rows<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -57,7 +57,7 @@ impl Springs {
     }
 
     /// Adds the springs to the rows of a matrix. Collective.
-    pub fn add<const D: usize, const S: usize>(
+    pub(super) fn add<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,

@@ -27,7 +27,7 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    pub fn register() -> Result<Self> {
+    pub(super) fn register() -> Result<Self> {
         Ok(Self {
             assembly: Stage::register("assembly")?,
             history: Stage::register("history")?,

@@ -58,7 +58,7 @@ pub(super) struct SolvedStep<'a> {
 
 impl ErrorWorkspace {
     /// The error of a step whose trial histories belong to its solution. Collective.
-    pub fn error<const D: usize, const S: usize>(
+    pub(super) fn error<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,

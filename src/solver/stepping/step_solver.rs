@@ -48,7 +48,7 @@ pub(super) struct StepSolver {
 
 impl StepSolver {
     /// Chooses the solver; the matrix is set by [`StepSolver::prepare`]. Collective.
-    pub fn new<const D: usize, const S: usize>(
+    pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
@@ -73,17 +73,17 @@ impl StepSolver {
     }
 
     /// Whether steps are solved by Newton's method.
-    pub fn is_nonlinear(&self) -> bool {
+    pub(super) fn is_nonlinear(&self) -> bool {
         !matches!(self.solver, Solver::Linear(_))
     }
 
     /// The preconditioner in use, and the reason for it.
-    pub fn preconditioner(&self) -> (Preconditioner, &str) {
+    pub(super) fn preconditioner(&self) -> (Preconditioner, &str) {
         (self.settings.preconditioner, &self.reason)
     }
 
     /// The precision of factors, if steps are condensed to the contact.
-    pub fn factor_precision(&self) -> Option<Precision> {
+    pub(super) fn factor_precision(&self) -> Option<Precision> {
         match &self.solver {
             Solver::Condensed(condensed) => Some(condensed.precision),
             _ => None,
@@ -91,13 +91,13 @@ impl StepSolver {
     }
 
     /// Whether the matrices belong to these lengths.
-    pub fn is_prepared_for(&self, lengths: Lengths) -> bool {
+    pub(super) fn is_prepared_for(&self, lengths: Lengths) -> bool {
         self.prepared == Some(lengths)
     }
 
     /// Assembles the matrix of this length and sets up its preconditioner, unless they are available; returns whether a
     /// preconditioner was built. `like` has the layout of velocities. Collective.
-    pub fn prepare<const D: usize, const S: usize>(
+    pub(super) fn prepare<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
@@ -227,12 +227,12 @@ impl StepSolver {
     }
 
     /// `y = K x`. Collective.
-    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+    pub(super) fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix()?.multiply(x, y)
     }
 
     /// Restarts the count of traffic.
-    pub fn restart_traffic(&mut self) {
+    pub(super) fn restart_traffic(&mut self) {
         self.matrices().for_each(Matrix::restart_products);
         match &mut self.solver {
             Solver::Condensed(condensed) => condensed.restart_traffic(),
@@ -243,7 +243,7 @@ impl StepSolver {
 
     /// Least number of bytes moved on this rank since then; `None` where they are not counted: cells that flow, PETSc's solver
     /// for variational inequalities, preconditioners of unknown size.
-    pub fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
+    pub(super) fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
         let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
         match &mut self.solver {
             Solver::Condensed(condensed) => Ok(Some(products + condensed.traffic())),
@@ -267,7 +267,7 @@ impl StepSolver {
     }
 
     /// Applies the preconditioner. Collective.
-    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+    pub(super) fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         match &mut self.solver {
             Solver::Condensed(condensed) => condensed.solve_linear(r, z),
             Solver::Linear(ksp) => ksp.precondition(r, z),
@@ -277,7 +277,7 @@ impl StepSolver {
 
     /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails, it is repeated with a factor in
     /// double precision and with the tolerance that rounding errors of the solution allow. Collective.
-    pub fn solve<const D: usize, const S: usize>(
+    pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,

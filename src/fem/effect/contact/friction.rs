@@ -54,7 +54,7 @@ pub(super) enum Motion {
 
 impl<const D: usize> Friction<D> {
     /// Applies the law to the points of a contact; refuses supports that leave no unique tangent, and missing pressure.
-    pub fn new(
+    pub(super) fn new(
         law: FrictionLaw,
         points: &[Point<D>],
         obstacle_moves: bool,
@@ -104,12 +104,12 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Removes points that have no tangent.
-    pub fn keep_points_with_tangents(&mut self) {
+    pub(super) fn keep_points_with_tangents(&mut self) {
         self.points.retain(|point| point.count > 0);
     }
 
     /// Reads the tractions from the nodal tractions of the converged state; the pressures are those of `points`.
-    pub fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
+    pub(super) fn restore_pressures(&mut self, points: &[Point<D>], traction: &[f64]) {
         for point in &mut self.points {
             point.traction = point.along(Body, traction);
             point.pressure = points[point.at].pressure;
@@ -117,18 +117,18 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Uses the pressures of `points` in the bounds.
-    pub fn take_pressures(&mut self, points: &[Point<D>]) {
+    pub(super) fn take_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
     }
 
     /// Converts velocities into unknowns.
-    pub fn unmap(&self, values: &mut [f64]) {
+    pub(super) fn unmap(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, 1.0 / self.scale, &point.traction, values));
         self.add_drift(-1.0, values);
     }
 
     /// Converts unknowns into velocities, after `points` have computed their pressures.
-    pub fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
+    pub(super) fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let (law, scale) = (self.law, self.scale);
         if self.follows {
             self.take_pressures(points);
@@ -174,7 +174,7 @@ impl<const D: usize> Friction<D> {
     ///
     /// A point without pressure whose normal graph is vertical is assumed to come under pressure: it sticks, which is one of the
     /// generalised derivatives at rest.
-    pub fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
+    pub(super) fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
         let (law, scale, follows) = (self.law, self.scale, self.follows);
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
@@ -200,7 +200,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Converts a change of the unknowns into the change of the velocities, after `points` have computed the change of pressures.
-    pub fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
+    pub(super) fn map_direction(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let scale = self.scale;
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
@@ -216,22 +216,22 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Adds the forces of the last evaluation.
-    pub fn add_forces(&self, forces: &mut [f64]) {
+    pub(super) fn add_forces(&self, forces: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.traction, forces));
     }
 
     /// Adds the change of the forces along the last direction.
-    pub fn add_derivative(&self, forces: &mut [f64]) {
+    pub(super) fn add_derivative(&self, forces: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, point.weight, &point.change, forces));
     }
 
     /// Adds the tractions to nodal values.
-    pub fn add_tractions(&self, nodal: &mut [f64]) {
+    pub(super) fn add_tractions(&self, nodal: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Body, 1.0, &point.traction, nodal));
     }
 
     /// Adds the change of the forces with the velocity at sliding points, without that of the pressure of vertical graphs.
-    pub fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
+    pub(super) fn add_slopes(&self, points: &[Point<D>], direction: &[f64], forces: &mut [f64]) {
         for point in self.points.iter().filter(|p| !p.tangent.sticks) {
             let normal = &points[point.at];
             let pressed = normal.slope * normal.along(Newton, direction);
@@ -241,7 +241,7 @@ impl<const D: usize> Friction<D> {
 
     /// Subtracts the normal equations of nodes with a vertical normal graph from the tangential ones, where the bound depends on
     /// the pressure.
-    pub fn reduce(&self, points: &[Point<D>], values: &mut [f64]) {
+    pub(super) fn reduce(&self, points: &[Point<D>], values: &mut [f64]) {
         for point in self.points.iter().filter(|p| p.tangent.coefficient > 0.0) {
             let normal = &points[point.at];
             if normal.theta == 0.0 {
@@ -252,17 +252,23 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Removes from nodal values the motions of sticking points.
-    pub fn project(&self, values: &mut [f64]) {
+    pub(super) fn project(&self, values: &mut [f64]) {
         self.points.iter().filter(|p| p.tangent.sticks).for_each(|point| point.set(&[0.0; D], values));
     }
 
     /// Removes from nodal values the motions of all points along their tangents.
-    pub fn remove_motions(&self, values: &mut [f64]) {
+    pub(super) fn remove_motions(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.set(&[0.0; D], values));
     }
 
     /// Converts a change of velocities into the change of the unknowns, after the same has been done along the normals.
-    pub fn unmap_direction(&self, points: &[Point<D>], normal_scale: f64, open: &[f64], values: &mut [f64]) {
+    pub(super) fn unmap_direction(
+        &self,
+        points: &[Point<D>],
+        normal_scale: f64,
+        open: &[f64],
+        values: &mut [f64],
+    ) {
         for point in &self.points {
             if point.tangent.sticks {
                 let open = point.along(Newton, open);
@@ -276,23 +282,23 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Whether, at the last linearisation, some point slides with a bound that depends on the pressure.
-    pub fn is_coupled(&self) -> bool {
+    pub(super) fn is_coupled(&self) -> bool {
         self.points.iter().any(|p| p.tangent.coefficient > 0.0)
     }
 
     /// Hash that differs between linearisations with different sets of branches.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         self.points.iter().flat_map(|p| [f64::from(u8::from(p.tangent.sticks)), p.tangent.coefficient])
     }
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
-    pub fn steepest_fall(&self) -> f64 {
+    pub(super) fn steepest_fall(&self) -> f64 {
         let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
         self.law.steepest_fall() * most
     }
 
     /// The state of each point, at velocities in a vector of Newton's method.
-    pub fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
+    pub(super) fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
         self.sliding(Newton, velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
                 return Motion::Separated;
@@ -304,26 +310,26 @@ impl<const D: usize> Friction<D> {
     }
 
     /// The part of a nodal value along the tangents at a node; zero at nodes without friction.
-    pub fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
+    pub(super) fn part_at(&self, node: usize, nodal: &[f64]) -> Vector<D> {
         // Points are ordered by node, at most one for each node.
         let found = self.points.binary_search_by_key(&node, TangentialPoint::node);
         found.map_or([0.0; D], |at| self.points[at].along(Body, nodal))
     }
 
     /// Power in W dissipated by friction at these velocities.
-    pub fn power(&self, velocity: &[f64]) -> f64 {
+    pub(super) fn power(&self, velocity: &[f64]) -> f64 {
         let sliding = self.sliding(Body, velocity);
         sliding.map(|(p, sliding)| p.weight * dot(&p.traction, &sliding)).sum()
     }
 
     /// Power in W of the obstacle's friction on the body.
-    pub fn driving_power(&self) -> f64 {
+    pub(super) fn driving_power(&self) -> f64 {
         let given = self.points.iter().zip(&self.drift).map(|(p, drift)| p.weight * dot(&p.traction, drift));
         -given.sum::<f64>()
     }
 
     /// Largest sliding velocity and largest traction or bound at points on this rank, at velocities in a vector of Newton's method.
-    pub fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
+    pub(super) fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         // Sliding that is slower than the rounding of the obstacle's velocity is a rounding error.
         let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
         self.sliding(Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
@@ -335,7 +341,7 @@ impl<const D: usize> Friction<D> {
     /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
     /// `range`; overestimated by at most a factor of the square root of 2. `residual` contains the unbalanced forces in N; both are
     /// vectors of Newton's method.
-    pub fn inclusion_residual(
+    pub(super) fn inclusion_residual(
         &self,
         points: &[Point<D>],
         velocity: &[f64],
@@ -363,12 +369,12 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Adds a unit velocity along the first tangent of each point to nodal values.
-    pub fn add_unit_sliding(&self, nodal: &mut [f64]) {
+    pub(super) fn add_unit_sliding(&self, nodal: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Body, 1.0, &point.tangents[0], nodal));
     }
 
     /// Adds the derivative of half of the sum of `factor w |x_tau|^2` over the points to `forces`.
-    pub fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
+    pub(super) fn add_squares(&self, factor: f64, x: &[f64], forces: &mut [f64]) {
         for point in &self.points {
             let along = point.along(Body, x);
             point.add(Body, factor * point.weight, &along, forces);
@@ -376,7 +382,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// `integral of w_tau^2` over the points on this rank.
-    pub fn square(&self, nodal: &[f64]) -> f64 {
+    pub(super) fn square(&self, nodal: &[f64]) -> f64 {
         let square = |point: &TangentialPoint<D>| {
             point.weight * point.along(Body, nodal).iter().map(|x| x * x).sum::<f64>()
         };

@@ -68,7 +68,7 @@ pub(super) struct Point<const D: usize> {
 }
 
 impl<const D: usize> Point<D> {
-    pub fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
+    pub(super) fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
         let mut point = Self {
             numbers: [[0; D]; 2],
             count: nodes.len(),
@@ -102,7 +102,7 @@ impl<const D: usize> Point<D> {
     }
 
     /// A point at a node, whose unknown is the parameter of the law.
-    pub fn nodal(node: u32, normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
+    pub(super) fn nodal(node: u32, normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
         let mut point = Self::new(&[node], &[1.0], normal, weight, fixed);
         let free: Vector<D> =
             std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
@@ -119,24 +119,24 @@ impl<const D: usize> Point<D> {
     }
 
     /// The local number of its first node; a nodal point has no other.
-    pub fn node(&self) -> usize {
+    pub(super) fn node(&self) -> usize {
         self.first(Vectors::Body)
     }
 
     /// The number of its first node in these vectors.
     #[inline]
-    pub fn first(&self, vectors: Vectors) -> usize {
+    pub(super) fn first(&self, vectors: Vectors) -> usize {
         self.numbers[vectors as usize][0] as usize
     }
 
     /// Sets the numbers of its nodes in the vectors of Newton's method, given those in the vectors of the body.
-    pub fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
+    pub(super) fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
         self.numbers[Vectors::Newton as usize] =
             self.numbers[Vectors::Body as usize].map(|node| number(node as usize) as u32);
     }
 
     /// Local numbers of the nodes and their weights.
-    pub fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub(super) fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
         self.places(Vectors::Body)
     }
 
@@ -147,7 +147,7 @@ impl<const D: usize> Point<D> {
 
     /// The normal component of the mean of nodal values.
     #[inline]
-    pub fn normal_component(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+    pub(super) fn normal_component(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
         let numbers = &self.numbers[vectors as usize];
         let mut sum = 0.0;
         for a in 0..self.count {
@@ -160,7 +160,7 @@ impl<const D: usize> Point<D> {
     }
 
     /// Magnitude of the mean of velocities in vectors of Newton's method.
-    pub fn speed(&self, nodal: &[f64]) -> f64 {
+    pub(super) fn speed(&self, nodal: &[f64]) -> f64 {
         let mean =
             |i: usize| self.places(Vectors::Newton).map(|(node, share)| share * nodal[node * D + i]).sum();
         norm::<D>(&std::array::from_fn(mean))
@@ -168,7 +168,7 @@ impl<const D: usize> Point<D> {
 
     /// The component of a nodal value along the free part of the normal.
     #[inline]
-    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
+    pub(super) fn along(&self, vectors: Vectors, nodal: &[f64]) -> f64 {
         let value = &nodal[self.first(vectors) * D..][..D];
         let mut sum = 0.0;
         for i in 0..D {
@@ -179,7 +179,7 @@ impl<const D: usize> Point<D> {
 
     /// Adds to a nodal value along the free part of the normal.
     #[inline]
-    pub fn add_along(&self, vectors: Vectors, amount: f64, nodal: &mut [f64]) {
+    pub(super) fn add_along(&self, vectors: Vectors, amount: f64, nodal: &mut [f64]) {
         let target = &mut nodal[self.first(vectors) * D..][..D];
         for i in 0..D {
             target[i] += amount * self.direction[i];
@@ -188,7 +188,7 @@ impl<const D: usize> Point<D> {
 
     /// Adds the forces in N of a pressure in Pa.
     #[inline]
-    pub fn add_force(&self, vectors: Vectors, pressure: f64, forces: &mut [f64]) {
+    pub(super) fn add_force(&self, vectors: Vectors, pressure: f64, forces: &mut [f64]) {
         let numbers = &self.numbers[vectors as usize];
         for a in 0..self.count {
             let target = &mut forces[numbers[a] as usize * D..][..D];
@@ -200,12 +200,12 @@ impl<const D: usize> Point<D> {
 
     /// The point of the law's graph for the unknown `along` the direction.
     #[inline]
-    pub fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
+    pub(super) fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
         law.resolve(scale * self.stretch * along, scale, self.context)
     }
 
     /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.
-    pub fn context_velocity(&self) -> f64 {
+    pub(super) fn context_velocity(&self) -> f64 {
         if self.context.step_length > 0.0 && self.can_touch() {
             (self.context.penetration / self.context.step_length).abs()
         } else {
@@ -214,12 +214,12 @@ impl<const D: usize> Point<D> {
     }
 
     /// Whether there is an obstacle along the normal.
-    pub fn can_touch(&self) -> bool {
+    pub(super) fn can_touch(&self) -> bool {
         self.context.penetration > f64::NEG_INFINITY
     }
 
     /// Pressure in Pa, given nodal velocities.
-    pub fn pressure_at(&self, law: &NormalResponse, vectors: Vectors, velocity: &[f64]) -> f64 {
+    pub(super) fn pressure_at(&self, law: &NormalResponse, vectors: Vectors, velocity: &[f64]) -> f64 {
         match self.unknown {
             Unknown::Parameter => self.pressure,
             Unknown::Velocity => law.pressure(self.normal_component(vectors, velocity), self.context),
@@ -228,7 +228,7 @@ impl<const D: usize> Point<D> {
     }
 
     /// The unbalanced normal force per area at this point, from a residual, a vector of Newton's method.
-    pub fn open_pressure(&self, residual: &[f64]) -> f64 {
+    pub(super) fn open_pressure(&self, residual: &[f64]) -> f64 {
         let mut largest = 0.0f64;
         for a in 0..self.count {
             let at = self.numbers[Vectors::Newton as usize][a] as usize * D;

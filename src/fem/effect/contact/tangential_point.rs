@@ -42,19 +42,19 @@ pub(super) struct Tangent<const D: usize> {
 }
 
 impl<const D: usize> Tangent<D> {
-    pub fn free() -> Self {
+    pub(super) fn free() -> Self {
         Self { sticks: false, toward: [0.0; D], theta: [1.0; 2], slopes: [0.0; 2], coefficient: 0.0 }
     }
 }
 
 impl<const D: usize> TangentialPoint<D> {
     /// Its node on this rank.
-    pub fn node(&self) -> usize {
+    pub(super) fn node(&self) -> usize {
         self.numbers[Body as usize]
     }
 
     /// Removes from the tangents the components along this direction.
-    pub fn remove_direction(&mut self, direction: &Vector<D>) {
+    pub(super) fn remove_direction(&mut self, direction: &Vector<D>) {
         let mut along = [0.0; D];
         for tangent in &self.tangents[..self.count] {
             let share = dot(tangent, direction);
@@ -68,13 +68,13 @@ impl<const D: usize> TangentialPoint<D> {
     }
 
     /// The part of a nodal value along the tangents.
-    pub fn along(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
+    pub(super) fn along(&self, vectors: Vectors, nodal: &[f64]) -> Vector<D> {
         let value = &nodal[self.numbers[vectors as usize] * D..][..D];
         self.part(&std::array::from_fn(|i| value[i]))
     }
 
     /// The part of a vector along the tangents.
-    pub fn part(&self, vector: &Vector<D>) -> Vector<D> {
+    pub(super) fn part(&self, vector: &Vector<D>) -> Vector<D> {
         let mut out = [0.0; D];
         for tangent in &self.tangents[..self.count] {
             let along: f64 = (0..D).map(|i| tangent[i] * vector[i]).sum();
@@ -84,20 +84,20 @@ impl<const D: usize> TangentialPoint<D> {
     }
 
     /// Adds to a nodal value.
-    pub fn add(&self, vectors: Vectors, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
+    pub(super) fn add(&self, vectors: Vectors, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
         let target = &mut nodal[self.numbers[vectors as usize] * D..][..D];
         (0..D).for_each(|i| target[i] += factor * vector[i]);
     }
 
     /// Replaces the part of a value along the tangents in a vector of Newton's method.
-    pub fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
+    pub(super) fn set(&self, vector: &Vector<D>, nodal: &mut [f64]) {
         let now = self.along(Newton, nodal);
         let change: Vector<D> = std::array::from_fn(|i| vector[i] - now[i]);
         self.add(Newton, 1.0, &change, nodal);
     }
 
     /// Change of the traction at a sliding point, with a change of the velocity, a vector of Newton's method, and of the pressure.
-    pub fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
+    pub(super) fn sliding_change(&self, direction: &[f64], pressed: f64) -> Vector<D> {
         let Tangent { toward, slopes, coefficient, .. } = self.tangent;
         let velocity = self.along(Newton, direction);
         let ahead = dot(&toward, &velocity);
