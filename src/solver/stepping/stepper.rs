@@ -262,10 +262,7 @@ impl Stepper {
     ) -> Result<()> {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
-        self.integrator.finish(body, state, &mut self.trial, step)?;
-        if self.scheme.is_implicit() {
-            self.traffic.add_solve(Some(self.passes.finish));
-        }
+        self.finish(body, state, step)?;
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
