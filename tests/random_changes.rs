@@ -8,7 +8,7 @@ use clarke::{
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use std::{cell::Cell, path::Path};
+use std::{cell::Cell, io::Write, path::Path};
 
 const JOB: &str = r#"
 [mesh]
@@ -137,7 +137,11 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
         }
         Ok(())
     });
-    result.unwrap_or_else(|fault| panic!("{fault}"));
+    // A panic ends the process by MPI_Abort, and what the test runner has captured is lost: these words are not captured.
+    result.unwrap_or_else(|fault| {
+        let _ = writeln!(std::io::stderr(), "{fault}");
+        panic!("{fault}")
+    });
     assert!(ready.get() > 20 && refused.get() > 100, "{ready:?} ready, {refused:?} refused");
     write(SQUARE);
     check(JOB).expect("what was refused leaves nothing behind in the process");
