@@ -30,7 +30,7 @@ const FUNCTIONS: &[&str] = &[
     "KSP(GetConvergedReason|GetIterationNumber|GetResidualNorm|SetInitialGuessNonzero)",
     "KSP(SetOptionsPrefix|GetType|SetPC|ConvergedDefaultSetUIRNorm|GetTolerances)",
     "PCShell(SetApply|SetContext|GetContext)",
-    "PC(Apply|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix)",
+    "PC(Apply|GetOperators|SetType|SetUseAmat|GetType|FactorSetMatSolverType|FactorGetMatrix)",
     "SNES(Create|SetType|SetFunction|SetJacobian|SetTolerances|GetKSP|GetLineSearch|SetFromOptions)",
     "SNES(Solve|GetConvergedReason|GetIterationNumber|GetFunctionNorm|SetOptionsPrefix)",
     "SNESLineSearchSetType",
@@ -40,7 +40,7 @@ const FUNCTIONS: &[&str] = &[
     "MatDense(Get|Restore)Array(Read)?",
     "(madvise|dlsym)",
     "cholmod_(l_)?(start|finish|amd|metis|analyze_p|factorize|solve2|allocate_dense|change_factor|free_dense|free_factor)",
-    "(cblas_s(gemm|syrk|trsm)|spotrf_)",
+    "(cblas_[sd](gemm|syrk|trsm)|[sd]potrf_)",
 ];
 
 /// What a build of PETSc may have or not, by its macro, and the cfg that says so.

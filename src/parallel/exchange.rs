@@ -77,6 +77,12 @@ impl Gathering {
         self.counts.iter().map(|&count| count as usize).sum()
     }
 
+    /// The range of the numbers of a rank in those of all ranks.
+    pub fn range(&self, rank: usize) -> std::ops::Range<usize> {
+        let start = self.starts[rank] as usize;
+        start..start + self.counts[rank] as usize
+    }
+
     /// Writes the numbers of all ranks to `all`, in the order of the ranks. Collective.
     pub fn gather<T: Equivalence>(&self, communicator: &SimpleCommunicator, numbers: &[T], all: &mut [T]) {
         communicator.all_gather_varcount_into(

@@ -102,7 +102,7 @@ fn report<const D: usize, const S: usize>(
     let steps = steps::landings(job).steps_after(0.0, longest);
     let inventory = Inventory::of(session, body, scheme);
     let (preconditioner, reason) = scheme.preconditioner();
-    let problem = ProblemSize::of(session, body, steps, job.solver.factor_precision);
+    let problem = ProblemSize::of(session, body, steps, job.solver.factor_precision)?;
     Ok(Report {
         version: super::VERSION,
         petsc_version: session.petsc().version()?,

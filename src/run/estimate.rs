@@ -82,12 +82,10 @@ impl Estimate {
         let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
-        let redundant = preconditioner.is_redundant(session.ranks(), mesh.total_nodes * D);
-        let (copies, sharers) = if redundant { (ranks, 1.0) } else { (1.0, ranks) };
         let program = PROGRAM * ranks;
-        let step = cells * CELL[usize::from(D == 3)] / ranks + cost.step / sharers;
-        let set_up = cost.set_up / sharers;
-        let preconditioner = copies * cost.memory;
+        let step = cells * CELL[usize::from(D == 3)] / ranks + cost.step;
+        let set_up = cost.set_up;
+        let preconditioner = cost.memory;
         let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
         let total = program + mesh_bytes + matrix + history + vectors + preconditioner;
         Self {

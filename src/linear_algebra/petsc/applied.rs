@@ -23,6 +23,8 @@ impl Ksp {
             Ok(None)
         } else if is_one_of(kind, &[c"gamg"]) && !is_set(c"-pc_mg_type")? && !is_set(c"-pc_mg_cycle_type")? {
             cycle(pc, &self.levels)
+        } else if is_one_of(kind, &[c"shell"]) {
+            Ok(self.own.as_ref().map(|own| own.borrow().bytes()))
         } else if is_one_of(kind, &[c"cholesky"]) && ranks == 1 {
             factor(pc)
         } else {

@@ -2,11 +2,12 @@ use super::{
     DistributedVector, Matrix, c_string, check, index,
     levels::{self, Level},
     library::communicator,
+    own_preconditioner::Own,
     reference::Reference,
     sys,
 };
 use crate::error::Result;
-use std::ptr;
+use std::{ffi::CStr, ptr};
 
 /// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
 /// before it decreases, and the condition number of a body supported by contact alone is large.
@@ -20,6 +21,8 @@ pub struct Ksp {
     pub(super) raw: Reference<sys::_p_KSP>,
     /// The matrices used by the smoothers and transfers of multigrid.
     pub(super) levels: Vec<Level>,
+    /// The preconditioner, if it is not PETSc's.
+    pub(super) own: Option<Box<Own>>,
     applications: u64,
 }
 
@@ -75,7 +78,7 @@ impl Ksp {
         unsafe {
             let raw = Reference::new(|raw| sys::KSPCreate(communicator(), raw))?;
             check(sys::KSPSetOptionsPrefix(raw.get(), prefix.as_ptr()))?;
-            Ok(Self { raw, levels: Vec::new(), applications: 0 })
+            Ok(Self { raw, levels: Vec::new(), own: None, applications: 0 })
         }
     }
 
@@ -166,6 +169,9 @@ impl Ksp {
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
         levels::give_back(pc, &self.levels)?;
+        if is_type(pc, c"shell")? {
+            self.set_up_own()?;
+        }
         // SAFETY: live object.
         check(unsafe { sys::KSPSetUp(self.raw.get()) })?;
         self.levels = levels::in_single_precision(pc)?;
@@ -212,6 +218,16 @@ impl Ksp {
             check(sys::KSPGetResidualNorm(self.raw.get(), &mut residual))?;
         }
         Ok(LinearOutcome { reason, iterations: usize::try_from(iterations).unwrap_or(0), residual })
+    }
+}
+
+/// Whether a preconditioner has this type.
+pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
+    let mut kind = ptr::null();
+    // SAFETY: live preconditioner; PETSc's names are NUL-terminated and live as long as their object.
+    unsafe {
+        check(sys::PCGetType(pc, &mut kind))?;
+        Ok(!kind.is_null() && CStr::from_ptr(kind) == name)
     }
 }
 

@@ -16,6 +16,7 @@ mod ksp;
 mod levels;
 mod library;
 mod matrix;
+mod own_preconditioner;
 mod projected;
 mod projected_operator;
 mod reduced;
@@ -29,13 +30,16 @@ pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
 pub use matrix::Matrix;
+pub use own_preconditioner::OwnPreconditioner;
 pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};
 pub use projected_operator::{ProjectedOperator, ProjectedOutcome};
 pub use snes::{NonlinearOutcome, NonlinearProblem, Snes};
 pub use variational_inequality::{BoundedSnes, Limits, UNBOUNDED};
 pub use vector::{DistributedVector, Local, LocalRead, LocalWrite};
 
-pub use crate::linear_algebra::sparse::{BlockRows, Cholesky, INDEX_BITS, Precision};
+pub use crate::linear_algebra::sparse::{
+    BlockRows, Cholesky, DenseFactor, INDEX_BITS, PartialCholesky, Precision,
+};
 use crate::{
     error::{Error, Result},
     linear_algebra::{bindings as sys, sparse::index},

@@ -1,4 +1,4 @@
-use super::{DistributedVector, Matrix, check, index, reference::Reference, sys};
+use super::{BlockRows, DistributedVector, Matrix, check, index, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::{
     collections::{BTreeSet, HashMap},
@@ -31,7 +31,7 @@ impl ReducedMatrix {
         let first = first_node(constant, block)?;
         let mut others = BTreeSet::new();
         for node in 0..owned {
-            let (columns, _) = block_row(constant, first + node, block)?;
+            let (columns, _) = block_row(constant.raw.get(), first + node, block)?;
             others.extend(columns.into_iter().filter(|node| !(first..first + owned).contains(node)));
         }
         // A row extends beyond the cells of this rank: the ghosts here are all nodes in the columns of the rows.
@@ -113,7 +113,7 @@ impl ReducedMatrix {
             if mine == identity {
                 continue;
             }
-            let (columns, rows) = block_row(constant, first + node, block)?;
+            let (columns, rows) = block_row(constant.raw.get(), first + node, block)?;
             for (at, &global) in columns.iter().enumerate() {
                 let other = if (first..first + owned).contains(&global) {
                     global - first
@@ -193,8 +193,30 @@ fn times(a: &[f64], b: &[f64], size: usize) -> Vec<f64> {
     (0..size * size).map(entry).collect()
 }
 
+/// The rows of a matrix on this rank.
+pub(super) fn block_rows(matrix: sys::Mat) -> Result<BlockRows> {
+    let (mut size, mut first, mut end) = (1, 0, 0);
+    // SAFETY: live matrix, live integers.
+    unsafe {
+        check(sys::MatGetBlockSize(matrix, &mut size))?;
+        check(sys::MatGetOwnershipRange(matrix, &mut first, &mut end))?;
+    }
+    let count = |number: sys::PetscInt| usize::try_from(number).unwrap_or(0);
+    let block = count(size).max(1);
+    let mut out = BlockRows { offsets: vec![0], ..BlockRows::default() };
+    for node in count(first) / block..count(end) / block {
+        let (columns, rows) = block_row(matrix, node, block)?;
+        for (at, &column) in columns.iter().enumerate() {
+            out.columns.push(column as u32);
+            rows.iter().for_each(|row| out.values.extend_from_slice(&row[at * block..][..block]));
+        }
+        out.offsets.push(out.columns.len());
+    }
+    Ok(out)
+}
+
 /// Global block columns and the scalar rows of an owned block row.
-fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, Vec<Vec<f64>>)> {
+fn block_row(matrix: sys::Mat, node: usize, block: usize) -> Result<(Vec<usize>, Vec<Vec<f64>>)> {
     let mut blocks = Vec::new();
     let mut rows = Vec::new();
     for i in 0..block {
@@ -203,7 +225,7 @@ fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, 
         // SAFETY: a live matrix, whose rows PETSc refuses to show on other ranks; its arrays hold `length` numbers and are
         // read before the row is given back.
         unsafe {
-            check(sys::MatGetRow(matrix.raw.get(), row, &mut count, &mut columns, &mut values))?;
+            check(sys::MatGetRow(matrix, row, &mut count, &mut columns, &mut values))?;
             let length = usize::try_from(count).unwrap_or(0);
             // PETSc shows no arrays of a row without entries.
             let (of, found) = match length {
@@ -217,7 +239,7 @@ fn block_row(matrix: &Matrix, node: usize, block: usize) -> Result<(Vec<usize>, 
                 blocks = firsts.map(|&column| usize::try_from(column).unwrap_or(0) / block).collect();
             }
             rows.push(found.to_vec());
-            check(sys::MatRestoreRow(matrix.raw.get(), row, &mut count, &mut columns, &mut values))?;
+            check(sys::MatRestoreRow(matrix, row, &mut count, &mut columns, &mut values))?;
         }
     }
     Ok((blocks, rows))

@@ -1,6 +1,9 @@
 use super::{
-    BlockRows, analysis::Analysis, double_factor::DoubleFactor, lower_half::Lower,
-    single_factor::SingleFactor,
+    BlockRows,
+    analysis::Analysis,
+    double_factor::DoubleFactor,
+    lower_half::Lower,
+    supernodal::{SupernodalFactor, last_columns},
 };
 use crate::error::{Error, Result};
 
@@ -20,7 +23,7 @@ pub struct Cholesky {
 #[derive(Debug)]
 enum Numbers {
     Double(DoubleFactor),
-    Single(SingleFactor),
+    Single(SupernodalFactor<f32>),
 }
 
 /// Precision of the entries of a factor.
@@ -54,11 +57,11 @@ impl Cholesky {
         precision: Precision,
     ) -> Result<Option<Self>> {
         rows.check(block, rows.offsets.len().saturating_sub(1))?;
-        let mut lower = Lower::of(block, rows)?;
+        let mut lower = Lower::of(block, rows, &[])?;
         let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
         let Some(mut analysis) = analysed else { return Ok(None) };
         let single = match precision {
-            Precision::Single => SingleFactor::new(&analysis, &lower, last.len()),
+            Precision::Single => SupernodalFactor::new(&analysis, &lower, last.len(), false),
             Precision::Double => None,
         };
         let numbers = match single {
@@ -139,28 +142,13 @@ impl Cholesky {
     /// The diagonal block `L_c` of the last unknowns, whose product `L_c L_c^T` is their Schur complement: column after column, each
     /// from the diagonal down.
     pub fn last_factor(&self) -> Vec<f64> {
-        let (size, last) = (self.order().len(), self.last);
-        let first = size - last;
-        let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
-        let value = |at: usize, row: usize| match &self.numbers {
-            Numbers::Double(_) => DoubleFactor::values(&self.analysis)[at],
-            Numbers::Single(factor) => f64::from(factor.values[at]) / factor.scales[row],
-        };
-        let mut columns = vec![0.0; last * (last + 1) / 2];
-        let nodes = self.analysis.supernodes();
-        for node in (0..nodes.len()).rev() {
-            let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
-            if own.end <= first {
-                break;
+        match &self.numbers {
+            Numbers::Double(_) => {
+                let values = DoubleFactor::values(&self.analysis);
+                last_columns(&self.analysis, self.order().len() - self.last, |at, _, _| values[at])
             }
-            for column in own.clone().filter(|&column| column >= first) {
-                let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
-                for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
-                    columns[to + row as usize - column] = value(from + at, row as usize);
-                }
-            }
+            Numbers::Single(factor) => factor.last_columns(&self.analysis),
         }
-        columns
     }
 }
 

@@ -1,5 +1,5 @@
-use super::{analysis::Analysis, cholmod, large_pages, sys};
-use crate::error::{Error, Result};
+use super::{analysis::Analysis, cholmod, large_pages, partial_cholesky::not_positive_definite, sys};
+use crate::error::Result;
 use std::{ffi::c_int, ptr};
 
 /// The vectors of a solve with CHOLMOD's own factor, in double precision.
@@ -25,10 +25,7 @@ impl DoubleFactor {
         // SAFETY: the handle owns a factor of the matrix' pattern.
         unsafe { cholmod::cholmod_factorize(matrix, analysis.factor, common) };
         if common.status == sys::CHOLMOD_NOT_POSDEF as c_int {
-            return Err(Error::Failed(
-                "the matrix of the step is not positive definite: check densities, viscosities and moduli"
-                    .into(),
-            ));
+            return Err(not_positive_definite());
         }
         analysis.check()?;
         // SAFETY: CHOLMOD allocates the vector, which whoever owns the factor frees.

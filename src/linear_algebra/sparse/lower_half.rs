@@ -11,8 +11,9 @@ pub(super) struct Lower {
 
 impl Lower {
     /// The columns of a symmetric matrix from the diagonal down are its rows from the diagonal on. Zeros are left out: held
-    /// components are coupled to nothing.
-    pub(super) fn of(block: usize, rows: &BlockRows) -> Result<Self> {
+    /// components are coupled to nothing. Entries between these pairs of unknowns, in ascending order, are stored also where they
+    /// are zero.
+    pub(super) fn of(block: usize, rows: &BlockRows, mut stored: &[(usize, usize)]) -> Result<Self> {
         let entries = (rows.columns.len() + rows.offsets.len()) / 2 * block * block;
         let too_many = |_| {
             Error::Refused(format!(
@@ -40,10 +41,25 @@ impl Lower {
                         }
                     }
                 }
+                while let Some(&(first, second)) = stored.first().filter(|pair| pair.0 <= row) {
+                    stored = &stored[1..];
+                    lower.store(first, second);
+                }
                 lower.starts.push(lower.indices.len() as sys::PetscInt);
             }
         }
         Ok(lower)
+    }
+
+    /// Stores an entry of the column that is being written, if it is not stored yet.
+    fn store(&mut self, column: usize, row: usize) {
+        debug_assert_eq!(column + 1, self.starts.len());
+        let start = self.starts[column] as usize;
+        let at = start + self.indices[start..].partition_point(|&other| (other as usize) < row);
+        if self.indices.get(at).is_none_or(|&other| other as usize != row) {
+            self.indices.insert(at, row as sys::PetscInt);
+            self.values.insert(at, 0.0);
+        }
     }
 
     /// Stored entries.
@@ -98,9 +114,12 @@ mod tests {
     #[test]
     fn zeros_are_left_out_but_on_the_diagonal() {
         let rows = BlockRows { offsets: vec![0, 1], columns: vec![0], values: vec![0.0, 0.0, 0.0, 4.0] };
-        let lower = Lower::of(2, &rows).unwrap();
+        let lower = Lower::of(2, &rows, &[]).unwrap();
         assert_eq!((&lower.starts[..], &lower.indices[..]), (&[0, 1, 2][..], &[0, 1][..]));
         assert_eq!(lower.values, [0.0, 4.0]);
+        let lower = Lower::of(2, &rows, &[(0, 1), (1, 1)]).unwrap();
+        assert_eq!((&lower.starts[..], &lower.indices[..]), (&[0, 2, 3][..], &[0, 1, 1][..]));
+        assert_eq!(lower.values, [0.0, 0.0, 4.0]);
     }
 
     #[test]
@@ -110,7 +129,7 @@ mod tests {
             columns: vec![0, 1, 0, 1],
             values: vec![1.0, 2.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 4.0, 6.0, 5.0, 7.0, 8.0, 9.0, 9.0, 10.0],
         };
-        let lower = Lower::of(2, &rows).unwrap();
+        let lower = Lower::of(2, &rows, &[]).unwrap();
         assert_eq!(lower.starts, [0, 4, 7, 9, 10]);
         assert_eq!(lower.indices, [0, 1, 2, 3, 1, 2, 3, 2, 3, 3]);
         assert_eq!(lower.values, [1.0, 2.0, 4.0, 5.0, 3.0, 6.0, 7.0, 8.0, 9.0, 10.0]);

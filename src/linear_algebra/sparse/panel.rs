@@ -1,68 +1,200 @@
-//! Solves with one panel of a supernodal factor in single precision: columns of the same length, a triangle on top of a rectangle.
+//! Dense operations on one panel of a supernodal factor: columns of the same length, a triangle on top of a rectangle, column after
+//! column.
 //!
-//! A panel is read once, column after column, beside a vector that stays in the fastest cache.
+//! Solves read a panel once, column after column, beside a vector that stays in the fastest cache.
 
+use super::sys;
 use multiversion::multiversion;
+use std::{
+    ffi::{c_char, c_int},
+    fmt::Debug,
+    ops::{AddAssign, SubAssign},
+};
 
-/// Number of partial sums.
-const LANES: usize = 16;
+/// Single or double precision.
+pub(super) trait Real: Copy + Debug + Default + AddAssign + SubAssign + 'static {
+    fn rounded(value: f64) -> Self;
 
-/// Solves with the triangle: the first entries of `values` hold the right-hand side and receive the solution; the product of the
-/// rectangle with the solution is subtracted from the others.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn forward(panel: &[f32], columns: usize, values: &mut [f32]) {
-    let rows = values.len();
-    assert_eq!(panel.len(), columns * rows);
-    for (at, column) in panel.chunks_exact(rows).enumerate() {
-        let x = values[at] / column[at];
-        values[at] = x;
-        values[at + 1..].iter_mut().zip(&column[at + 1..]).for_each(|(value, l)| *value -= l * x);
-    }
+    fn exact(self) -> f64;
+
+    /// Solves with the triangle: the first entries of `values` hold the right-hand side and receive the solution; the product of
+    /// the rectangle with the solution is subtracted from the others.
+    fn forward(panel: &[Self], columns: usize, values: &mut [Self]);
+
+    /// Subtracts the product of the transposed rectangle with the values of its rows, then solves with the transpose of the triangle.
+    fn backward(panel: &[Self], columns: usize, values: &mut [Self]);
+
+    /// Replaces a panel of this many columns by its factor; `None` where its triangle is not positive definite.
+    fn factor(panel: &mut [Self], columns: usize) -> Option<()>;
+
+    /// Writes the product of a panel's rows from `first` on with the first `count` of them, below its diagonal, column after column.
+    fn own_product(panel: &[Self], rows: usize, first: usize, count: usize, product: &mut [Self]);
 }
 
-/// Subtracts the product of the transposed rectangle with the values of its rows, then solves with the transpose of the triangle.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn backward(panel: &[f32], columns: usize, values: &mut [f32]) {
-    let rows = values.len();
-    assert_eq!(panel.len(), columns * rows);
-    for (at, column) in panel.chunks_exact(rows).enumerate().rev() {
-        values[at] = (values[at] - dot(&column[at + 1..], &values[at + 1..])) / column[at];
-    }
+macro_rules! real {
+    ($real:ident, $lanes:literal, $potrf:ident, $trsm:ident, $syrk:ident, $gemm:ident, $solves:ident) => {
+        mod $solves {
+            use super::multiversion;
+
+            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+            pub(super) fn forward(panel: &[$real], columns: usize, values: &mut [$real]) {
+                let rows = values.len();
+                assert_eq!(panel.len(), columns * rows);
+                for (at, column) in panel.chunks_exact(rows).enumerate() {
+                    let x = values[at] / column[at];
+                    values[at] = x;
+                    values[at + 1..].iter_mut().zip(&column[at + 1..]).for_each(|(value, l)| *value -= l * x);
+                }
+            }
+
+            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+            pub(super) fn backward(panel: &[$real], columns: usize, values: &mut [$real]) {
+                let rows = values.len();
+                assert_eq!(panel.len(), columns * rows);
+                for (at, column) in panel.chunks_exact(rows).enumerate().rev() {
+                    values[at] = (values[at] - dot(&column[at + 1..], &values[at + 1..])) / column[at];
+                }
+            }
+
+            /// From the end on: columns are read from the last one on, and memory is fetched ahead where addresses go one way.
+            #[inline(always)]
+            fn dot(a: &[$real], b: &[$real]) -> $real {
+                let (a_rest, a) = a.as_rchunks::<$lanes>();
+                let (b_rest, b) = b.as_rchunks::<$lanes>();
+                let mut sums = [0.0; $lanes];
+                for (a, b) in a.iter().zip(b).rev() {
+                    (0..$lanes).for_each(|i| sums[i] += a[i] * b[i]);
+                }
+                let rest: $real = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+                sums.iter().sum::<$real>() + rest
+            }
+        }
+
+        impl Real for $real {
+            fn rounded(value: f64) -> Self {
+                value as $real
+            }
+
+            fn exact(self) -> f64 {
+                f64::from(self)
+            }
+
+            fn forward(panel: &[Self], columns: usize, values: &mut [Self]) {
+                $solves::forward(panel, columns, values);
+            }
+
+            fn backward(panel: &[Self], columns: usize, values: &mut [Self]) {
+                $solves::backward(panel, columns, values);
+            }
+
+            fn factor(panel: &mut [Self], columns: usize) -> Option<()> {
+                let rows = panel.len() / columns;
+                assert!(panel.len() == rows * columns && columns <= rows);
+                let below = rows - columns;
+                let (height, width, below_count) = (rows as c_int, columns as c_int, below as c_int);
+                let mut outcome = 0;
+                // SAFETY: the triangle and the rectangle lie in the panel, whose columns are `rows` numbers apart.
+                unsafe {
+                    let triangle = panel.as_mut_ptr();
+                    let lower = c"L".as_ptr().cast::<c_char>();
+                    sys::$potrf(lower, &width, triangle, &height, &mut outcome, 1);
+                    if outcome == 0 && below > 0 {
+                        sys::$trsm(
+                            sys::CblasColMajor,
+                            sys::CblasRight,
+                            sys::CblasLower,
+                            sys::CblasTrans,
+                            sys::CblasNonUnit,
+                            below_count,
+                            width,
+                            1.0,
+                            triangle,
+                            height,
+                            triangle.add(columns),
+                            height,
+                        );
+                    }
+                }
+                (outcome == 0).then_some(())
+            }
+
+            fn own_product(panel: &[Self], rows: usize, first: usize, count: usize, product: &mut [Self]) {
+                let height = rows - first;
+                assert!(
+                    panel.len().is_multiple_of(rows) && count <= height && product.len() >= count * height
+                );
+                let (width, height_count, count_count) =
+                    ((panel.len() / rows) as c_int, height as c_int, count as c_int);
+                // SAFETY: rows `first..` of the panel and the product lie in these slices.
+                unsafe {
+                    let (from, to) = (panel.as_ptr().add(first), product.as_mut_ptr());
+                    sys::$syrk(
+                        sys::CblasColMajor,
+                        sys::CblasLower,
+                        sys::CblasNoTrans,
+                        count_count,
+                        width,
+                        1.0,
+                        from,
+                        rows as c_int,
+                        0.0,
+                        to,
+                        height_count,
+                    );
+                    if height > count {
+                        sys::$gemm(
+                            sys::CblasColMajor,
+                            sys::CblasNoTrans,
+                            sys::CblasTrans,
+                            height_count - count_count,
+                            count_count,
+                            width,
+                            1.0,
+                            from.add(count),
+                            rows as c_int,
+                            from,
+                            rows as c_int,
+                            0.0,
+                            to.add(count),
+                            height_count,
+                        );
+                    }
+                }
+            }
+        }
+    };
 }
 
-/// From the end on: columns are read from the last one on, and memory is fetched ahead where addresses go one way.
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let (a_rest, a) = a.as_rchunks::<LANES>();
-    let (b_rest, b) = b.as_rchunks::<LANES>();
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.iter().zip(b).rev() {
-        (0..LANES).for_each(|i| sums[i] += a[i] * b[i]);
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f32>() + rest
-}
+real!(f32, 16, spotrf_, cblas_strsm, cblas_ssyrk, cblas_sgemm, single);
+real!(f64, 8, dpotrf_, cblas_dtrsm, cblas_dsyrk, cblas_dgemm, double);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A panel with small whole numbers, exact in single precision, and ones on the diagonal.
-    fn panel(columns: usize, rows: usize) -> Vec<f32> {
+    /// A panel with small whole numbers, exact in both precisions, and ones on the diagonal.
+    fn panel(columns: usize, rows: usize) -> Vec<f64> {
         let entry = |column: usize, row: usize| match row.cmp(&column) {
-            std::cmp::Ordering::Less => f32::NAN,
+            std::cmp::Ordering::Less => f64::NAN,
             std::cmp::Ordering::Equal => 2.0,
-            std::cmp::Ordering::Greater => ((3 * row + 5 * column) % 5) as f32 - 2.0,
+            std::cmp::Ordering::Greater => ((3 * row + 5 * column) % 5) as f64 - 2.0,
         };
         (0..columns).flat_map(|column| (0..rows).map(move |row| entry(column, row))).collect()
     }
 
-    fn whole_numbers(count: usize) -> Vec<f32> {
-        (0..count).map(|i| (i % 7) as f32 - 3.0).collect()
+    fn whole_numbers(count: usize) -> Vec<f64> {
+        (0..count).map(|i| (i % 7) as f64 - 3.0).collect()
     }
 
     #[test]
     fn solves_take_products_back_whatever_the_shape() {
+        solves_take_products_back::<f32>();
+        solves_take_products_back::<f64>();
+    }
+
+    fn solves_take_products_back<R: Real>() {
+        let rounded = |values: &[f64]| values.iter().map(|&value| R::rounded(value)).collect::<Vec<R>>();
+        let exact = |values: &[R]| values.iter().map(|value| value.exact()).collect::<Vec<f64>>();
         for (columns, rows) in [(1, 1), (1, 40), (3, 5), (4, 4), (5, 21), (8, 64), (11, 12), (18, 83)] {
             let panel = panel(columns, rows);
             let x = whole_numbers(columns);
@@ -70,16 +202,18 @@ mod tests {
                 if row < column { 0.0 } else { panel[column * rows + row] }
             };
             let product = |row: usize| (0..columns).map(|column| lower(row, column) * x[column]).sum();
-            let mut values: Vec<f32> = (0..rows).map(product).collect();
-            forward(&panel, columns, &mut values);
+            let mut values = rounded(&(0..rows).map(product).collect::<Vec<f64>>());
+            R::forward(&rounded(&panel), columns, &mut values);
+            let values = exact(&values);
             assert_eq!(values[..columns], x, "{columns} columns of {rows}");
             assert!(values[columns..].iter().all(|&value| value == 0.0), "{columns} columns of {rows}");
 
             let all = whole_numbers(rows);
             let product = |column: usize| (column..rows).map(|row| lower(row, column) * all[row]).sum();
-            let mut values: Vec<f32> = (0..columns).map(product).chain(all[columns..].to_vec()).collect();
-            backward(&panel, columns, &mut values);
-            assert_eq!(values, all, "{columns} columns of {rows}");
+            let mut values =
+                rounded(&(0..columns).map(product).chain(all[columns..].to_vec()).collect::<Vec<f64>>());
+            R::backward(&rounded(&panel), columns, &mut values);
+            assert_eq!(exact(&values), all, "{columns} columns of {rows}");
         }
     }
 }

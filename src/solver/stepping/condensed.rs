@@ -21,6 +21,7 @@ use super::{
     problem::{StepProblem, System},
     resistance::{resistances, resistances_of_body},
     springs::SprungRows,
+    substructuring::{Factors, Substructures},
 };
 use crate::{
     error::{Error, Result},
@@ -28,14 +29,9 @@ use crate::{
         body::Body,
         effect::{ContactNode, contact_nodes},
     },
-    linear_algebra::petsc::{BlockRows, Cholesky, DistributedVector, Matrix, Precision, ProjectedKsp},
-    parallel::{
-        agreement::Agreed,
-        exchange::{Gathering, gather},
-        session::Session,
-    },
+    linear_algebra::petsc::{DistributedVector, Matrix, Precision, ProjectedKsp},
+    parallel::session::Session,
 };
-use mpi::topology::SimpleCommunicator;
 
 /// Number of corrections after which single precision has failed.
 const CORRECTIONS: usize = 12;
@@ -45,7 +41,7 @@ const LARGEST_SHARE_LEFT: f64 = 0.5;
 /// method would otherwise stop just below the tolerance, with velocity and pressure at that distance from their graph.
 const CONTACT_SHARE: f64 = 0.1;
 
-/// A solver for steps whose matrix each rank factors completely.
+/// A solver for steps with a factor of their matrix.
 pub(super) struct Condensed {
     newton: Newton,
     elimination: Elimination,
@@ -54,7 +50,7 @@ pub(super) struct Condensed {
     nodes: ContactNodes,
     /// The range of this rank in the unknowns of all ranks.
     own: std::ops::Range<usize>,
-    /// The order of elimination, once it is known.
+    /// The order of elimination on this rank, once it is known.
     order: Option<Vec<u32>>,
     /// Vectors of contact nodes: right-hand side, velocity, and velocity of the converged state.
     right_hand_side: DistributedVector,
@@ -66,21 +62,18 @@ pub(super) struct Condensed {
 
 /// A factored matrix.
 pub(super) struct Factored {
-    cholesky: Cholesky,
+    factors: Factors,
     condensed: CondensedMatrix,
     /// The parameters of each contact's graphs.
     scales: Vec<[f64; 2]>,
 }
 
-/// The factor in use, and its vectors of the unknowns of all ranks.
+/// The factor in use, and its vector of the unknowns of this rank.
 struct Elimination {
     factored: Option<Factored>,
     frames: Frames,
-    /// The values of all nodes of all ranks, and the gather operation.
-    whole: Vec<f64>,
-    gathering: Gathering,
-    /// Start of the values of this rank.
-    first: usize,
+    substructures: Substructures,
+    values: Vec<f64>,
     /// Half solves since the count of traffic was restarted.
     halves: u64,
 }
@@ -139,10 +132,9 @@ impl Condensed {
             newton,
             elimination: Elimination {
                 factored: None,
-                whole: vec![0.0; frames.total()],
+                substructures: Substructures::new(session, &body.mesh, &frames)?,
                 frames,
-                gathering: Gathering::new(session.world(), body.mesh.owned * D)?,
-                first: body.mesh.first_node * D,
+                values: vec![0.0; body.mesh.owned * D],
                 halves: 0,
             },
             precision,
@@ -168,21 +160,23 @@ impl Condensed {
         matrix: &Matrix,
         like: &DistributedVector,
     ) -> Result<bool> {
-        let SprungRows { rows, springs } = rows;
-        let mut rows = gather_rows(session, rows, D)?;
-        self.elimination.frames.turn_matrix(&mut rows);
-        self.elimination.factored = None;
-        let Some(cholesky) = self.factor(session, D, &rows)? else { return Ok(false) };
-        self.order.get_or_insert_with(|| cholesky.order().to_vec());
-        self.precision = cholesky.precision();
+        let SprungRows { mut rows, springs } = rows;
+        let Elimination { factored, frames, substructures, .. } = &mut self.elimination;
+        frames.turn_matrix(&mut rows);
+        *factored = None;
+        let order = self.order.as_deref();
+        let Some(factors) = Factors::new(session.world(), substructures, &rows, order, self.precision)?
+        else {
+            return Ok(false);
+        };
+        self.order.get_or_insert_with(|| factors.order().to_vec());
+        self.precision = factors.precision();
         drop(rows);
-        let Frames { unknowns, groups, .. } = &self.elimination.frames;
-        let mut place = vec![0; self.elimination.frames.total()];
-        cholesky.last_unknowns().iter().enumerate().for_each(|(at, &unknown)| place[unknown as usize] = at);
+        let Frames { unknowns, groups, .. } = frames;
         let has_springs = springs.is_some();
         let condensed = CondensedMatrix {
-            lower: cholesky.last_factor(),
-            places: unknowns.iter().map(|&unknown| place[unknown]).collect(),
+            lower: factors.last_factor(),
+            places: factors.places(unknowns),
             nodes: groups.clone(),
             own: self.own.clone(),
             motions: self.nodes.motions.clone(),
@@ -201,31 +195,13 @@ impl Condensed {
             })?
         };
         self.newton.scales.clone_from(&scales);
-        self.elimination.factored = Some(Factored { cholesky, condensed, scales });
+        self.elimination.factored = Some(Factored { factors, condensed, scales });
         Ok(true)
-    }
-
-    /// Factors a matrix in one precision on all ranks, because the choice could differ between processors. `None` on all ranks
-    /// where the contact unknowns can't be ordered last on one of them. Collective.
-    fn factor(&self, session: &Session, block: usize, rows: &BlockRows) -> Result<Option<Cholesky>, Agreed> {
-        let unknowns = &self.elimination.frames.unknowns;
-        let factor = |precision| Cholesky::new(block, rows, unknowns, self.order.as_deref(), precision);
-        let found = session.agree(factor(self.precision))?;
-        let is = |precision| found.as_ref().is_some_and(|cholesky| cholesky.precision() == precision);
-        let here = [found.is_none(), is(Precision::Single), is(Precision::Double)];
-        let [none, single, double] = session.largest(here.map(|flag| f64::from(u8::from(flag))));
-        if none > 0.0 {
-            return Ok(None);
-        }
-        if single * double == 0.0 {
-            return Ok(found);
-        }
-        session.agree(if here[1] { factor(Precision::Double) } else { Ok(found) })
     }
 
     /// The precision of the factor in use.
     pub(super) fn precision_in_use(&mut self) -> Result<Precision> {
-        Ok(in_use(&mut self.elimination.factored)?.cholesky.precision())
+        Ok(in_use(&mut self.elimination.factored)?.factors.precision())
     }
 
     /// Exchanges the factored matrix for another.
@@ -255,7 +231,7 @@ impl Condensed {
     /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product.
     pub(super) fn traffic(&self) -> u64 {
         let Elimination { factored, halves, .. } = &self.elimination;
-        let of = |factored: &Factored| halves * factored.cholesky.bytes() + factored.condensed.traffic();
+        let of = |factored: &Factored| halves * factored.factors.bytes() + factored.condensed.traffic();
         factored.as_ref().map_or(0, of)
     }
 
@@ -274,11 +250,11 @@ impl Condensed {
         elimination.forward(system.right_hand_side)?;
         nodes.restrict::<D>(system.converged, converged)?;
         nodes.restrict::<D>(trial, velocity)?;
-        let Factored { cholesky, condensed, .. } = in_use(&mut elimination.factored)?;
-        condensed.write_times_lower(cholesky.last_mut(), right_hand_side)?;
+        let Factored { factors, condensed, .. } = in_use(&mut elimination.factored)?;
+        condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
         let contact = System { matrix: condensed, right_hand_side, converged, ..system };
         let outcome = newton.solve(problem, contact, velocity)?;
-        condensed.read_times_upper(velocity, cholesky.last_mut())?;
+        condensed.read_times_upper(velocity, factors.last_mut())?;
         elimination.backward(trial)?;
         nodes.prescribe::<D>(velocity, trial)?;
         trial.update_ghosts()?;
@@ -308,8 +284,8 @@ impl Condensed {
             elimination.forward(residual)?;
             nodes.restrict::<D>(trial, velocity)?;
             before.copy_from(velocity)?;
-            let Factored { cholesky, condensed, .. } = in_use(&mut elimination.factored)?;
-            condensed.write_times_lower(cholesky.last_mut(), right_hand_side)?;
+            let Factored { factors, condensed, .. } = in_use(&mut elimination.factored)?;
+            condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
             right_hand_side.add_scaled(1.0, change)?;
             condensed.multiply(before, product)?;
             right_hand_side.add_scaled(1.0, product)?;
@@ -327,7 +303,7 @@ impl Condensed {
             change.copy_from(velocity)?;
             change.add_scaled(-1.0, before)?;
             condensed.multiply(change, product)?;
-            condensed.read_times_upper(change, cholesky.last_mut())?;
+            condensed.read_times_upper(change, factors.last_mut())?;
             elimination.backward(correction)?;
             trial.add_scaled(1.0, correction)?;
             nodes.prescribe::<D>(velocity, trial)?;
@@ -364,20 +340,18 @@ fn in_use(factored: &mut Option<Factored>) -> Result<&mut Factored> {
 impl Elimination {
     /// Solves `L y = b`. Collective.
     fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
-        self.gathering.gather(&SimpleCommunicator::world(), &right_hand_side.owned()?, &mut self.whole);
-        self.frames.turn(&mut self.whole, false);
+        self.values.copy_from_slice(&right_hand_side.owned()?);
+        self.frames.turn(&mut self.values, false);
         self.halves += 1;
-        in_use(&mut self.factored)?.cholesky.forward(&self.whole)
+        in_use(&mut self.factored)?.factors.forward(&self.values)
     }
 
     /// Solves `L^T x = y`.
     fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
         self.halves += 1;
-        in_use(&mut self.factored)?.cholesky.backward(&mut self.whole)?;
-        self.frames.turn(&mut self.whole, true);
-        let mut solution = solution.owned_mut()?;
-        let count = solution.len();
-        solution.copy_from_slice(&self.whole[self.first..][..count]);
+        in_use(&mut self.factored)?.factors.backward(&mut self.values)?;
+        self.frames.turn(&mut self.values, true);
+        solution.owned_mut()?.copy_from_slice(&self.values);
         Ok(())
     }
 }
@@ -447,19 +421,4 @@ impl ContactNodes {
         }
         Ok(())
     }
-}
-
-/// Gathers the rows of all ranks. Collective.
-fn gather_rows(session: &Session, rows: BlockRows, block: usize) -> Result<BlockRows> {
-    if session.ranks() == 1 {
-        return Ok(rows);
-    }
-    let world = session.world();
-    let counts: Vec<u64> = rows.offsets.windows(2).map(|range| (range[1] - range[0]) as u64).collect();
-    let mut offsets = vec![0];
-    for count in gather(world, &counts)? {
-        offsets.push(offsets[offsets.len() - 1] + count as usize);
-    }
-    debug_assert_eq!(rows.values.len(), rows.columns.len() * block * block);
-    Ok(BlockRows { offsets, columns: gather(world, &rows.columns)?, values: gather(world, &rows.values)? })
 }

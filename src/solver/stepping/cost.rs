@@ -4,20 +4,28 @@
 //! operations; the work of multigrid is proportional to the unknowns. The constants were measured on one core of a common server
 //! with 10^4 to 10^6 unknowns (docs/speed.md); estimates can be wrong by a factor of two.
 
-use super::linear_solver::{FactorPrecision, Preconditioner, ProblemSize};
-use crate::{fem::body::Body, linear_algebra::petsc::Precision, parallel::session::Session};
+use super::{
+    linear_solver::{FactorPrecision, Preconditioner, ProblemSize},
+    substructuring::{MOST_ON_INTERFACE, interface_nodes},
+};
+use crate::{
+    fem::{
+        body::Body,
+        effect::{Contact, contact_nodes},
+    },
+    linear_algebra::petsc::Precision,
+    parallel::{agreement::Agreed, session::Session},
+};
 
-/// Costs of a preconditioner and of the solves of a step, on one rank and over all ranks together.
+/// Costs of a preconditioner and of the solves of a step, on the ranks of the problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
-    /// Bytes of a factor or a hierarchy.
+    /// Bytes of a factor or a hierarchy over all ranks.
     pub memory: f64,
     /// Seconds of assembly and set-up.
     pub set_up: f64,
     /// Seconds of a step.
     pub step: f64,
-    /// Krylov iterations of a step with communication.
-    pub iterations: f64,
 }
 
 /// Size in bytes above which a factor in double precision does not fit any cache.
@@ -26,6 +34,19 @@ const BEYOND_CACHES: f64 = 16e6;
 const MESSAGES: f64 = 100e-6;
 /// Number of V-cycles whose messages take as long as those of a set-up.
 const SET_UP_CYCLES: f64 = 100.0;
+/// Seconds for the messages of a step with a shared factor between processes of one machine (docs/scaling.md).
+const STEP_MESSAGES: f64 = 85e-6;
+/// Factor by which a step with MUMPS takes longer than one with CHOLMOD (docs/scaling.md).
+const MUMPS: f64 = 8.0;
+/// Seconds of a step for each unknown besides the solve: stress, history, forces, energies.
+const OTHER: f64 = 55e-9;
+
+/// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
+const MOST_MOTIONS: usize = 4_000;
+/// The number of motions on which the contacts of a body act, over all ranks. Collective.
+fn motions<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
+    session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
+}
 
 /// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's
 /// matrix.
@@ -36,22 +57,29 @@ struct Iterations {
 }
 
 impl ProblemSize {
-    /// The problem size for this number of steps of this body.
+    /// The problem size for this number of steps of this body. Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         steps: u64,
         precision: FactorPrecision,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, Agreed> {
+        let motions = motions(session, body);
+        let contacts = &body.contacts;
+        Ok(Self {
             dimension: D,
             unknowns: body.mesh.total_nodes * D,
             ranks: session.ranks(),
             steps,
-            contact: !body.contacts.is_empty(),
-            friction: body.contacts.iter().any(|contact| contact.friction().is_some()),
+            interface: interface_nodes(session, &body.mesh)?.len() * D + motions,
+            contact: !contacts.is_empty(),
+            condensed: !contacts.is_empty()
+                && !contacts.iter().any(Contact::needs_ghosts)
+                && !body.flows()
+                && motions <= MOST_MOTIONS,
+            friction: contacts.iter().any(|contact| contact.friction().is_some()),
             precision,
-        }
+        })
     }
 
     fn pick(self, in_plane: f64, in_space: f64) -> f64 {
@@ -74,24 +102,56 @@ impl ProblemSize {
     /// The precision of factors: single where it is requested, or where it takes less time. In 3D two or three corrections
     /// reach the accuracy of one solve in double precision, in 2D four to seven (docs/speed.md).
     pub fn factor_precision(self) -> Precision {
-        let served = self.contact
-            && (self.ranks == 1 || Preconditioner::Cholesky.is_redundant(self.ranks, self.unknowns));
         let pays = || {
-            let time = |precision| self.work(self.factor(precision));
+            let time = |precision| self.seconds_of(self.factor(precision));
             self.dimension == 3
                 && self.factor(Precision::Double).memory > BEYOND_CACHES
                 && time(Precision::Single) < time(Precision::Double)
         };
         match self.precision {
-            FactorPrecision::Single if served => Precision::Single,
-            FactorPrecision::Auto if served && pays() => Precision::Single,
+            FactorPrecision::Single if self.is_condensed() => Precision::Single,
+            FactorPrecision::Auto if self.is_condensed() && pays() => Precision::Single,
             _ => Precision::Double,
         }
     }
 
-    /// The cost of a factor, including the solves of a step.
+    /// Whether a factor is shared by all ranks.
+    fn is_shared(self) -> bool {
+        self.interface <= MOST_ON_INTERFACE
+    }
+
+    /// Whether steps are condensed to the contact, if the matrix is factored.
+    pub(super) fn is_condensed(self) -> bool {
+        self.condensed && (self.ranks == 1 || self.is_shared())
+    }
+
+    /// The same problem on one rank.
+    fn on_one_rank(self) -> Self {
+        Self { ranks: 1, ..self }
+    }
+
+    /// The cost of factors.
     fn factor(self, precision: Precision) -> Cost {
-        let n = self.unknowns as f64;
+        let ranks = self.ranks as f64;
+        let whole = self.factor_of(self.unknowns as f64, precision);
+        if self.ranks == 1 {
+            return whole;
+        }
+        if self.is_shared() {
+            // Each rank factors its part and the dense matrix of the interface, and reads both in each half of a solve.
+            let part = self.factor_of(self.unknowns as f64 / ranks, precision);
+            let interface = self.interface as f64;
+            return Cost {
+                memory: ranks * (part.memory + 4.0 * interface.powi(2)),
+                set_up: part.set_up + 1.5e-11 * interface.powi(3),
+                step: part.step + 1.0e-9 * interface.powi(2) + STEP_MESSAGES,
+            };
+        }
+        Cost { set_up: whole.set_up / ranks, step: MUMPS * whole.step / ranks, ..whole }
+    }
+
+    /// The cost of a factor of `n` unknowns on one rank.
+    fn factor_of(self, n: f64, precision: Precision) -> Cost {
         let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
         let [memory, set_up, step] = match precision {
             Precision::Double => [
@@ -105,50 +165,58 @@ impl ProblemSize {
                 self.pick(8.0e-9, 1.7e-9),
             ],
         };
-        Cost { memory: memory * entries, set_up, step: step * entries, iterations: 0.0 }
+        Cost { memory: memory * entries, set_up, step: step * entries }
     }
 
     /// The cost of this preconditioner.
     pub fn cost(self, preconditioner: Preconditioner) -> Cost {
         let n = self.unknowns as f64;
+        let multigrid = |memory: f64, set_up: f64, iterations: Iterations, cycle: f64| {
+            let iterations = self.iterations(iterations);
+            let messages = if self.ranks > 1 { MESSAGES } else { 0.0 };
+            let ranks = self.ranks as f64;
+            Cost {
+                memory: memory * self.matrix(),
+                set_up: n * set_up / ranks + SET_UP_CYCLES * messages,
+                step: iterations * (n * cycle / ranks + messages),
+            }
+        };
         match preconditioner {
             Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
-            Preconditioner::Gamg => {
-                let iterations =
-                    self.iterations(Iterations { without: 20.0, contact: 30.0, friction: 300.0 });
-                Cost {
-                    memory: 2.2 * self.matrix(),
-                    set_up: n * self.pick(7e-6, 22e-6),
-                    step: iterations * n * self.pick(100e-9, 180e-9),
-                    iterations,
-                }
-            }
-            Preconditioner::Boomeramg => {
-                let iterations =
-                    self.iterations(Iterations { without: 14.0, contact: 20.0, friction: 200.0 });
-                Cost {
-                    memory: 3.5 * self.matrix(),
-                    set_up: n * self.pick(1.5e-6, 5e-6),
-                    step: iterations * n * self.pick(120e-9, 300e-9),
-                    iterations,
-                }
-            }
+            Preconditioner::Gamg => multigrid(
+                2.2,
+                self.pick(7e-6, 22e-6),
+                Iterations { without: 20.0, contact: 30.0, friction: 300.0 },
+                self.pick(100e-9, 180e-9),
+            ),
+            Preconditioner::Boomeramg => multigrid(
+                3.5,
+                self.pick(1.5e-6, 5e-6),
+                Iterations { without: 14.0, contact: 20.0, friction: 200.0 },
+                self.pick(120e-9, 300e-9),
+            ),
         }
     }
 
-    /// Seconds of set-up and of the steps that share one matrix, on one rank.
-    fn work(self, cost: Cost) -> f64 {
+    /// Seconds of set-up and of the steps that share one matrix.
+    fn seconds_of(self, cost: Cost) -> f64 {
         cost.set_up + self.steps as f64 * cost.step
     }
 
-    /// Seconds of set-up and of the steps that share one matrix: work that every rank repeats, or work shared with messages.
+    /// Seconds of set-up and of the steps that share one matrix.
     pub(super) fn seconds(self, preconditioner: Preconditioner) -> f64 {
-        let (cost, steps) = (self.cost(preconditioner), self.steps as f64);
-        let work = self.work(cost);
-        if self.ranks == 1 || preconditioner.is_redundant(self.ranks, self.unknowns) {
-            return work;
+        self.seconds_of(self.cost(preconditioner))
+    }
+
+    /// Whether this many ranks take no less time than one, with this preconditioner.
+    pub(super) fn ranks_are_in_vain(self, preconditioner: Preconditioner) -> bool {
+        if self.ranks == 1 {
+            return false;
         }
-        work / self.ranks as f64 + (SET_UP_CYCLES + steps * cost.iterations) * MESSAGES
+        let one = self.on_one_rank();
+        let alone = one.seconds(Preconditioner::Auto.choose(one).0);
+        let other = OTHER * self.steps as f64 * self.unknowns as f64;
+        self.seconds(preconditioner) + other / self.ranks as f64 >= alone + other
     }
 }
 
@@ -163,12 +231,34 @@ mod tests {
             unknowns: 1_000_000,
             ranks: 1,
             steps: 1,
+            interface: 0,
             contact: true,
+            condensed: true,
             friction: false,
             precision: FactorPrecision::Double,
         };
         let [factor, multigrid] =
             [Preconditioner::Cholesky, Preconditioner::Gamg].map(|which| problem.cost(which));
         assert!(factor.memory > 5.0 * multigrid.memory && factor.set_up > 5.0 * multigrid.set_up);
+    }
+
+    #[test]
+    fn a_second_rank_pays_where_its_work_outweighs_messages() {
+        let square = |cells: usize, ranks: usize| ProblemSize {
+            dimension: 2,
+            unknowns: 2 * (cells + 1) * (cells + 1),
+            ranks,
+            interface: if ranks > 1 { 3 * cells } else { 0 },
+            steps: 64,
+            contact: true,
+            condensed: true,
+            friction: false,
+            precision: FactorPrecision::Auto,
+        };
+        let is_in_vain = |cells, ranks| square(cells, ranks).ranks_are_in_vain(Preconditioner::Cholesky);
+        assert!(is_in_vain(8, 2) && !is_in_vain(8, 1), "messages take longer than steps");
+        assert!([32, 128, 256, 512].iter().all(|&cells| !is_in_vain(cells, 2)));
+        let [one, two] = [1, 2].map(|ranks| square(256, ranks).cost(Preconditioner::Cholesky));
+        assert!(two.step < 0.65 * one.step && two.memory < 1.1 * one.memory, "{one:?} {two:?}");
     }
 }

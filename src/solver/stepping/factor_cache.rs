@@ -12,6 +12,7 @@ use super::{
 use crate::{
     error::Result,
     linear_algebra::petsc::{DistributedVector, Ksp, Matrix, ProjectedKsp},
+    mesh::Mesh,
     parallel::session::Session,
 };
 use std::mem::swap;
@@ -47,15 +48,13 @@ impl Krylov {
         used: &Solver,
         session: &Session,
         chosen: Preconditioner,
-        unknowns: usize,
+        mesh: &Mesh<D>,
         like: &DistributedVector,
     ) -> Result<Self> {
         Ok(match used {
-            Solver::Linear(_) => Self::Linear(linear(session, chosen, unknowns)?),
+            Solver::Linear(_) => Self::Linear(linear(session, chosen, mesh)?),
             Solver::Condensed(_) => Self::Condensed(Box::default()),
-            Solver::Newton(_) => {
-                Self::Newton(Box::new(projected::<D>(session, chosen, unknowns, like)?), Vec::new())
-            }
+            Solver::Newton(_) => Self::Newton(Box::new(projected(session, chosen, mesh, like)?), Vec::new()),
         })
     }
 
@@ -107,13 +106,12 @@ pub(super) fn nearest(base: f64, length: f64) -> f64 {
 impl Preconditioner {
     /// Estimated bytes of a factor or a hierarchy over all ranks, given those of the matrix: nested dissection's `n log n` and
     /// `n^(4/3)` entries, or a size proportional to the unknowns.
-    pub fn bytes(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> f64 {
+    pub fn bytes(self, dimension: usize, unknowns: usize, matrix: f64) -> f64 {
         let n = unknowns as f64;
         match self {
             Self::Auto | Self::Cholesky => {
                 let entries = if dimension == 2 { 7.0 * n * n.log2() } else { 28.0 * n.powf(4.0 / 3.0) };
-                let copies = if self.is_redundant(ranks, unknowns) { ranks } else { 1 };
-                8.0 * entries * copies as f64
+                8.0 * entries
             }
             Self::Gamg => 2.0 * matrix,
             Self::Boomeramg => 3.5 * matrix,
@@ -123,7 +121,7 @@ impl Preconditioner {
     /// Number of matrices of different lengths to store, each with its preconditioner, including the one in use: as many as fit
     /// into 512 MB on each rank, at most 8.
     pub fn kept(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
-        let each = (matrix + self.bytes(dimension, unknowns, ranks, matrix)) / ranks as f64;
+        let each = (matrix + self.bytes(dimension, unknowns, matrix)) / ranks as f64;
         ((ROOM / each.max(1.0)) as usize).clamp(1, MOST)
     }
 }
@@ -149,7 +147,9 @@ mod tests {
                 unknowns,
                 ranks,
                 steps: 2,
+                interface: 0,
                 contact: true,
+                condensed: true,
                 friction: false,
                 precision,
             };

@@ -11,17 +11,18 @@ use crate::{
 /// The frames of the contact nodes of all ranks.
 pub(super) struct Frames {
     dimension: usize,
-    /// Index of the frame of each node of all ranks, or `NONE`.
-    at: Vec<u32>,
+    /// Global numbers of the contact nodes, ascending.
+    nodes: Vec<u32>,
     /// `dimension` directions each.
     directions: Vec<f64>,
+    /// The range of this rank in these nodes, and the local numbers of its nodes.
+    own: std::ops::Range<usize>,
+    own_nodes: Vec<usize>,
     /// The components along directions on which contact laws act, of all ranks.
     pub unknowns: Vec<usize>,
     /// The unknowns of each contact node.
     pub groups: Vec<std::ops::Range<usize>>,
 }
-
-const NONE: u32 = u32::MAX;
 
 impl Frames {
     /// The frames of the contact nodes of this rank and all others. Collective.
@@ -31,38 +32,44 @@ impl Frames {
         nodes: &[ContactNode<D>],
     ) -> Result<Self> {
         let world = session.world();
-        let mine: Vec<u64> = nodes.iter().map(|c| (mesh.first_node + c.node) as u64).collect();
+        let mine: Vec<u32> = nodes.iter().map(|c| mesh.global_node(c.node as u32)).collect();
         let all = gather(world, &mine)?;
         let seen = gather(world, &nodes.iter().map(|c| c.seen as u64).collect::<Vec<_>>())?;
         let directions: Vec<f64> = nodes.iter().flat_map(|c| c.frame.as_flattened().to_vec()).collect();
         let directions = gather(world, &directions)?;
-        let mut at = vec![NONE; mesh.total_nodes];
         let (mut unknowns, mut groups) = (Vec::new(), Vec::new());
-        for (number, (&node, &seen)) in all.iter().zip(&seen).enumerate() {
-            at[node as usize] = number as u32;
+        for (&node, &seen) in all.iter().zip(&seen) {
             let first = unknowns.len();
             unknowns.extend((0..seen as usize).map(|i| node as usize * D + i));
             groups.push(first..unknowns.len());
         }
-        Ok(Self { dimension: D, at, directions, unknowns, groups })
+        let start = session.share_start(nodes.len());
+        Ok(Self {
+            dimension: D,
+            nodes: all,
+            directions,
+            own: start..start + nodes.len(),
+            own_nodes: nodes.iter().map(|c| c.node).collect(),
+            unknowns,
+            groups,
+        })
     }
 
-    /// Number of unknowns of all nodes of all ranks.
-    pub(super) fn total(&self) -> usize {
-        self.at.len() * self.dimension
+    /// The global numbers of the contact nodes, ascending.
+    pub(super) fn nodes(&self) -> &[u32] {
+        &self.nodes
     }
 
-    /// The components of a nodal value along its directions; `None` where these are the axes.
-    fn of(&self, node: usize) -> Option<&[f64]> {
+    fn directions(&self, number: usize) -> &[f64] {
         let size = self.dimension * self.dimension;
-        (self.at[node] != NONE).then(|| &self.directions[self.at[node] as usize * size..][..size])
+        &self.directions[number * size..][..size]
     }
 
-    /// Transforms components along the axes into components along the directions, or back.
+    /// Transforms the components of the values of this rank along the axes into components along the directions, or back.
     pub(super) fn turn(&self, values: &mut [f64], back: bool) {
         let d = self.dimension;
-        for (node, value) in values.chunks_exact_mut(d).enumerate() {
-            let Some(frame) = self.of(node) else { continue };
+        for (&node, number) in self.own_nodes.iter().zip(self.own.clone()) {
+            let (frame, value) = (self.directions(number), &mut values[node * d..][..d]);
             let entry = |i: usize, j: usize| if back { frame[j * d + i] } else { frame[i * d + j] };
             let mut before = [0.0; 3];
             before[..d].copy_from_slice(value);
@@ -72,18 +79,20 @@ impl Frames {
         }
     }
 
-    /// The same for a matrix.
+    /// The same for the rows of a matrix on this rank.
     pub(super) fn turn_matrix(&self, rows: &mut BlockRows) {
         let d = self.dimension;
-        for row in 0..rows.offsets.len() - 1 {
-            for at in rows.offsets[row]..rows.offsets[row + 1] {
-                let block = &mut rows.values[at * d * d..][..d * d];
-                if let Some(frame) = self.of(row) {
-                    multiply(block, |block, i, j| (0..d).map(|k| frame[i * d + k] * block[k * d + j]).sum());
-                }
-                if let Some(frame) = self.of(rows.columns[at] as usize) {
-                    multiply(block, |block, i, j| (0..d).map(|k| block[i * d + k] * frame[j * d + k]).sum());
-                }
+        for (&row, number) in self.own_nodes.iter().zip(self.own.clone()) {
+            let frame = self.directions(number);
+            let blocks = rows.offsets[row] * d * d..rows.offsets[row + 1] * d * d;
+            for block in rows.values[blocks].chunks_exact_mut(d * d) {
+                multiply(block, |block, i, j| (0..d).map(|k| frame[i * d + k] * block[k * d + j]).sum());
+            }
+        }
+        for (&column, block) in rows.columns.iter().zip(rows.values.chunks_exact_mut(d * d)) {
+            if let Ok(number) = self.nodes.binary_search(&column) {
+                let frame = self.directions(number);
+                multiply(block, |block, i, j| (0..d).map(|k| block[i * d + k] * frame[j * d + k]).sum());
             }
         }
     }
@@ -91,7 +100,9 @@ impl Frames {
 
 /// Transforms the entries of a square block.
 fn multiply(block: &mut [f64], entry: impl Fn(&[f64], usize, usize) -> f64) {
-    let before = block.to_vec();
+    let mut before = [0.0; 9];
+    let before = &mut before[..block.len()];
+    before.copy_from_slice(block);
     let d = block.len().isqrt();
-    block.iter_mut().enumerate().for_each(|(k, value)| *value = entry(&before, k / d, k % d));
+    block.iter_mut().enumerate().for_each(|(k, value)| *value = entry(before, k / d, k % d));
 }

@@ -1,8 +1,11 @@
 //! Krylov methods and preconditioners for the constant matrix.
 
+use super::substructuring::SharedFactor;
 use crate::{
     error::Result,
     linear_algebra::petsc::{HAS_HYPRE, HAS_MUMPS, Ksp, Precision, require, set_default_option},
+    mesh::Mesh,
+    parallel::session::Session,
 };
 
 pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner};
@@ -39,8 +42,13 @@ pub struct ProblemSize {
     pub ranks: usize,
     /// Number of steps that share one matrix, as far as it is known.
     pub steps: u64,
+    /// Unknowns of the interface between subdomains and of the contact, for which ranks share a dense matrix; not used on one rank.
+    pub interface: usize,
     /// Whether there is contact.
     pub contact: bool,
+    /// Whether a factor condenses steps to the contact: there is contact, at nodes that are not too many, and nothing in the bodies
+    /// flows during a step.
+    pub condensed: bool,
     /// Whether there is friction.
     pub friction: bool,
     /// The requested precision of factors.
@@ -49,32 +57,30 @@ pub struct ProblemSize {
 
 /// Size in bytes above which factors are made on request only.
 const LARGEST_FACTOR: f64 = 4e9;
-/// Largest number of unknowns for which every rank factors the matrix itself.
-const REDUNDANT: usize = 50_000;
 /// Krylov iterations after which a linear solve fails.
 pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 
 impl Preconditioner {
     /// Replaces `Auto` by the faster choice for this problem, and returns the reason.
     pub fn resolve(self, problem: ProblemSize) -> (Self, String) {
-        let (chosen, why) = self.choose(problem);
-        let single = chosen == Self::Cholesky && problem.factor_precision() == Precision::Single;
-        (chosen, if single { format!("{why}; factors in single precision") } else { why })
+        let (chosen, mut why) = self.choose(problem);
+        if chosen == Self::Cholesky && problem.factor_precision() == Precision::Single {
+            why += "; factors in single precision";
+        }
+        if problem.ranks_are_in_vain(chosen) {
+            why += &format!("; {} ranks are no faster than 1 here", problem.ranks);
+        }
+        (chosen, why)
     }
 
-    fn choose(self, problem: ProblemSize) -> (Self, String) {
+    /// The choice, and the reason.
+    pub(super) fn choose(self, problem: ProblemSize) -> (Self, String) {
         if self != Self::Auto {
             return (self, "[solver] preconditioner asks for it".into());
         }
-        let memory = problem.cost(Self::Cholesky).memory;
-        if problem.ranks > 1 && problem.unknowns > REDUNDANT {
-            let why = format!(
-                "above {REDUNDANT} velocity components several ranks don't factor all of the matrix each"
-            );
-            return (Self::Gamg, why);
-        }
+        let memory = problem.cost(Self::Cholesky).memory / problem.ranks as f64;
         if memory > LARGEST_FACTOR {
-            return (Self::Gamg, format!("a factor would take some {:.0} GB", memory / 1e9));
+            return (Self::Gamg, format!("a factor would take some {:.0} GB on each rank", memory / 1e9));
         }
         let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| problem.seconds(which));
         let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
@@ -85,11 +91,6 @@ impl Preconditioner {
             seconds(multigrid)
         );
         (chosen, why)
-    }
-
-    /// Whether every rank factors the whole matrix.
-    pub fn is_redundant(self, ranks: usize, unknowns: usize) -> bool {
-        matches!(self, Self::Auto | Self::Cholesky) && ranks > 1 && unknowns <= REDUNDANT
     }
 
     /// Number of iterations that take as long as rebuilding it; in 3D rebuilding never pays (measured, see
@@ -114,25 +115,28 @@ impl Preconditioner {
 
     /// Sets the method and the preconditioner; PETSc options of the user have priority.
     ///
-    /// Each rank applies CHOLMOD to a small matrix separately: MUMPS on several ranks sums in the order in which messages arrive,
-    /// so that results of two runs differ in the last bits. MUMPS is used only for larger matrices. The faster triple product for
-    /// the coarse matrices of GAMG also sums in the order of arrival, as soon as a rank has two neighbours, and is not used then.
-    pub(super) fn configure(self, ksp: &mut Ksp, ranks: usize, unknowns: usize) -> Result<()> {
+    /// Ranks share a factor, whose results repeat each bit, unless their interface is too large for it: MUMPS sums in the order in
+    /// which messages arrive, so that results of two runs differ in the last bits. The faster triple product for the coarse matrices
+    /// of GAMG also sums in the order of arrival, as soon as a rank has two neighbours, and is not used then.
+    pub(super) fn configure<const D: usize>(
+        self,
+        session: &Session,
+        mesh: &Mesh<D>,
+        ksp: &mut Ksp,
+    ) -> Result<()> {
+        let ranks = session.ranks();
         ksp.set_method("cg")?;
         match self {
             Self::Auto | Self::Cholesky if ranks == 1 => ksp.set_preconditioner("cholesky", Some("cholmod")),
-            Self::Auto | Self::Cholesky if self.is_redundant(ranks, unknowns) => {
-                ksp.set_preconditioner("redundant", None)?;
-                set_default_option("redundant_ksp_type", "preonly")?;
-                set_default_option("redundant_pc_type", "cholesky")?;
-                set_default_option("redundant_pc_factor_mat_solver_type", "cholmod")
-            }
             Self::Auto | Self::Cholesky => {
+                if let Some(shared) = SharedFactor::new(session, mesh)? {
+                    return ksp.precondition_by(Box::new(shared));
+                }
                 require(
                     HAS_MUMPS,
-                    "[solver] preconditioner = \"cholesky\" of so many unknowns on several ranks",
+                    "[solver] preconditioner = \"cholesky\" with so many unknowns between subdomains",
                     "MUMPS",
-                    "use \"gamg\", or one rank",
+                    "use \"gamg\", or fewer ranks",
                 )?;
                 ksp.set_preconditioner("cholesky", Some("mumps"))
             }
@@ -173,7 +177,26 @@ mod tests {
 
     fn problem(dimension: usize, unknowns: usize, ranks: usize, steps: u64) -> ProblemSize {
         let precision = FactorPrecision::Auto;
-        ProblemSize { dimension, unknowns, ranks, steps, contact: true, friction: false, precision }
+        let interface = match (ranks, dimension) {
+            (1, _) => 0,
+            (_, 2) => 3 * (unknowns as f64).sqrt() as usize,
+            _ => 3 * (unknowns as f64).powf(2.0 / 3.0) as usize,
+        };
+        ProblemSize {
+            dimension,
+            unknowns,
+            ranks,
+            interface,
+            steps,
+            contact: true,
+            condensed: true,
+            friction: false,
+            precision,
+        }
+    }
+
+    fn precision_of(problem: ProblemSize) -> Precision {
+        problem.factor_precision()
     }
 
     fn chosen(problem: ProblemSize) -> Preconditioner {
@@ -190,14 +213,16 @@ mod tests {
 
     #[test]
     fn factors_in_space_are_in_single_precision_where_few_steps_share_them() {
-        let precision = |problem: ProblemSize| problem.factor_precision();
-        assert_eq!(precision(problem(3, 100_000, 1, 16)), Precision::Single);
-        assert_eq!(precision(problem(3, 100_000, 1, 1000)), Precision::Double);
-        assert_eq!(precision(problem(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
-        assert_eq!(precision(problem(2, 500_000, 1, 1)), Precision::Double);
-        assert_eq!(precision(ProblemSize { contact: false, ..problem(3, 100_000, 1, 1) }), Precision::Double);
+        assert_eq!(precision_of(problem(3, 100_000, 1, 16)), Precision::Single);
+        assert_eq!(precision_of(problem(3, 100_000, 1, 1000)), Precision::Double);
+        assert_eq!(precision_of(problem(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
+        assert_eq!(precision_of(problem(2, 500_000, 1, 1)), Precision::Double);
+        assert_eq!(
+            precision_of(ProblemSize { contact: false, condensed: false, ..problem(3, 100_000, 1, 1) }),
+            Precision::Double
+        );
         let asked = |steps| ProblemSize { precision: FactorPrecision::Single, ..problem(2, 1_000, 1, steps) };
-        assert_eq!(precision(asked(1000)), Precision::Single);
+        assert_eq!(precision_of(asked(1000)), Precision::Single);
         let (_, why) = Preconditioner::Cholesky.resolve(asked(1));
         assert!(why.ends_with("; factors in single precision"), "{why}");
     }
@@ -209,12 +234,18 @@ mod tests {
     }
 
     #[test]
-    fn ranks_factor_small_matrices_each_for_itself() {
-        assert_eq!(chosen(problem(2, 500_000, 2, 64)), Preconditioner::Gamg);
-        assert_eq!(chosen(problem(2, 40_000, 2, 64)), Preconditioner::Cholesky);
+    fn ranks_share_a_factor_where_their_interface_is_small() {
+        for unknowns in [40_000, 500_000] {
+            assert_eq!(chosen(problem(2, unknowns, 2, 64)), Preconditioner::Cholesky);
+        }
+        assert_eq!(precision_of(problem(3, 100_000, 2, 16)), Precision::Single);
+        let crowded = ProblemSize { interface: 20_000, ..problem(2, 500_000, 2, 64) };
+        assert_eq!(chosen(crowded), Preconditioner::Gamg, "MUMPS is slower");
         for steps in [1, 8, 1000] {
             assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
         }
+        let (_, why) = Preconditioner::Auto.resolve(problem(2, 300, 7, 64));
+        assert!(why.ends_with("; 7 ranks are no faster than 1 here"), "{why}");
         let (asked, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
         assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
     }

@@ -30,6 +30,7 @@ mod step_error;
 mod step_length;
 mod step_solver;
 mod stepper;
+mod substructuring;
 
 pub use adaptive::{Adaptive, AdaptiveSettings, Pace};
 pub use cost::Cost;

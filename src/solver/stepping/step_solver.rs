@@ -54,10 +54,10 @@ impl StepSolver {
         state: &State,
         settings: SolverSettings,
     ) -> Result<Self> {
-        let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision);
+        let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision)?;
         let (preconditioner, reason) = settings.preconditioner.resolve(problem);
         let settings = SolverSettings { preconditioner, ..settings };
-        let solver = Solver::new(session, body, &state.velocity, settings, problem.factor_precision())?;
+        let solver = Solver::new(session, body, &state.velocity, settings, problem)?;
         Ok(Self {
             settings,
             reason,
@@ -153,7 +153,7 @@ impl StepSolver {
         let mut krylov = match next {
             Some(krylov) => krylov,
             None if self.cached.is_none() && !self.is_broken => return Ok(()),
-            None => Krylov::another::<D>(&self.solver, session, chosen, unknowns, like)?,
+            None => Krylov::another(&self.solver, session, chosen, &body.mesh, like)?,
         };
         krylov.exchange(&mut self.solver);
         let Some((length, matrix)) = self.cached.take() else { return Ok(()) };

@@ -2,23 +2,28 @@ use super::{
     analysis::{Analysis, Supernodes},
     large_pages,
     lower_half::Lower,
-    panel, single_blas, sys,
+    panel::Real,
+    sys,
 };
+use std::ops::Range;
 
-/// A supernodal factor in single precision, with half the memory and half the traffic of one in double precision.
+/// A supernodal factor on CHOLMOD's symbolic analysis, in single precision with half the memory and half the traffic of one in double
+/// precision.
 ///
 /// The matrix is scaled to a diagonal near one, by powers of two: `L` here is that of `s K s`.
 #[derive(Debug)]
-pub(super) struct SingleFactor {
+pub(super) struct SupernodalFactor<R> {
     /// The panels one after the other, in CHOLMOD's layout.
-    pub values: Vec<f32>,
+    pub values: Vec<R>,
     /// The scale `s` of the unknown at each position of the order of elimination.
     pub scales: Vec<f64>,
+    /// The first position that substitutions leave alone: the end, or that of the last unknowns, which are not factored then.
+    end: usize,
     /// Right-hand side, half a solution or solution, over `size`, place by place.
-    vector: Vec<f32>,
+    vector: Vec<R>,
     size: f64,
     /// Values in the rows of a supernode.
-    values_there: Vec<f32>,
+    values_there: Vec<R>,
     /// The result of the forward substitution for the last unknowns, unscaled.
     pub last: Vec<f64>,
 }
@@ -26,40 +31,59 @@ pub(super) struct SingleFactor {
 /// The end of a list of supernodes.
 const NONE: u32 = u32::MAX;
 
-impl SingleFactor {
-    /// Factors the matrix that was analysed; `None` where it is not positive definite in single precision.
-    pub(super) fn new(analysis: &Analysis, lower: &Lower, last: usize) -> Option<Self> {
+impl<R: Real> SupernodalFactor<R> {
+    /// Factors the matrix that was analysed; `None` where it is not positive definite in this precision. With `partial`, the last
+    /// unknowns are not eliminated, and the entries between two of them count as zero: their panels hold `-K_lf K_ff^-1 K_fl`, the
+    /// contribution of the other unknowns to their Schur complement.
+    pub(super) fn new(analysis: &Analysis, lower: &Lower, last: usize, partial: bool) -> Option<Self> {
         let (order, nodes) = (&analysis.order, analysis.supernodes());
-        let columns = Columns::of(order, lower)?;
-        let mut values = vec![0.0; (0..nodes.len()).map(|node| nodes.panel(node).len()).sum()];
+        let end = if partial { order.len() - last } else { order.len() };
+        let columns = Columns::<R>::of(order, lower)?;
+        let mut values = vec![R::default(); (0..nodes.len()).map(|node| nodes.panel(node).len()).sum()];
         large_pages::put(&values);
-        factor(nodes, &columns, &mut values)?;
+        factor(nodes, &columns, end, &mut values)?;
         let longest = (0..nodes.len()).map(|node| nodes.rows(node).len()).max();
         Some(Self {
             values,
             scales: columns.scales,
-            vector: vec![0.0; order.len()],
+            end,
+            vector: vec![R::default(); order.len()],
             size: 1.0,
-            values_there: vec![0.0; longest.unwrap_or(0)],
+            values_there: vec![R::default(); longest.unwrap_or(0)],
             last: vec![0.0; last],
         })
     }
 
+    /// The entries in the columns of the last unknowns, unscaled if these were not eliminated: column after column, each from the
+    /// diagonal down.
+    pub(super) fn last_columns(&self, analysis: &Analysis) -> Vec<f64> {
+        let (first, is_partial) = (self.scales.len() - self.last.len(), self.end < self.scales.len());
+        last_columns(analysis, first, |at, row, column| {
+            let scale = if is_partial { self.scales[row] * self.scales[column] } else { self.scales[row] };
+            self.values[at].exact() / scale
+        })
+    }
+
+    /// Solves `L y = b` for the unknowns that were eliminated; what is left of `b` for the others stands in `last`.
     pub(super) fn forward(&mut self, analysis: &Analysis, right_hand_side: &[f64]) {
         let scaled = |(&unknown, scale): (&u32, &f64)| right_hand_side[unknown as usize] * scale;
         let places = analysis.order.iter().zip(&self.scales);
         let largest = places.clone().map(|place| scaled(place).abs()).fold(0.0, f64::max);
         self.size = if largest > 0.0 && largest.is_finite() { largest } else { 1.0 };
-        let shares = places.map(|place| (scaled(place) / self.size) as f32);
+        let shares = places.map(|place| R::rounded(scaled(place) / self.size));
         self.vector.iter_mut().zip(shares).for_each(|(value, share)| *value = share);
         let nodes = analysis.supernodes();
         for node in 0..nodes.len() {
-            let (columns, rows) = (nodes.columns(node), nodes.rows(node));
+            let (columns, rows) = (eliminated(nodes.columns(node), self.end), nodes.rows(node));
+            if columns.is_empty() {
+                break;
+            }
             let (own, below) = self.values_there[..rows.len()].split_at_mut(columns.len());
             own.copy_from_slice(&self.vector[columns.clone()]);
-            below.fill(0.0);
+            below.fill(R::default());
             let there = &mut self.values_there[..rows.len()];
-            panel::forward(&self.values[nodes.panel(node)], columns.len(), there);
+            let panel = &self.values[nodes.panel(node)][..columns.len() * rows.len()];
+            R::forward(panel, columns.len(), there);
             let (own, below) = there.split_at(columns.len());
             self.vector[columns.clone()].copy_from_slice(own);
             for (&row, value) in rows[columns.len()..].iter().zip(below) {
@@ -67,40 +91,91 @@ impl SingleFactor {
             }
         }
         let first = self.vector.len() - self.last.len();
-        for (last, value) in self.last.iter_mut().zip(&self.vector[first..]) {
-            *last = self.size * f64::from(*value);
+        let is_partial = self.end < self.vector.len();
+        for ((last, value), scale) in
+            self.last.iter_mut().zip(&self.vector[first..]).zip(&self.scales[first..])
+        {
+            *last = self.size * value.exact() / if is_partial { *scale } else { 1.0 };
         }
     }
 
+    /// Solves `L^T x = y` for the unknowns that were eliminated, given `y` in `last`, or the solution for those that were not.
     pub(super) fn backward(&mut self, analysis: &Analysis, solution: &mut [f64]) {
         let first = self.vector.len() - self.last.len();
-        for (last, value) in self.last.iter().zip(&mut self.vector[first..]) {
-            *value = (last / self.size) as f32;
+        let is_partial = self.end < self.vector.len();
+        if is_partial {
+            // The solution of the last unknowns has another size than the right-hand side.
+            let scaled =
+                self.last.iter().zip(&self.scales[first..]).map(|(last, scale)| (last / scale).abs());
+            let largest = scaled.fold(0.0, f64::max);
+            let ratio = if largest.is_finite() { (largest / self.size).max(1.0) } else { 1.0 };
+            self.vector[..first].iter_mut().for_each(|value| *value = R::rounded(value.exact() / ratio));
+            self.size *= ratio;
+        }
+        for ((last, value), scale) in
+            self.last.iter().zip(&mut self.vector[first..]).zip(&self.scales[first..])
+        {
+            *value = R::rounded(last / self.size / if is_partial { *scale } else { 1.0 });
         }
         let nodes = analysis.supernodes();
         for node in (0..nodes.len()).rev() {
-            let (columns, rows) = (nodes.columns(node), nodes.rows(node));
+            let (columns, rows) = (eliminated(nodes.columns(node), self.end), nodes.rows(node));
+            if columns.is_empty() {
+                continue;
+            }
             let there = &mut self.values_there[..rows.len()];
             there.iter_mut().zip(rows).for_each(|(value, &row)| *value = self.vector[row as usize]);
-            panel::backward(&self.values[nodes.panel(node)], columns.len(), there);
+            let panel = &self.values[nodes.panel(node)][..columns.len() * rows.len()];
+            R::backward(panel, columns.len(), there);
             self.vector[columns.clone()].copy_from_slice(&there[..columns.len()]);
         }
         let places = analysis.order.iter().zip(&self.scales);
         for ((&unknown, scale), value) in places.zip(&self.vector) {
-            solution[unknown as usize] = self.size * scale * f64::from(*value);
+            solution[unknown as usize] = self.size * scale * value.exact();
         }
     }
 }
 
+/// The entries of a factor in the columns from position `first` on: column after column, each from the diagonal down. `value` gives
+/// them by their index in the panels, row and column.
+pub(super) fn last_columns(
+    analysis: &Analysis,
+    first: usize,
+    value: impl Fn(usize, usize, usize) -> f64,
+) -> Vec<f64> {
+    let last = analysis.order.len() - first;
+    let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
+    let mut columns = vec![0.0; last * (last + 1) / 2];
+    let nodes = analysis.supernodes();
+    for node in (0..nodes.len()).rev() {
+        let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
+        if own.end <= first {
+            break;
+        }
+        for column in own.clone().filter(|&column| column >= first) {
+            let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
+            for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
+                columns[to + row as usize - column] = value(from + at, row as usize, column);
+            }
+        }
+    }
+    columns
+}
+
+/// The columns of a supernode that are eliminated, if substitutions end at this position.
+fn eliminated(columns: Range<usize>, end: usize) -> Range<usize> {
+    columns.start.min(end)..columns.end.min(end)
+}
+
 /// The scaled matrix in the order of elimination, by columns from the diagonal down.
-struct Columns {
+struct Columns<R> {
     starts: Vec<usize>,
     rows: Vec<u32>,
-    values: Vec<f32>,
+    values: Vec<R>,
     scales: Vec<f64>,
 }
 
-impl Columns {
+impl<R: Real> Columns<R> {
     /// `None` where a diagonal entry is not positive.
     fn of(order: &[u32], lower: &Lower) -> Option<Self> {
         let mut place = vec![0u32; order.len()];
@@ -120,17 +195,17 @@ impl Columns {
         lower.entries().for_each(|(column, row, _)| starts[places(column, row).0 + 1] += 1);
         (1..starts.len()).for_each(|at| starts[at] += starts[at - 1]);
         let mut next = starts.clone();
-        let (mut rows, mut values) = (vec![0; lower.len()], vec![0.0; lower.len()]);
+        let (mut rows, mut values) = (vec![0; lower.len()], vec![R::default(); lower.len()]);
         for (column, row, value) in lower.entries() {
             let (column, row) = places(column, row);
             rows[next[column]] = row;
-            values[next[column]] = (value * scales[column] * scales[row as usize]) as f32;
+            values[next[column]] = R::rounded(value * scales[column] * scales[row as usize]);
             next[column] += 1;
         }
         Some(Self { starts, rows, values, scales })
     }
 
-    fn column(&self, at: usize) -> impl Iterator<Item = (usize, f32)> {
+    fn column(&self, at: usize) -> impl Iterator<Item = (usize, R)> {
         let range = self.starts[at]..self.starts[at + 1];
         self.rows[range.clone()].iter().map(|&row| row as usize).zip(self.values[range].iter().copied())
     }
@@ -176,37 +251,58 @@ impl Waiting {
 }
 
 /// The left-looking supernodal factorisation (Ng and Peyton 1993): each supernode receives the updates of earlier ones, and is then
-/// factored as a dense matrix.
-fn factor(nodes: Supernodes<'_>, columns: &Columns, values: &mut [f32]) -> Option<()> {
+/// factored as a dense matrix. Columns from position `end` on only receive updates.
+fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, values: &mut [R]) -> Option<()> {
     let mut waiting = Waiting::new(nodes);
     let mut line = vec![0u32; waiting.of_column.len()];
     let (mut update, mut lines) = (Vec::new(), Vec::new());
     for node in 0..nodes.len() {
         let (own, rows) = (nodes.columns(node), nodes.rows(node));
+        let factored = eliminated(own.clone(), end);
         (0..).zip(rows).for_each(|(at, &row)| line[row as usize] = at);
         let (earlier, panel) = values.split_at_mut(nodes.panel(node).start);
         let panel = &mut panel[..nodes.panel(node).len()];
-        for (column, panel) in own.clone().zip(panel.chunks_exact_mut(rows.len())) {
+        for (column, panel) in factored.clone().zip(panel.chunks_exact_mut(rows.len())) {
             columns.column(column).for_each(|(row, value)| panel[line[row] as usize] = value);
         }
         while let Some(other) = waiting.take(node) {
             let (all, first) = (nodes.rows(other), waiting.row[other]);
             let changed = all[first..].partition_point(|&row| (row as usize) < own.end);
-            let (height, panel_of_other) = (all.len() - first, &earlier[nodes.panel(other)]);
-            update.resize(usize::max(update.len(), height * changed), 0.0);
-            single_blas::own_product(panel_of_other, all.len(), first, changed, &mut update);
+            let height = all.len() - first;
+            let width = eliminated(nodes.columns(other), end).len();
+            let panel_of_other = &earlier[nodes.panel(other)][..width * all.len()];
+            update.resize(usize::max(update.len(), height * changed), R::default());
+            R::own_product(panel_of_other, all.len(), first, changed, &mut update);
             lines.clear();
             lines.extend(all[first..].iter().map(|&row| line[row as usize]));
             for (at, update) in update[..height * changed].chunks_exact(height).enumerate() {
                 let column = all[first + at] as usize - own.start;
                 let panel = &mut panel[column * rows.len()..][..rows.len()];
                 for (&line, value) in lines[at..].iter().zip(&update[at..]) {
-                    panel[line as usize] -= value;
+                    panel[line as usize] -= *value;
                 }
             }
             waiting.put(other, all, first + changed);
         }
-        single_blas::factor(panel, own.len())?;
+        let (width, height) = (factored.len(), rows.len());
+        if width == 0 {
+            continue;
+        }
+        R::factor(&mut panel[..width * height], width)?;
+        let rest = own.len() - width;
+        if rest > 0 {
+            let (panel, last) = panel.split_at_mut(width * height);
+            let below = height - width;
+            update.resize(usize::max(update.len(), rest * below), R::default());
+            R::own_product(panel, height, width, rest, &mut update);
+            let updates = update[..rest * below].chunks_exact(below).enumerate();
+            for ((at, update), column) in updates.zip(last.chunks_exact_mut(height)) {
+                column[width + at..]
+                    .iter_mut()
+                    .zip(&update[at..])
+                    .for_each(|(value, update)| *value -= *update);
+            }
+        }
         waiting.put(node, rows, own.len());
     }
     Some(())
