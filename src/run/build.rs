@@ -7,13 +7,13 @@ use crate::{
         body::Body,
         effect::{
             self, Adhesion, Bonded, Contact, ContactConditions, ContactMemory, Damage, Effect, ElasticLaw,
-            Held, Inertia, Load, Support, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress,
-            choose_unknowns, fixed_components,
+            Inertia, Load, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
+            fixed_components,
         },
         space::{Geometry, surface_points},
         state::State,
     },
-    job::{self, Fix, Job, Material, Named},
+    job::{self, Job, Material},
     laws::{
         contact::{Gap, NormalResponse},
         material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
@@ -33,8 +33,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let (materials, of_region) = materials(session, job, &mesh);
     let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
-    let supports = supports(job, &mesh);
-    let fixed = session.agree(fixed_components(&mesh, &supports, &state.velocity))?;
+    let fixed = session.agree(fixed_components(&mesh, &job.support, &state.velocity))?;
     let effects = session.agree(effects(&materials, &geometry))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
@@ -173,23 +172,6 @@ fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
     all.sort_unstable();
     all.dedup();
     all
-}
-
-fn supports<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Vec<Support> {
-    let mut out = Vec::new();
-    for support in &job.support {
-        let held = match &support.fix {
-            Fix::Named(Named::All) => Held::All,
-            Fix::Named(Named::Normal) => Held::Normal,
-            Fix::Axes(axes) => Held::Axes(axes.iter().map(|a| a.index()).collect()),
-        };
-        out.extend(support.on.iter().map(|name| Support {
-            name: name.clone(),
-            facets: facets(mesh, std::slice::from_ref(name)),
-            held: held.clone(),
-        }));
-    }
-    out
 }
 
 fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {

@@ -5,8 +5,9 @@ use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};
 use clarke::{
     fem::{
         body::Body,
-        effect::{Effect, Held, Inertia, ViscousStress},
+        effect::{Effect, Inertia, ViscousStress},
     },
+    job::{Axis, Fix, Named},
     laws::material::{ByMaterial, Isotropic},
     linear_algebra::{petsc::Matrix, tensor::larger},
     mesh::{
@@ -160,15 +161,15 @@ fn effects<const D: usize, const S: usize>() -> Vec<Box<dyn Effect<D, S>>> {
     ]
 }
 
-fn entries<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, held: &[(&str, Held)]) {
-    let (body, _) = body::<D, S>(session, whole, held, effects());
+fn entries<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, fixed: &[(&str, Fix)]) {
+    let (body, _) = body::<D, S>(session, whole, fixed, effects());
     let (dense, reference) = (gathered(session, &body), reference(whole));
-    let fixed = held_components(session, &body);
-    assert_eq!(fixed.iter().any(|f| *f), !held.is_empty());
+    let is_fixed = held_components(session, &body);
+    assert_eq!(is_fixed.iter().any(|f| *f), !fixed.is_empty());
     let largest = reference.iter().flatten().fold(0.0, |m, x| larger(m, x.abs()));
     for (row, (found, expected)) in dense.chunks_exact(reference.len()).zip(&reference).enumerate() {
         for (column, (found, expected)) in found.iter().zip(expected).enumerate() {
-            let decoupled = row != column && (fixed[row] || fixed[column]);
+            let decoupled = row != column && (is_fixed[row] || is_fixed[column]);
             let expected = if decoupled { 0.0 } else { *expected };
             let error = (found - expected).abs();
             assert!(error < 1e-13 * largest, "({row}, {column}): {found} is not {expected}");
@@ -227,14 +228,15 @@ pub fn compare(session: &Session) {
     let plane = crossed([3, 2]);
     let askew = stir(rectangle([1.0, 2.0], [4, 3], Diagonal::Alternating, [1.0, 1.0]).expect("mesh"), 0.06);
     let space = brick([2, 3, 2]);
-    let corner = [("left", Held::All), ("bottom", Held::Axes(vec![1]))];
+    let corner = [("left", Fix::Named(Named::All)), ("bottom", Fix::Axes(vec![Axis::Y]))];
     for mesh in [&plane, &askew] {
         entries::<2, 3>(session, mesh, &[]);
         entries::<2, 4>(session, mesh, &corner);
         rigid_motions::<2, 3>(session, mesh);
     }
     entries::<3, 6>(session, &space, &[]);
-    entries::<3, 6>(session, &space, &[("left", Held::Normal), ("front", Held::All)]);
+    let sides = [("left", Fix::Named(Named::Normal)), ("front", Fix::Named(Named::All))];
+    entries::<3, 6>(session, &space, &sides);
     rigid_motions::<3, 6>(session, &space);
     total_mass::<2, 3>(session, &plane, 1.2 * 0.9);
     total_mass::<3, 6>(session, &space, 1.0 * 0.8 * 1.1);

@@ -3,10 +3,8 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    fem::effect::{
-        Contact, ContactConditions, Effect, Held, Inertia, Quadrature, ViscousStress, choose_unknowns,
-    },
-    job::{Expression, Scalar},
+    fem::effect::{Contact, ContactConditions, Effect, Inertia, Quadrature, ViscousStress, choose_unknowns},
+    job::{Expression, Fix, Named, Scalar},
     laws::{
         contact::{
             Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph,
@@ -68,7 +66,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
         Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
     ];
-    let (body, state) = body::<D, S>(session, whole, &[("left", Held::All)], effects);
+    let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Named(Named::All))], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
     let [bottom, right] =

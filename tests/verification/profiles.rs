@@ -3,8 +3,9 @@
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
-    fem::effect::{Contact, ContactConditions, Effect, Held, Inertia, Quadrature},
+    fem::effect::{Contact, ContactConditions, Effect, Inertia, Quadrature},
     io::output::profiles::Profiles,
+    job::{Axis, Fix},
     laws::{
         contact::{Bound, Gap, NormalResponse, Unilateral},
         material::ByMaterial,
@@ -73,7 +74,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     down[D - 1] = -1.0;
     let normal = turned(down);
     let effects: Vec<Box<dyn Effect<D, S>>> = vec![Box::new(Inertia { density: ByMaterial::uniform(1.0) })];
-    let (mut body, mut state) = body::<D, S>(session, &whole, &[("left", Held::Axes(vec![0]))], effects);
+    let (mut body, mut state) = body::<D, S>(session, &whole, &[("left", Fix::Axes(vec![Axis::X]))], effects);
     let random = |salt: usize| {
         move |id: usize, _: &[f64; D]| std::array::from_fn(|i| noise(((salt * 1000 + id) * D + i) as u64))
     };

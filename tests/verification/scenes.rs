@@ -4,11 +4,11 @@ use crate::mpirun::scramble;
 use clarke::{
     fem::{
         body::Body,
-        effect::{Effect, Evaluation, Held, Support, fixed_components},
+        effect::{Effect, Evaluation, fixed_components},
         space::Geometry,
         state::State,
     },
-    job::Job,
+    job::{Fix, Job, Support},
     mesh::{
         GlobalMesh, Mesh, distribute,
         generate::{Diagonal, box_mesh, rectangle},
@@ -55,23 +55,20 @@ pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D>
     distribute(session, parts).expect("distributed")
 }
 
-/// A body at rest that is held on some boundaries and feels these effects.
+/// A body at rest whose displacement is fixed on some boundaries, with these effects.
 pub fn body<const D: usize, const S: usize>(
     session: &Session,
     whole: &GlobalMesh<D>,
-    held: &[(&str, Held)],
+    fixed: &[(&str, Fix)],
     effects: Vec<Box<dyn Effect<D, S>>>,
 ) -> (Body<D, S>, State) {
     let mesh = part(session, whole);
     let state = State::at_rest(&mesh).expect("state");
-    let supports: Vec<Support> = held
-        .iter()
-        .map(|(name, held)| Support {
-            name: (*name).to_owned(),
-            facets: mesh.boundary(name).expect("a boundary").facets.clone(),
-            held: held.clone(),
-        })
-        .collect();
+    let support = |(name, fix): &(&str, Fix)| {
+        mesh.boundary(name).expect("a boundary");
+        Support { on: vec![(*name).to_owned()], fix: fix.clone() }
+    };
+    let supports: Vec<Support> = fixed.iter().map(support).collect();
     let fixed = fixed_components(&mesh, &supports, &state.velocity).expect("flags");
     let geometry = Geometry::new(&mesh);
     let body = Body::new(mesh, geometry, effects, fixed, Evaluation::Converged);

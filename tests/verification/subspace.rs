@@ -4,7 +4,8 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     error::Result,
-    fem::effect::{Effect, Held, Inertia, ViscousStress},
+    fem::effect::{Effect, Inertia, ViscousStress},
+    job::{Fix, Named},
     laws::material::{ByMaterial, Isotropic},
     linear_algebra::petsc::{DistributedVector, Matrix, ProjectedKsp, ProjectedOperator, set_default_option},
     mesh::GlobalMesh,
@@ -40,7 +41,7 @@ fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
         Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
     ];
-    let (body, state) = body::<D, S>(session, whole, &[("left", Held::All)], effects);
+    let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Named(Named::All))], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
     let solver = |refresh_threshold| {

@@ -45,7 +45,7 @@ pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use step::{Blend, Evaluation, Step};
 pub use step_error::{Curvature, StressError};
-pub use support::{Held, Support, fixed_components};
+pub use support::fixed_components;
 pub use surface::{SurfaceEffect, SurfaceState, SurfaceStep};
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
