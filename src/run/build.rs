@@ -1,6 +1,5 @@
 //! Builds a body from the tables of a job. A table that is absent creates nothing.
 
-use super::steps;
 use crate::{
     error::{Error, Result},
     fem::{
@@ -21,7 +20,7 @@ use crate::{
     linear_algebra::tensor::Vector,
     mesh::Mesh,
     parallel::session::Session,
-    solver::stepping::{SolverSettings, evaluation},
+    solver::stepping::evaluation,
 };
 
 /// Builds the body of a job on this rank's mesh. Collective.
@@ -206,18 +205,4 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
     let mut velocity = state.velocity.owned_mut()?;
     velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
     Ok(())
-}
-
-/// The solver settings of a job.
-pub(super) fn settings(job: &Job) -> SolverSettings {
-    SolverSettings {
-        tolerance: job.solver.tolerance,
-        inclusion_tolerance: job.solver.inclusion_tolerance,
-        method: job.solver.method,
-        preconditioner: job.solver.preconditioner,
-        factor_precision: job.solver.factor_precision,
-        steps: steps::steps_a_matrix(job),
-        newton_iterations: job.solver.max_newton_iterations as usize,
-        friction: job.solver.friction,
-    }
 }

@@ -5,12 +5,12 @@ use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
     io::output::probes::Probes,
-    job::{Accept, Job, Loaded},
+    job::{Job, Loaded},
     linear_algebra::{petsc::set_option, tensor::Vector},
     mesh::Mesh,
     parallel::session::Session,
     solver::{
-        certificate::{Accepted, Certificates, Verdict},
+        certificate::{Certificates, Verdict},
         stepping::Stepper,
     },
 };
@@ -41,7 +41,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
-    let scheme = Stepper::new(session, &mut body, &state, job.time.scheme, build::settings(job));
+    let shared = steps::steps_a_matrix(job);
+    let scheme = Stepper::new(session, &mut body, &state, job.time.scheme, &job.solver, shared);
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",
@@ -66,18 +67,9 @@ pub(super) fn setup<const D: usize, const S: usize>(
     } else {
         session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
     };
-    scheme.other_starts = job.solver.guesses as usize;
-    scheme.accepts_fast_flow = accepted(job).explicit_stability;
-    let verdict = certificates.verdict(longest, unique_step, accepted(job));
+    let verdict = certificates.verdict(longest, unique_step, &job.solver.accept);
     session.agree(refuse(loaded, &verdict))?;
     Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings })
-}
-
-fn accepted(job: &Job) -> Accepted {
-    Accepted {
-        uniqueness: job.solver.accept.contains(&Accept::Uniqueness),
-        explicit_stability: job.solver.accept.contains(&Accept::ExplicitStability),
-    }
 }
 
 fn refuse(loaded: &Loaded, verdict: &Verdict) -> Result<()> {

@@ -2,20 +2,12 @@
 
 use crate::{
     job::{Every, Job},
-    solver::stepping::{Adaptive, AdaptiveSettings, Landings},
+    solver::stepping::{Adaptive, Landings},
 };
 
 /// The step size control of a job with adaptive steps.
 pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
-    job.time.adaptive.as_ref().map(|adaptive| {
-        Adaptive::new(AdaptiveSettings {
-            tolerance: adaptive.tolerance,
-            first: job.time.step,
-            smallest: adaptive.smallest_step,
-            largest: adaptive.largest_step,
-            end: job.time.end,
-        })
-    })
+    job.time.adaptive.clone().map(|settings| Adaptive::new(settings, job.time.step, job.time.end))
 }
 
 /// The longest step of a job.

@@ -7,10 +7,7 @@ use super::{
     picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
     scale::{number, size},
 };
-use crate::{
-    io::output::field_list::FIELDS,
-    solver::certificate::{Accepted, Certificates},
-};
+use crate::{io::output::field_list::FIELDS, job::Accept, solver::certificate::Certificates};
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -141,7 +138,7 @@ pub(super) fn certificates(found: &Found) -> String {
     let steps = found.history.as_ref().and_then(|history| history.column("dt"));
     let longest = steps.and_then(|steps| steps.into_iter().reduce(f64::max));
     if let Some(step) = longest.or_else(|| found.job.as_ref().map(|job| job.time.step)) {
-        let verdict = known.verdict(step, None, Accepted { uniqueness: true, explicit_stability: true });
+        let verdict = known.verdict(step, None, &[Accept::Uniqueness, Accept::ExplicitStability]);
         let _ = writeln!(out, "<h3>Verdict for steps of {} s</h3>\n<ul>", number(step));
         for words in &verdict.words {
             let _ = writeln!(out, "<li>{}</li>", escape(words));

@@ -39,7 +39,7 @@ mod suprema;
 mod verdict;
 
 pub use certificates::Certificates;
-pub use verdict::{Accepted, Verdict};
+pub use verdict::Verdict;
 
 use crate::{
     error::Result,

@@ -1,15 +1,7 @@
 //! What the certificates mean for a run.
 
 use super::Certificates;
-
-/// What a job accepts although a certificate speaks against it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Accepted {
-    /// Steps with more than one solution.
-    pub uniqueness: bool,
-    /// Steps beyond the explicit bound.
-    pub explicit_stability: bool,
-}
+use crate::job::Accept;
 
 /// The outcome.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -24,8 +16,9 @@ pub struct Verdict {
 
 impl Certificates {
     /// Holds the certificates against a fixed step of this length. `unique_step` is the largest step with which
-    /// `theta_step` is below 1 by the margin, where it is known.
-    pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: Accepted) -> Verdict {
+    /// `theta_step` is below 1 by the margin, where it is known; `accepted` is what the job accepts although a certificate speaks
+    /// against it.
+    pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: &[Accept]) -> Verdict {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
         if let Some(fall) = self.monotonicity_constant {
@@ -66,11 +59,11 @@ impl Certificates {
                 let meaning = "below 1: each step has one solution";
                 verdict.words.push(format!("theta of a step = {theta:.4}, {meaning}{covered}"));
             } else {
-                verdict.uniqueness(theta, step, unique_step, accepted.uniqueness);
+                verdict.uniqueness(theta, step, unique_step, accepted.contains(&Accept::Uniqueness));
             }
         }
         if let Some(bound) = self.explicit_step_bound {
-            verdict.stability(self, bound, step, accepted.explicit_stability);
+            verdict.stability(self, bound, step, accepted.contains(&Accept::ExplicitStability));
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
@@ -177,15 +170,14 @@ mod tests {
 
     #[test]
     fn a_sound_problem_is_neither_refused_nor_warned_of() {
-        let verdict = paper().verdict(1.0 / 64.0, None, Accepted::default());
+        let verdict = paper().verdict(1.0 / 64.0, None, &[]);
         assert!(verdict.refusals.is_empty() && verdict.warnings.is_empty());
         assert!(verdict.words[2].contains("> m_j |gamma|^2 = 22.4"));
     }
 
     #[test]
     fn growth_stands_beside_the_monotonicity_constant() {
-        let first =
-            |known: Certificates| known.verdict(1.0 / 64.0, None, Accepted::default()).words[0].clone();
+        let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).words[0].clone();
         assert_eq!(
             first(paper()),
             "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: contact pressures grow linearly at most, as \
@@ -204,7 +196,7 @@ mod tests {
         let words = |fall: f64| {
             let known =
                 Certificates { trace_norm_squared: None, monotonicity_constant: Some(fall), ..paper() };
-            known.verdict(1.0 / 64.0, None, Accepted::default()).words[2].clone()
+            known.verdict(1.0 / 64.0, None, &[]).words[2].clone()
         };
         assert_eq!(words(0.0), "m_A = 50.0000 Pa s > m_j |gamma|^2 = 0.0000 Pa s: condition (13) holds");
         assert!(words(0.1).contains("<= m_j |gamma|^2 = infinite") && words(0.1).contains("does not hold"));
@@ -213,22 +205,21 @@ mod tests {
     #[test]
     fn theta_beyond_one_alone_warns() {
         let known = Certificates { theta: Some(1.5), ..paper() };
-        let verdict = known.verdict(1.0 / 64.0, None, Accepted::default());
+        let verdict = known.verdict(1.0 / 64.0, None, &[]);
         assert!(verdict.refusals.is_empty() && verdict.warnings.len() == 1);
     }
 
     #[test]
     fn a_bound_that_is_only_the_least_is_said_to_be_that() {
         let known = Certificates { explicit_bound_is_least: true, ..paper() };
-        let words = known.verdict(0.01, None, Accepted::default()).words;
+        let words = known.verdict(0.01, None, &[]).words;
         assert!(words.iter().any(|words| words.starts_with("steps are stable up to at least 1.2000e-1 s")));
     }
 
     #[test]
     fn suprema_found_from_below_keep_a_margin_to_one() {
-        let verdict = |theta| {
-            Certificates { theta_step: Some(theta), ..paper() }.verdict(0.01, Some(0.05), Accepted::default())
-        };
+        let verdict =
+            |theta| Certificates { theta_step: Some(theta), ..paper() }.verdict(0.01, Some(0.05), &[]);
         assert!(verdict(0.998).refusals.is_empty());
         for theta in [0.9995, f64::NAN] {
             assert_eq!(verdict(theta).refusals.len(), 1, "{theta}");
@@ -239,28 +230,28 @@ mod tests {
     #[test]
     fn the_bound_of_power_laws_says_where_it_holds() {
         let known = Certificates { explicit_bound_follows_stress: true, ..paper() };
-        let words = known.verdict(0.01, None, Accepted::default()).words;
+        let words = known.verdict(0.01, None, &[]).words;
         assert!(words.iter().any(|words| words.contains("each step is held against the one that occurs")));
     }
 
     #[test]
     fn a_step_that_is_stable_while_little_flows_is_warned_of() {
-        let verdict = paper().verdict(0.1, None, Accepted::default());
+        let verdict = paper().verdict(0.1, None, &[]);
         assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("beyond 8.0000e-2 s"));
-        assert!(paper().verdict(0.079, None, Accepted::default()).warnings.is_empty());
+        assert!(paper().verdict(0.079, None, &[]).warnings.is_empty());
     }
 
     #[test]
     fn a_step_beyond_a_bound_is_refused_unless_accepted_and_the_largest_step_is_named() {
         let known = Certificates { theta_step: Some(1.2), ..paper() };
-        let refused = known.verdict(0.125, Some(0.05), Accepted::default());
+        let refused = known.verdict(0.125, Some(0.05), &[]);
         assert_eq!(refused.refusals.len(), 2);
         assert!(
             refused.refusals[0].1.contains("5.0000e-2 s") && refused.refusals[1].1.contains("1.2000e-1 s")
         );
         assert!(refused.refusals[1].1.contains("scheme = \"implicit_euler\""), "{:?}", refused.refusals[1]);
-        let all = Accepted { uniqueness: true, explicit_stability: true };
-        let accepted = known.verdict(0.125, Some(0.05), all);
+        let all = [Accept::Uniqueness, Accept::ExplicitStability];
+        let accepted = known.verdict(0.125, Some(0.05), &all);
         assert!(accepted.refusals.is_empty() && accepted.warnings.len() == 2);
     }
 }

@@ -18,6 +18,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Step, state::State},
+    job,
     parallel::{agreement::Agreed, session::Session},
 };
 use serde::{Deserialize, Serialize};
@@ -26,21 +27,6 @@ use serde::{Deserialize, Serialize};
 const STEPS_BEFORE_GROWTH: u32 = 2;
 /// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
-
-/// Settings of adaptive steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AdaptiveSettings {
-    /// Accepted error of a step, relative to the largest velocity and stress.
-    pub tolerance: f64,
-    /// Length in s of the first step tried.
-    pub first: f64,
-    /// Shortest step in s.
-    pub smallest: f64,
-    /// Longest step in s.
-    pub largest: f64,
-    /// The end of the run in s.
-    pub end: f64,
-}
 
 /// The level of a run and the values that determine its changes; saved in checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -61,7 +47,11 @@ pub struct Pace {
 /// Takes steps of adaptive length.
 #[derive(Debug)]
 pub struct Adaptive<const D: usize> {
-    settings: AdaptiveSettings,
+    settings: job::Adaptive,
+    /// Length in s of the first step tried.
+    first: f64,
+    /// The end of the run in s.
+    end: f64,
     /// Time-dependent loads and obstacles, from the first step on.
     drives: Option<Drives<D>>,
     lowest: i32,
@@ -71,12 +61,12 @@ pub struct Adaptive<const D: usize> {
 }
 
 impl<const D: usize> Adaptive<D> {
-    /// Starts at the first length.
-    pub fn new(settings: AdaptiveSettings) -> Self {
-        let level = |length: f64| (length / settings.first).log2();
-        let (lowest, highest) =
-            ((level(settings.smallest) - 1e-9).ceil(), (level(settings.largest) + 1e-9).floor());
-        Self { settings, drives: None, lowest: lowest as i32, highest: highest as i32, pace: Pace::default() }
+    /// Starts with steps of length `first` in s, in a run to the time `end` in s.
+    pub fn new(settings: job::Adaptive, first: f64, end: f64) -> Self {
+        let level = |length: f64| (length / first).log2();
+        let lowest = (level(settings.smallest_step) - 1e-9).ceil() as i32;
+        let highest = (level(settings.largest_step) + 1e-9).floor() as i32;
+        Self { settings, first, end, drives: None, lowest, highest, pace: Pace::default() }
     }
 
     /// Length in s of its longest steps.
@@ -86,7 +76,7 @@ impl<const D: usize> Adaptive<D> {
 
     /// Length in s of a step at this level.
     fn length(&self, level: i32) -> f64 {
-        self.settings.first * 2f64.powi(level)
+        self.first * 2f64.powi(level)
     }
 
     /// Takes a step that ends at `target` at the latest, and commits it. Steps whose error is too large and steps without a
@@ -100,7 +90,7 @@ impl<const D: usize> Adaptive<D> {
         target: Landing,
     ) -> Result<StepOutcome, Agreed> {
         if self.drives.is_none() {
-            self.drives = Some(Drives::of(session, body, self.settings.end));
+            self.drives = Some(Drives::of(session, body, self.end));
         }
         if self.pace.velocity == 0.0 && self.pace.stress == 0.0 {
             self.look_ahead(session, stepper, body, state, target)?;
@@ -146,7 +136,7 @@ impl<const D: usize> Adaptive<D> {
     /// Collective.
     fn landing(&self, session: &Session, state: &State, target: Landing, length: f64) -> Landing {
         let last = target.time.min(state.time + 2.0 * length);
-        let least = (1.0 - SNAP) * self.settings.smallest;
+        let least = (1.0 - SNAP) * self.settings.smallest_step;
         let drives = self.drives.as_ref();
         let end = drives.and_then(|d| d.first_end(session, [state.time, last], [least, length]));
         end.unwrap_or(target)
@@ -211,7 +201,7 @@ impl<const D: usize> Adaptive<D> {
 
     /// The highest level whose step length is not above this length.
     fn level_of(&self, step: Step) -> i32 {
-        ((step.length / self.settings.first).log2() + 1e-9).floor() as i32
+        ((step.length / self.first).log2() + 1e-9).floor() as i32
     }
 
     /// The error relative to the largest norms so far; NaN if the error or a norm is NaN.
@@ -227,7 +217,7 @@ impl<const D: usize> Adaptive<D> {
     /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length.
     fn fitting(&self, step: Step, error: f64) -> i32 {
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
-        let level = (length / self.settings.first).log2().floor();
+        let level = (length / self.first).log2().floor();
         if level.is_finite() { (level as i32).min(self.level_of(step) - 1) } else { self.level_of(step) - 1 }
     }
 
@@ -262,9 +252,8 @@ mod tests {
     use super::*;
 
     fn adaptive() -> Adaptive<2> {
-        let settings =
-            AdaptiveSettings { tolerance: 1e-2, first: 0.01, smallest: 0.001, largest: 0.1, end: 1.0 };
-        Adaptive::new(settings)
+        let settings = job::Adaptive { tolerance: 1e-2, smallest_step: 0.001, largest_step: 0.1 };
+        Adaptive::new(settings, 0.01, 1.0)
     }
 
     fn step(length: f64) -> Step {

@@ -24,9 +24,10 @@ pub(super) struct Bounded {
 
 impl Bounded {
     /// A solver for velocities with the layout of `like`.
-    pub(super) fn new(like: &DistributedVector, settings: SolverSettings) -> Result<Self> {
+    pub(super) fn new(like: &DistributedVector, settings: &SolverSettings) -> Result<Self> {
         let (lower, upper, residual) = (like.like()?, like.like()?, like.like()?);
-        Ok(Self { snes: BoundedSnes::new("bounds_", like)?, settings, lower, upper, residual })
+        let snes = BoundedSnes::new("bounds_", like)?;
+        Ok(Self { snes, settings: settings.clone(), lower, upper, residual })
     }
 
     /// Solves for the velocity `trial`, starting from its values, and sets the pressures of the contacts; returns the iterations.
@@ -61,9 +62,11 @@ impl Bounded {
         let Some(matrix) = system.matrix.assembled() else {
             return Err(Error::Internal("bounds need the entries of the matrix".into()));
         };
-        let SolverSettings { tolerance, newton_iterations, .. } = self.settings;
-        let limits =
-            Limits { absolute: system.tolerance, relative: tolerance, iterations: newton_iterations };
+        let limits = Limits {
+            absolute: system.tolerance,
+            relative: self.settings.tolerance,
+            iterations: self.settings.max_newton_iterations as usize,
+        };
         let outcome = self.snes.solve(matrix, system.right_hand_side, bounds, trial, limits)?;
         self.residual.copy_from(self.snes.residual())?;
         let (velocity, mut residual) = (trial.owned()?, self.residual.owned_mut()?);

@@ -114,7 +114,7 @@ impl Condensed {
     pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
-        settings: SolverSettings,
+        settings: &SolverSettings,
         precision: Precision,
     ) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);

@@ -8,28 +8,8 @@ use crate::{
     parallel::session::Session,
 };
 
+pub(super) use crate::job::Solver as SolverSettings;
 pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner};
-
-/// How the equations of a step are solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SolverSettings {
-    /// Residual norm relative to the norm of the right-hand side.
-    pub tolerance: f64,
-    /// Largest scaled distance to a contact graph.
-    pub inclusion_tolerance: f64,
-    /// The method for steps with contact.
-    pub method: Method,
-    /// The preconditioner.
-    pub preconditioner: Preconditioner,
-    /// The precision of factors for steps with contact.
-    pub factor_precision: FactorPrecision,
-    /// Newton iterations after which a step fails.
-    pub newton_iterations: usize,
-    /// Number of steps that share one matrix, as far as it is known.
-    pub steps: u64,
-    /// How the pressure in friction bounds is determined.
-    pub friction: FrictionIteration,
-}
 
 /// The problem sizes that determine the choice of a preconditioner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -32,13 +32,11 @@ mod step_solver;
 mod stepper;
 mod substructuring;
 
-pub use adaptive::{Adaptive, AdaptiveSettings, Pace};
+pub use adaptive::{Adaptive, Pace};
 pub use cost::Cost;
 pub use equations::{CellForces, ContactEquations, Effort, Scratch};
 pub use integrator::evaluation;
-pub use linear_solver::{
-    FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize, SolverSettings,
-};
+pub use linear_solver::{FactorPrecision, FrictionIteration, Method, Preconditioner, ProblemSize};
 pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};

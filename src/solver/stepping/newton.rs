@@ -78,13 +78,13 @@ impl Newton {
         like: &DistributedVector,
         contacts: &[Contact<D>],
         linear_solver: ProjectedKsp,
-        settings: SolverSettings,
+        settings: &SolverSettings,
     ) -> Result<Self> {
         let mut snes = Snes::new("", like, D)?;
         snes.apply_options()?;
         Ok(Self {
             snes,
-            settings,
+            settings: settings.clone(),
             bounded: None,
             linear_solver,
             scratch: Scratch::new(like, contacts)?,
@@ -226,7 +226,8 @@ impl Newton {
         // A tolerance relative to the first residual suffices: the right-hand side is almost zero where only an obstacle moves the
         // body.
         let tolerances = (system.tolerance, self.settings.tolerance);
-        let solved = self.snes.solve(&mut equations, trial, tolerances, self.settings.newton_iterations);
+        let most = self.settings.max_newton_iterations as usize;
+        let solved = self.snes.solve(&mut equations, trial, tolerances, most);
         self.effort = equations.effort;
         let iterations = self.effort.sets.len();
         let missed = !matches!(&solved, Ok(outcome) if outcome.converged());

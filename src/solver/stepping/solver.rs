@@ -32,7 +32,7 @@ impl Solver {
         session: &Session,
         body: &mut Body<D, S>,
         like: &DistributedVector,
-        settings: SolverSettings,
+        settings: &SolverSettings,
         problem: ProblemSize,
     ) -> Result<Self> {
         if body.contacts.is_empty() && !body.flows() {
@@ -50,7 +50,7 @@ impl Solver {
         session: &Session,
         body: &mut Body<D, S>,
         like: &DistributedVector,
-        settings: SolverSettings,
+        settings: &SolverSettings,
     ) -> Result<Self> {
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| node));
         let linear_solver = projected(session, settings.preconditioner, &body.mesh, like)?;
@@ -74,7 +74,7 @@ impl Solver {
 }
 
 /// Whether all unknowns except the motions of contact nodes are eliminated.
-fn can_condense(settings: SolverSettings, problem: ProblemSize) -> Result<bool> {
+fn can_condense(settings: &SolverSettings, problem: ProblemSize) -> Result<bool> {
     Ok(settings.preconditioner == Preconditioner::Cholesky
         && settings.method == Method::Newton
         && problem.is_condensed()

@@ -47,17 +47,18 @@ pub(super) struct StepSolver {
 }
 
 impl StepSolver {
-    /// Chooses the solver; the matrix is set by [`StepSolver::prepare`]. Collective.
+    /// Chooses the solver for steps of which about `steps` share a matrix; the matrix is set by [`StepSolver::prepare`]. Collective.
     pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
-        settings: SolverSettings,
+        settings: &SolverSettings,
+        steps: u64,
     ) -> Result<Self> {
-        let problem = ProblemSize::of(session, body, settings.steps, settings.factor_precision)?;
+        let problem = ProblemSize::of(session, body, steps, settings.factor_precision)?;
         let (preconditioner, reason) = settings.preconditioner.resolve(problem);
-        let settings = SolverSettings { preconditioner, ..settings };
-        let solver = Solver::new(session, body, &state.velocity, settings, problem)?;
+        let settings = SolverSettings { preconditioner, ..settings.clone() };
+        let solver = Solver::new(session, body, &state.velocity, &settings, problem)?;
         Ok(Self {
             settings,
             reason,
@@ -188,7 +189,7 @@ impl StepSolver {
                 }
                 return Ok(matrix);
             }
-            self.solver = Solver::whole(session, body, like, self.settings)?;
+            self.solver = Solver::whole(session, body, like, &self.settings)?;
             sprung = self.springs.rows(session, body, length)?;
         }
         let SprungRows { rows, springs } = sprung;

@@ -20,7 +20,7 @@ use crate::{
         effect::Step,
         state::State,
     },
-    job::Scheme,
+    job::{Accept, Scheme},
     linear_algebra::petsc::{DistributedVector, Precision},
     parallel::session::Session,
 };
@@ -43,9 +43,9 @@ pub struct Stepper {
     /// The base length in s: lengths with preconditioners are powers of two times this one.
     base_length: f64,
     /// Number of other start velocities in the search for further solutions of steps with contact.
-    pub other_starts: usize,
+    other_starts: usize,
     /// Whether steps may exceed the stability bound of explicit flow at the actual stresses.
-    pub accepts_fast_flow: bool,
+    accepts_fast_flow: bool,
     /// Number of preconditioners built.
     pub set_ups: u64,
     /// Seconds by phase.
@@ -56,19 +56,21 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Prepares the vectors and the solver; the matrix is set by the first step. Collective.
+    /// Prepares the vectors and the solver for steps of which about `steps` share a matrix; the matrix is set by the first step.
+    /// Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
         scheme: Scheme,
-        settings: SolverSettings,
+        settings: &SolverSettings,
+        steps: u64,
     ) -> Result<Self> {
         Ok(Self {
             scheme,
             integrator: Integrator::new(scheme, state)?,
             stages: Stages::register()?,
-            solver: StepSolver::new(session, body, state, settings)?,
+            solver: StepSolver::new(session, body, state, settings, steps)?,
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
@@ -76,8 +78,8 @@ impl Stepper {
             is_finished: false,
             workspace: ErrorWorkspace::default(),
             base_length: 1.0,
-            other_starts: 0,
-            accepts_fast_flow: false,
+            other_starts: settings.guesses as usize,
+            accepts_fast_flow: settings.accept.contains(&Accept::ExplicitStability),
             set_ups: 0,
             clock: StepClock::default(),
             traffic: StepTraffic::default(),
