@@ -1,12 +1,19 @@
-//! Memory traffic of a preconditioner.
+//! Memory traffic of products and preconditioners.
 
-use super::{Ksp, check, levels::Level, library::is_set, matrix::bytes_of_a_product, sys};
+use super::{Ksp, Matrix, check, levels::Level, library::is_set, sys};
 use crate::error::Result;
 use std::{
     ffi::{CStr, c_char},
     mem::MaybeUninit,
     ptr,
 };
+
+impl Matrix {
+    /// Least number of bytes that a product with it moves on this rank.
+    pub fn bytes_of_a_product(&self) -> Result<u64> {
+        self.blocks.as_ref().map_or_else(|| product(self.raw.get()), |blocks| Ok(blocks.bytes()))
+    }
+}
 
 impl Ksp {
     /// Least number of bytes that one application of the preconditioner by CG or GMRES moves on this rank: a V-cycle of multigrid with
@@ -83,6 +90,13 @@ fn product(matrix: sys::Mat) -> Result<u64> {
     Ok(bytes_of_a_product(entries as usize, count(block), [count(rows), count(columns)]))
 }
 
+/// Least number of bytes that a product with a matrix moves: entries, one index for each column of a block (PETSc reads
+/// rows with the same pattern together), and the two vectors once.
+fn bytes_of_a_product(entries: usize, block: usize, sizes: [usize; 2]) -> u64 {
+    let indices = entries / block.max(1) * size_of::<sys::PetscInt>();
+    (entries * size_of::<f64>() + indices + (sizes[0] + sizes[1]) * size_of::<f64>()) as u64
+}
+
 /// Bytes of a forward and a backward substitution with a PETSc factor.
 fn factor(pc: sys::PC) -> Result<Option<u64>> {
     let (mut matrix, mut counts) = (ptr::null_mut(), MaybeUninit::<sys::MatInfo>::zeroed());
@@ -93,4 +107,16 @@ fn factor(pc: sys::PC) -> Result<Option<u64>> {
         counts.assume_init().nz_used
     };
     Ok((entries > 0.0).then(|| (2.0 * entries) as u64 * size_of::<f64>() as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_product_reads_entries_indices_and_vectors() {
+        // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
+        let index = size_of::<sys::PetscInt>() as u64;
+        assert_eq!(bytes_of_a_product(8, 2, [2, 2]), 8 * 8 + 4 * index + 4 * 8);
+    }
 }

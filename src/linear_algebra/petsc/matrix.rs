@@ -3,17 +3,14 @@ use super::{
     reference::Reference, shell::Shell, sys,
 };
 use crate::error::{Error, Result};
-use std::{cell::Cell, mem::MaybeUninit, rc::Rc};
+use std::{mem::MaybeUninit, rc::Rc};
 
 /// A sparse matrix distributed over the ranks by rows.
 #[derive(Debug)]
 pub struct Matrix {
     pub(super) raw: Reference<sys::_p_Mat>,
     /// A copy with faster products.
-    blocks: Option<Rc<Shell>>,
-    /// Least number of bytes that a product moves on this rank.
-    bytes: u64,
-    products: Cell<u64>,
+    pub(super) blocks: Option<Rc<Shell>>,
 }
 
 impl Matrix {
@@ -21,7 +18,6 @@ impl Matrix {
     pub fn symmetric(block: usize, rows: &BlockRows) -> Result<Self> {
         let owned = rows.offsets.len() - 1;
         let (starts, columns, values) = scalar_rows(block, rows)?;
-        let bytes = bytes_of_a_product(values.len(), block, [owned * block; 2]);
         let local = index(owned * block, "unknowns of a rank")?;
         let (starts, columns, values) = (starts.as_ptr(), columns.as_ptr(), values.as_ptr());
         // SAFETY: PETSc copies the row arrays, which describe `local` rows with ascending global columns.
@@ -37,14 +33,14 @@ impl Matrix {
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
             matrix
         };
-        Ok(Self { raw, blocks: None, bytes, products: Cell::new(0) })
+        Ok(Self { raw, blocks: None })
     }
 
     /// Another handle of the same matrix.
     pub(super) fn share(&self) -> Result<Self> {
         // SAFETY: live matrix.
         let raw = unsafe { Reference::to(self.raw.get())? };
-        Ok(Self { raw, blocks: self.blocks.clone(), bytes: self.bytes, products: Cell::new(0) })
+        Ok(Self { raw, blocks: self.blocks.clone() })
     }
 
     /// Attaches the rigid motions of the nodes at these owned coordinates (`block` for each node) for algebraic multigrid.
@@ -73,7 +69,6 @@ impl Matrix {
     /// Accelerates later products by a copy of half the size of the matrix. Collective.
     pub fn multiply_often(&mut self) -> Result<()> {
         self.blocks = BlockProduct::shell::<f64>(self.raw.get())?.map(Rc::new);
-        self.bytes = self.blocks.as_ref().map_or(self.bytes, |blocks| blocks.bytes());
         Ok(())
     }
 
@@ -84,24 +79,8 @@ impl Matrix {
 
     /// `result = self * x`. Collective.
     pub fn multiply(&self, x: &DistributedVector, result: &mut DistributedVector) -> Result<()> {
-        self.products.set(self.products.get() + 1);
         // SAFETY: live objects of matching layout; `x` and `result` differ.
         check(unsafe { sys::MatMult(self.operator(), x.raw.get(), result.raw.get()) })
-    }
-
-    /// Restarts the count of products.
-    pub fn restart_products(&self) {
-        self.products.set(0);
-    }
-
-    /// Least number of bytes that [`Matrix::multiply`] moved on this rank since [`Matrix::restart_products`].
-    pub fn product_bytes(&self) -> u64 {
-        self.products.get() * self.bytes
-    }
-
-    /// Least number of bytes that one product moves on this rank.
-    pub fn bytes_of_a_product(&self) -> u64 {
-        self.bytes
     }
 
     /// The largest sum of the absolute values of a row's entries, over all ranks. Collective.
@@ -121,13 +100,6 @@ impl Matrix {
             Ok(counts.assume_init().nz_used)
         }
     }
-}
-
-/// Least number of bytes that a product with a matrix moves: entries, one index for each column of a block (PETSc reads
-/// rows with the same pattern together), and the two vectors once.
-pub(super) fn bytes_of_a_product(entries: usize, block: usize, sizes: [usize; 2]) -> u64 {
-    let indices = entries / block.max(1) * size_of::<sys::PetscInt>();
-    (entries * size_of::<f64>() + indices + (sizes[0] + sizes[1]) * size_of::<f64>()) as u64
 }
 
 type ScalarRows = (Vec<sys::PetscInt>, Vec<sys::PetscInt>, Vec<f64>);
@@ -170,13 +142,6 @@ mod tests {
         assert_eq!(starts, [0, 4, 8]);
         assert_eq!(columns, [0, 1, 6, 7, 0, 1, 6, 7]);
         assert_eq!(values, [1.0, 2.0, 5.0, 6.0, 3.0, 4.0, 7.0, 8.0]);
-    }
-
-    #[test]
-    fn a_product_reads_entries_indices_and_vectors() {
-        // Two rows of two blocks: eight numbers, an index for each pair of one column, two vectors of two numbers.
-        let index = size_of::<sys::PetscInt>() as u64;
-        assert_eq!(bytes_of_a_product(8, 2, [2, 2]), 8 * 8 + 4 * index + 4 * 8);
     }
 
     #[test]

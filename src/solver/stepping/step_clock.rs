@@ -1,7 +1,11 @@
 //! Time and memory traffic of steps by phase.
 
-use crate::{error::Result, linear_algebra::petsc::Stage};
-use std::time::Duration;
+use super::equations::StepMatrix;
+use crate::{
+    error::Result,
+    linear_algebra::petsc::{DistributedVector, Matrix, Stage},
+};
+use std::{cell::Cell, time::Duration};
 
 /// Seconds spent by phase.
 #[derive(Debug, Clone, Copy, Default)]
@@ -59,5 +63,22 @@ impl StepTraffic {
     /// Adds a part of a solve; the sum is unknown as soon as one part is unknown.
     pub(super) fn add_solve(&mut self, bytes: Option<u64>) {
         self.solve = self.solve.zip(bytes).map(|(sum, more)| sum + more);
+    }
+}
+
+/// A matrix whose products are counted.
+pub(super) struct CountedMatrix<'a> {
+    pub matrix: &'a Matrix,
+    pub products: &'a Cell<u64>,
+}
+
+impl StepMatrix for CountedMatrix<'_> {
+    fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.products.set(self.products.get() + 1);
+        self.matrix.multiply(x, y)
+    }
+
+    fn assembled(&self) -> Option<&Matrix> {
+        Some(self.matrix)
     }
 }

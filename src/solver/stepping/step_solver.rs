@@ -9,6 +9,7 @@ use super::{
     resistance::{resistances_of_body, set_reference_values},
     solver::Solver,
     springs::{Springs, SprungRows},
+    step_clock::CountedMatrix,
 };
 use crate::{
     error::{Error, Result},
@@ -16,6 +17,7 @@ use crate::{
     linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
     parallel::{agreement::Agreed, session::Session},
 };
+use std::cell::Cell;
 
 /// The length of a step, and the length of the steps for which its preconditioner is set up, both as used in matrices, in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +40,8 @@ pub(super) struct StepSolver {
     /// Norm of the matrix in use in N s/m.
     matrix_norm: f64,
     solver: Solver,
+    /// Products with the matrix since the count of traffic was restarted, without those of PETSc's Krylov solver for linear steps.
+    products: Cell<u64>,
     /// Whether a set-up failed: the linear solver in use must be replaced.
     is_broken: bool,
     /// Matrices with preconditioners that are not in use.
@@ -67,6 +71,7 @@ impl StepSolver {
             prepared: None,
             matrix_norm: 0.0,
             solver,
+            products: Cell::new(0),
             is_broken: false,
             cache: None,
             springs: Springs::default(),
@@ -234,7 +239,7 @@ impl StepSolver {
 
     /// Restarts the count of traffic.
     pub(super) fn restart_traffic(&mut self) {
-        self.matrices().for_each(Matrix::restart_products);
+        self.products.set(0);
         match &mut self.solver {
             Solver::Condensed(condensed) => condensed.restart_traffic(),
             Solver::Linear(ksp) => ksp.restart_applications(),
@@ -245,7 +250,8 @@ impl StepSolver {
     /// Least number of bytes moved on this rank since then; `None` where they are not counted: cells that flow, PETSc's solver
     /// for variational inequalities, preconditioners of unknown size.
     pub(super) fn traffic(&mut self, ranks: usize) -> Result<Option<u64>> {
-        let products: u64 = self.matrices().map(Matrix::product_bytes).sum();
+        let product = self.matrix()?.bytes_of_a_product()?;
+        let products = self.products.get() * product;
         match &mut self.solver {
             Solver::Condensed(condensed) => Ok(Some(products + condensed.traffic())),
             Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
@@ -257,14 +263,9 @@ impl StepSolver {
             Solver::Linear(ksp) => {
                 // PETSc multiplies the same number of times: for the first residual, and in each iteration.
                 let (applications, applied) = (ksp.applications(), ksp.bytes_applied(ranks)?);
-                let matrix = self.matrix()?.bytes_of_a_product();
-                Ok(applied.map(|bytes| applications * (matrix + bytes)))
+                Ok(applied.map(|bytes| applications * (product + bytes)))
             }
         }
-    }
-
-    fn matrices(&self) -> impl Iterator<Item = &Matrix> {
-        [&self.cached, &self.step_matrix].into_iter().flatten().map(|(_, matrix)| matrix)
     }
 
     /// Applies the preconditioner. Collective.
@@ -291,6 +292,7 @@ impl StepSolver {
                 self.step_matrix.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
                     Error::Internal("a step was taken before its matrix was assembled".into())
                 })?;
+            let matrix = &CountedMatrix { matrix, products: &self.products };
             let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
             let solved = match &mut self.solver {
                 Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
