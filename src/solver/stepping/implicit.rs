@@ -10,12 +10,12 @@
 //! `s_n : (e(u_n) - e(u_{n-1}) - k e(v_n)) - 1/2 |s_n - s_{n-1}|^2`, in the compliance norm. For implicit Euler only the last terms
 //! remain.
 
-use super::{contacts::released_by_contact, flow::FlowStart, outcome::over_ranks};
+use super::flow::FlowStart;
 use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Energy, Form, Peaks, Step},
+        effect::{Blend, Energy, Form, Step},
         space::Nodal,
         state::State,
     },
@@ -35,7 +35,8 @@ pub(super) struct Implicit {
     end: DistributedVector,
     /// Sum of squares of the forces of this rank's cells at the start.
     squares: f64,
-    solved: Energy,
+    /// The energies of the solved step that need the state before it.
+    pub solved: Energy,
     /// `M v_n`, where the energy balance needs it.
     momentum: Vec<f64>,
 }
@@ -147,29 +148,16 @@ impl Implicit {
         state.commit_both(solved, &self.end, step.time, step.length)
     }
 
-    pub(super) fn energy<const D: usize, const S: usize>(
-        &mut self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<(Energy, Peaks)> {
-        let (mut energy, peaks) = body.energy(state, step)?;
-        energy += self.solved;
-        released_by_contact(body, state, step, &mut energy)?;
-        if self.blend.earlier != 0.0 && body.has_form(Form::Mass) {
-            energy.numerical += self.momentum_term(body, state, step)?;
-        }
-        Ok(over_ranks(session, energy, peaks))
-    }
-
-    /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells.
-    fn momentum_term<const D: usize, const S: usize>(
+    /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells; 0 for steps of implicit Euler.
+    pub(super) fn momentum_term<const D: usize, const S: usize>(
         &mut self,
         body: &Body<D, S>,
         state: &State,
         step: Step,
     ) -> Result<f64> {
+        if self.blend.earlier == 0.0 || !body.has_form(Form::Mass) {
+            return Ok(0.0);
+        }
         let (now, before) = (state.velocity.local()?, state.previous_velocity.local()?);
         let start = self.velocity.local()?;
         let momentum = &mut self.momentum;

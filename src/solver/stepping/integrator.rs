@@ -1,6 +1,9 @@
 //! Time schemes: the parts of a step that are specific to a scheme.
 
-use super::{bdf2, flow::FlowStart, implicit::Implicit, implicit_euler, lagged_euler::LaggedEuler};
+use super::{
+    bdf2, contacts::released_by_contact, flow::FlowStart, implicit::Implicit, implicit_euler,
+    lagged_euler::LaggedEuler, outcome::over_ranks,
+};
 use crate::{
     error::Result,
     fem::{
@@ -123,9 +126,15 @@ impl Integrator {
         state: &State,
         step: Step,
     ) -> Result<(Energy, Peaks)> {
-        match self {
-            Self::LaggedEuler(scheme) => scheme.energy(session, body, state, step),
-            Self::Implicit(scheme) => scheme.energy(session, body, state, step),
+        let (mut energy, peaks) = body.energy(state, step)?;
+        energy += match self {
+            Self::LaggedEuler(scheme) => scheme.explicit,
+            Self::Implicit(scheme) => scheme.solved,
+        };
+        released_by_contact(body, state, step, &mut energy)?;
+        if let Self::Implicit(scheme) = self {
+            energy.numerical += scheme.momentum_term(body, state, step)?;
         }
+        Ok(over_ranks(session, energy, peaks))
     }
 }

@@ -7,12 +7,11 @@
 //! u_n = u_{n-1} + k v_n,          sigma_n = A e(v_n) + s_n
 //! ```
 
-use super::{contacts::released_by_contact, outcome::over_ranks};
 use crate::{
     error::{Error, Result},
     fem::{
         body::Body,
-        effect::{Energy, Peaks, Step},
+        effect::{Energy, Step},
         state::State,
     },
     parallel::session::Session,
@@ -21,7 +20,7 @@ use crate::{
 /// Energies that are computed at the start of a step.
 #[derive(Debug, Default)]
 pub(super) struct LaggedEuler {
-    explicit: Energy,
+    pub explicit: Energy,
 }
 
 /// Refuses a step longer than the stability bound of explicit flow at the stresses for which forces were just added, if the bound
@@ -55,18 +54,5 @@ impl LaggedEuler {
     ) -> Result<()> {
         self.explicit = body.add_explicit_forces(state, step, forces)?;
         Ok(())
-    }
-
-    pub(super) fn energy<const D: usize, const S: usize>(
-        &self,
-        session: &Session,
-        body: &Body<D, S>,
-        state: &State,
-        step: Step,
-    ) -> Result<(Energy, Peaks)> {
-        let (mut energy, peaks) = body.energy(state, step)?;
-        energy += self.explicit;
-        released_by_contact(body, state, step, &mut energy)?;
-        Ok(over_ranks(session, energy, peaks))
     }
 }
