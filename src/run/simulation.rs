@@ -14,11 +14,11 @@ use crate::{
         state::State,
     },
     io::output::history::Totals,
-    job::{Loaded, Time},
+    job::{Job, Loaded, Time},
     linear_algebra::tensor::larger,
     mesh::{GlobalMesh, Mesh},
-    parallel::session::Session,
-    solver::stepping::{Adaptive, Landings, Pace, StepOutcome, Stepper, next_step},
+    parallel::{agreement::Agreed, session::Session},
+    solver::stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
 };
 
 /// A body with its state and scheme, for programs that look at fields after each step.
@@ -32,8 +32,10 @@ pub struct Simulation<const D: usize, const S: usize> {
     /// Sums and maxima over the steps.
     pub totals: Totals,
     time: Time,
-    landings: Landings,
-    adaptive: Option<Adaptive<D>>,
+    /// Where steps have to end.
+    pub(super) landings: Landings,
+    /// The step size control, if steps are adaptive.
+    pub(super) adaptive: Option<Adaptive<D>>,
 }
 
 impl<const D: usize, const S: usize> Simulation<D, S> {
@@ -48,58 +50,61 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     /// The same on this rank's part of a mesh that was checked against the job. Collective.
     pub fn on(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Result<Self> {
         let Setup { body, state, scheme, .. } = setup::<D, S>(session, loaded, mesh)?;
-        let totals = totals_at_start(session, &body, &state)?;
-        let (time, adaptive) = (loaded.job.time.clone(), steps::adaptive(&loaded.job));
-        let landings = steps::landings(&loaded.job);
+        Ok(Self::start(session, &loaded.job, (body, state, scheme), None)?)
+    }
+
+    /// A job that was set up, with the totals of the run that it continues, if it continues one. Collective.
+    pub(super) fn start(
+        session: &Session,
+        job: &Job,
+        (body, state, scheme): (Body<D, S>, State, Stepper),
+        totals: Option<Totals>,
+    ) -> Result<Self, Agreed> {
+        let totals = match totals {
+            Some(totals) => totals,
+            None => totals_at_start(session, &body, &state)?,
+        };
+        let mut adaptive = steps::adaptive(job);
+        if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
+            adaptive.pace = pace;
+        }
+        let (time, landings) = (job.time.clone(), steps::landings(job));
         Ok(Self { body, state, scheme, totals, time, landings, adaptive })
     }
 
-    /// The state of the step size control, if steps are adaptive.
-    pub fn pace(&self) -> Option<Pace> {
-        self.adaptive.as_ref().map(|adaptive| adaptive.pace)
-    }
-
-    /// Takes the next step; `None` at the end time. Collective.
-    pub fn advance(&mut self, session: &Session) -> Result<Option<StepOutcome>> {
-        if self.state.time >= self.time.end {
+    /// Takes the next step, shortened to land on required times, and adds it to the totals; `None` at the end time. Collective.
+    pub fn advance(&mut self, session: &Session) -> Result<Option<StepOutcome>, Agreed> {
+        let Self { body, state, scheme, totals, time, landings, adaptive } = self;
+        if state.time >= time.end {
             return Ok(None);
         }
-        let (body, state) = (&mut self.body, &mut self.state);
-        let target = self.landings.next(state.time);
-        let outcome = match &mut self.adaptive {
-            Some(adaptive) => adaptive.advance(session, &mut self.scheme, body, state, target)?,
-            None => {
-                let step = next_step(state, self.time.step, target.time);
-                self.scheme.advance(session, body, state, step)?
-            }
+        let target = landings.next(state.time);
+        let outcome = if let Some(adaptive) = adaptive {
+            let outcome = adaptive.advance(session, scheme, body, state, target)?;
+            totals.pace = Some(adaptive.pace);
+            outcome
+        } else {
+            let step = next_step(state, time.step, target.time);
+            let mut outcome = session.agree(scheme.advance(session, body, state, step))?;
+            outcome.landed_on = target.what.filter(|_| step.time == target.time);
+            outcome
         };
-        self.totals.add(&outcome);
-        update_slip_pressure(session, &self.body, &self.state, &mut self.totals)?;
+        totals.add(&outcome);
+        // The largest contact pressure under slip weakening, which the certificate bounds.
+        if let Some(mine) = session.agree(body.slip_pressure(state))? {
+            let [most] = session.largest([mine]);
+            totals.max_slip_pressure = Some(totals.max_slip_pressure.map_or(most, |max| larger(max, most)));
+        }
         Ok(Some(outcome))
     }
 }
 
-/// Updates the largest contact pressure under slip weakening, which the certificate bounds. Collective.
-pub(super) fn update_slip_pressure<const D: usize, const S: usize>(
-    session: &Session,
-    body: &Body<D, S>,
-    state: &State,
-    totals: &mut Totals,
-) -> Result<()> {
-    if let Some(mine) = session.agree(body.slip_pressure(state))? {
-        let [largest] = session.largest([mine]);
-        totals.max_slip_pressure =
-            Some(totals.max_slip_pressure.map_or(largest, |most| larger(most, largest)));
-    }
-    Ok(())
-}
-
 /// The totals of a run that has taken no step. Collective.
-pub(super) fn totals_at_start<const D: usize, const S: usize>(
+fn totals_at_start<const D: usize, const S: usize>(
     session: &Session,
     body: &Body<D, S>,
     state: &State,
-) -> Result<Totals> {
+) -> Result<Totals, Agreed> {
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
     let (mine, _) = session.agree(body.energy(state, rest))?;
     Ok(Totals::at_start(Energy::from_array(session.sum(mine.to_array()))))

@@ -1,7 +1,7 @@
 //! A run: set-up, steps, checkpoints, closing.
 
 use super::{
-    Clock, Inventory, Start,
+    Clock, Inventory, Simulation, Start,
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header,
@@ -9,15 +9,12 @@ use super::{
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
-    simulation::{totals_at_start, update_slip_pressure},
     step_line::StepLine,
-    steps,
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::{body::Body, state::State},
-    io::output::{checkpoint::Identity, history::Totals, log::Log, output_field::Converged},
+    io::output::{checkpoint::Identity, log::Log, output_field::Converged},
     job::{Accept, Job, Loaded},
     linear_algebra::{
         petsc::Precision,
@@ -25,10 +22,7 @@ use crate::{
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
-    solver::{
-        certificate::Certificates,
-        stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
-    },
+    solver::{certificate::Certificates, stepping::StepOutcome},
 };
 use std::{
     fmt::Write,
@@ -70,32 +64,22 @@ pub(super) fn run<const D: usize, const S: usize>(
     session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
     let Setup { body, state, scheme, probes, certificates, .. } = ready;
-    let totals = match &restored {
-        Some(restored) => restored.totals,
-        None => session.agree(totals_at_start(session, &body, &state))?,
-    };
+    let totals = restored.as_ref().map(|restored| restored.totals);
+    let simulation = Simulation::start(session, job, (body, state, scheme), totals)?;
+    let (body, state) = (&simulation.body, &simulation.state);
     let contents = Contents { job, identity, probes, goes_on };
-    let mut outputs = session.agree(Outputs::open(session, contents, &body, &state, &mut log))?;
-    session.agree(outputs.at_start(session, &body, &state))?;
+    let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;
+    session.agree(outputs.at_start(session, body, state))?;
     let setup = clock.began.elapsed() - clock.launched;
     let stepping = (Instant::now(), state.step);
-    let mut adaptive = steps::adaptive(job);
-    if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
-        adaptive.pace = pace;
-    }
     let deadline = Deadline::new(session, job, clock);
     deadline.log_limit(&mut log);
     let mut run = Run {
         session,
         job,
-        body,
-        state,
-        scheme,
+        simulation,
         certificates,
-        adaptive,
-        landings: steps::landings(job),
         landed: 0,
-        totals,
         outputs,
         log,
         line: String::with_capacity(LINE),
@@ -117,15 +101,10 @@ enum Ended {
 struct Run<'a, const D: usize, const S: usize> {
     session: &'a Session,
     job: &'a Job,
-    body: Body<D, S>,
-    state: State,
-    scheme: Stepper,
+    simulation: Simulation<D, S>,
     certificates: Certificates,
-    adaptive: Option<Adaptive<D>>,
-    landings: Landings,
     /// Logged lines about the times that steps landed on.
     landed: u64,
-    totals: Totals,
     outputs: Outputs<D, S>,
     log: Log,
     /// The line of the log after a step, kept to reuse its memory.
@@ -140,48 +119,33 @@ struct Run<'a, const D: usize, const S: usize> {
 impl<const D: usize, const S: usize> Run<'_, D, S> {
     /// Steps to the end, to a request to stop, or to a failure. Collective.
     fn advance(&mut self) -> Result<Ended> {
-        let (end, length) = (self.job.time.end, self.job.time.step);
-        let left = self.landings.steps_after(self.state.time, length);
-        let last = self.state.step + left;
-        self.log.start_progress(last, self.state.step);
+        let Simulation { state, landings, .. } = &self.simulation;
+        let last = state.step + landings.steps_after(state.time, self.job.time.step);
+        self.log.start_progress(last, state.step);
         let mut saved_at = Instant::now();
-        while self.state.time < end {
-            let outcome = self.take_step(length).or_else(|error| self.explain(error))?;
-            self.totals.add(&outcome);
-            update_slip_pressure(self.session, &self.body, &self.state, &mut self.totals)?;
-            self.outputs.after_step(self.session, &self.body, &self.state, &outcome, &self.totals)?;
-            let steps_left = self.landings.steps_after(self.state.time, self.state.step_length);
-            let last = if self.adaptive.is_some() { self.state.step + steps_left } else { last };
+        while let Some(outcome) =
+            self.simulation.advance(self.session).or_else(|error| self.explain(error))?
+        {
+            let Simulation { body, state, totals, landings, adaptive, .. } = &self.simulation;
+            self.outputs.after_step(self.session, body, state, &outcome, totals)?;
+            let goes_on = state.time < self.job.time.end;
+            let steps_left = landings.steps_after(state.time, state.step_length);
+            let last = if adaptive.is_some() { state.step + steps_left } else { last };
             self.report(&outcome, last);
             self.refuse_overflow()?;
             self.refuse_growth()?;
             let request = self.pending_request(saved_at);
             if let Some(reason) = request.stop
-                && self.state.time < end
+                && goes_on
             {
                 return Ok(Ended::Stopped(reason));
             }
-            if request.save && self.state.time < end {
+            if request.save && goes_on {
                 self.save()?;
                 saved_at = Instant::now();
             }
         }
         Ok(Ended::Completed)
-    }
-
-    /// Takes a step of the job's length or an adaptive one; shortened to land on required times. Collective.
-    fn take_step(&mut self, length: f64) -> Result<StepOutcome, Agreed> {
-        let (body, state) = (&mut self.body, &mut self.state);
-        let target = self.landings.next(state.time);
-        let Some(adaptive) = &mut self.adaptive else {
-            let step = next_step(state, length, target.time);
-            let mut outcome = self.session.agree(self.scheme.advance(self.session, body, state, step))?;
-            outcome.landed_on = target.what.filter(|_| step.time == target.time);
-            return Ok(outcome);
-        };
-        let outcome = adaptive.advance(self.session, &mut self.scheme, body, state, target)?;
-        self.totals.pace = Some(adaptive.pace);
-        Ok(outcome)
     }
 
     /// Adds to the error of a failed step that the certificates do not exclude several solutions.
@@ -199,19 +163,19 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     /// Fails if energies, stresses or residuals are not finite.
     fn refuse_overflow(&self) -> Result<()> {
-        if self.totals.are_finite() {
+        if self.simulation.totals.are_finite() {
             return Ok(());
         }
         Err(Error::Failed(format!(
             "at t = {:.6e} s energies, stresses or residuals are not finite numbers: see whether loads, velocities and the [time] step, in \
              SI units, are of sensible size",
-            self.state.time
+            self.simulation.state.time
         )))
     }
 
     /// Fails if the explicit scheme has produced so much energy that the solution is meaningless.
     fn refuse_growth(&self) -> Result<()> {
-        let made = self.totals.made_by_scheme();
+        let made = self.simulation.totals.made_by_scheme();
         let explicit = self.certificates.explicit_step_bound.is_some();
         if !explicit || self.job.solver.accept.contains(&Accept::ExplicitStability) || made <= LARGEST_GROWTH
         {
@@ -220,18 +184,19 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         Err(Error::Failed(format!(
             "at t = {:.6e} s the time scheme has made {made:.1e} times the energy that was put in: explicit stress makes errors \
              grow; take a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
-            self.state.time
+            self.simulation.state.time
         )))
     }
 
     fn report(&mut self, outcome: &StepOutcome, last: u64) {
-        let step = self.state.step;
+        let Simulation { state, totals, .. } = &self.simulation;
+        let (step, time, imbalance) = (state.step, state.time, totals.energy_imbalance);
         if self.log.has_bar() {
-            self.log.progress(step, &format!("t = {:.4e} s", self.state.time));
+            self.log.progress(step, &format!("t = {time:.4e} s"));
         }
         if let Some(what) = outcome.landed_on.filter(|_| self.landed < LOGGED_STEPS) {
             self.landed += 1;
-            self.log.quiet_line(format!("step {step} lands on t = {:.9} s: {what}", self.state.time));
+            self.log.quiet_line(format!("step {step} lands on t = {time:.9} s: {what}"));
         }
         if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
             return;
@@ -239,9 +204,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let line = StepLine {
             step,
             last,
-            time: self.state.time,
+            time,
             outcome,
-            imbalance: self.totals.energy_imbalance,
+            imbalance,
             left: self.seconds_per_step() * (last - step) as f64,
         };
         self.line.clear();
@@ -252,7 +217,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     /// Mean seconds per step so far.
     fn seconds_per_step(&self) -> f64 {
-        self.stepping.0.elapsed().as_secs_f64() / (self.state.step - self.stepping.1).max(1) as f64
+        self.stepping.0.elapsed().as_secs_f64() / (self.simulation.state.step - self.stepping.1).max(1) as f64
     }
 
     /// Whether a signal, a limit of wall time or `[checkpoint]` requests a stop or a checkpoint now; the same on all ranks. Collective.
@@ -261,7 +226,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let late = self.deadline.passed(self.session);
         let (mut by_steps, mut by_time) = (false, false);
         if let Some(checkpoint) = &self.job.checkpoint {
-            by_steps = checkpoint.every.is_some_and(|every| self.state.step.is_multiple_of(every));
+            by_steps = checkpoint.every.is_some_and(|every| self.simulation.state.step.is_multiple_of(every));
             if let Some(seconds) = checkpoint.interval {
                 let due = saved_at.elapsed().as_secs_f64() >= seconds;
                 by_time = self.session.largest([f64::from(u8::from(due))])[0] > 0.0;
@@ -272,7 +237,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     fn save(&mut self) -> Result<()> {
         let start = Instant::now();
-        let path = self.outputs.checkpoint(self.session, &self.body, &self.state, &self.totals)?;
+        let Simulation { body, state, totals, .. } = &self.simulation;
+        let path = self.outputs.checkpoint(self.session, body, state, totals)?;
         self.deadline.add_save(start.elapsed());
         self.log.quiet_line(format!("saved {}", path.display()));
         Ok(())
@@ -289,7 +255,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             }
             Err(error) => Err(error),
         };
-        if !self.totals.are_finite() {
+        if !self.simulation.totals.are_finite() {
             self.log.line(
                 "no checkpoint is written of a state that is not finite; earlier ones are left as they are",
             );
@@ -299,7 +265,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.keep_first(&mut result, saved);
         }
         if result != Ok(Exit::Stopped) {
-            let written = self.outputs.at_end(self.session, &self.body, &self.state);
+            let Simulation { body, state, .. } = &self.simulation;
+            let written = self.outputs.at_end(self.session, body, state);
             let written = self.session.agree(written);
             self.keep_first(&mut result, written);
         }
@@ -339,7 +306,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         error: Option<String>,
         restarted_from: Option<String>,
     ) -> Result<Summary> {
-        let (session, body, state) = (self.session, &self.body, &self.state);
+        let (session, Simulation { body, state, scheme, totals, .. }) = (self.session, &self.simulation);
         let stress = body.stress(state)?;
         let von_mises = stress.iter().map(von_mises).fold(0.0, larger);
         let of_fields = self.outputs.figures(Converged { session, body, state, stress: &stress })?;
@@ -356,39 +323,33 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             nodes: mesh.total_nodes,
             unknowns: body.unknowns(session),
             effects: body.effect_names(),
-            scheme: self.scheme.scheme().name(),
-            preconditioner: self.scheme.preconditioner().0.name(),
-            factor_precision: self.scheme.factor_precision().map(Precision::name),
+            scheme: scheme.scheme().name(),
+            preconditioner: scheme.preconditioner().0.name(),
+            factor_precision: scheme.factor_precision().map(Precision::name),
             steps: state.step,
             time: state.time,
-            rejected_steps: self.totals.pace.map_or(0, |pace| pace.rejected),
-            set_ups: self.scheme.set_ups,
-            newton_iterations: self.totals.newton_iterations,
-            linear_iterations: self.totals.linear_iterations,
+            rejected_steps: totals.pace.map_or(0, |pace| pace.rejected),
+            set_ups: scheme.set_ups,
+            newton_iterations: totals.newton_iterations,
+            linear_iterations: totals.linear_iterations,
             restarted_from,
             final_von_mises: session.largest([von_mises])[0],
-            peaks: self.totals.peaks,
+            peaks: totals.peaks,
             of_fields,
-            max_inclusion_residual: self.totals.max_inclusion_residual,
-            max_energy_imbalance: self.totals.max_energy_imbalance,
-            max_slip_pressure: self.totals.max_slip_pressure,
-            guesses: (self.totals.guessed_steps > 0).then_some(Guesses {
-                steps: self.totals.guessed_steps,
-                steps_with_several: self.totals.steps_with_several,
-                most_solutions: self.totals.most_solutions,
+            max_inclusion_residual: totals.max_inclusion_residual,
+            max_energy_imbalance: totals.max_energy_imbalance,
+            max_slip_pressure: totals.max_slip_pressure,
+            guesses: (totals.guessed_steps > 0).then_some(Guesses {
+                steps: totals.guessed_steps,
+                steps_with_several: totals.steps_with_several,
+                most_solutions: totals.most_solutions,
             }),
             certificates: self.certificates.clone(),
-            wall_seconds: phases::seconds(
-                session,
-                self.clock,
-                self.setup,
-                &self.scheme.clock,
-                self.outputs.spent,
-            ),
-            traffic_bytes: phases::traffic(session, &self.scheme.traffic, self.outputs.written()),
+            wall_seconds: phases::seconds(session, self.clock, self.setup, &scheme.clock, self.outputs.spent),
+            traffic_bytes: phases::traffic(session, &scheme.traffic, self.outputs.written()),
             peak_memory_bytes: session.total(usize::try_from(peak_memory()).unwrap_or(0)) as u64,
             partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
-            inventory: Inventory::of(session, body, &self.scheme),
+            inventory: Inventory::of(session, body, scheme),
         })
     }
 }

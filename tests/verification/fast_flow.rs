@@ -3,9 +3,8 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, noise, set_nodal, simulation};
 use clarke::{
-    error::Error,
     mesh::generate::{Diagonal, rectangle},
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
     run::Simulation,
     solver::certificate::Certificates,
 };
@@ -27,7 +26,7 @@ fn started(session: &Session, job: &str) -> Simulation<2, 3> {
 }
 
 /// The steps that are taken, and the error that ends them.
-fn steps(session: &Session, run: &mut Simulation<2, 3>) -> (u64, Option<Error>) {
+fn steps(session: &Session, run: &mut Simulation<2, 3>) -> (u64, Option<Agreed>) {
     loop {
         match run.advance(session) {
             Ok(Some(_)) => {}
