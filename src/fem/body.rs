@@ -11,7 +11,7 @@ use crate::{
     fem::{
         effect::{
             Contact, Curvature, Effect, Energy, Evaluation, FlowProperties, Form, History, HistoryStore,
-            Load, Outcome, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect, SurfaceState, Term,
+            Load, Outcome, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect, Term,
         },
         space::{Batch, Geometry, Needs, Nodal, assemble},
         state::State,
@@ -20,7 +20,7 @@ use crate::{
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
-        tensor::{Mandel, larger},
+        tensor::{Mandel, add_scaled, dot, larger},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -93,55 +93,72 @@ impl<const D: usize, const S: usize> Body<D, S> {
         })
     }
 
-    /// Adds explicit forces at the start of a step to `forces` (with ghosts); effects write their trial histories.
+    /// Adds the forces of the converged state at the start of a step to `forces` (with ghosts), and gives the energies that are known
+    /// then; effects write their trial histories.
     pub fn add_explicit_forces(&mut self, state: &State, step: Step, forces: &mut [f64]) -> Result<Energy> {
-        let (mut outcome, evaluation) = (Outcome::default(), Evaluation::Converged);
-        if !self.surface_effects.is_empty() {
-            let displacement = state.displacement.local()?;
-            for effect in &mut self.surface_effects {
-                effect.evaluate(evaluation, step, &displacement, forces, &mut outcome);
-            }
+        let add = |nodal: Nodal<'_>| self.add_start_forces(Evaluation::Converged, nodal, step, forces);
+        Ok(with_nodal(state, add)?.0)
+    }
+
+    /// Adds the forces of the state from which a step starts to `forces` (with ghosts); effects write their trial histories.
+    ///
+    /// `at` is the converged state or the start of an implicit step. `nodal` has the displacement of this state, and the converged
+    /// displacement as the previous one. Gives the energies that are known, and at the start of an implicit step the sum of the
+    /// squares of the forces of each effect on cells: no residual can be less than their rounding, also where large forces cancel.
+    pub fn add_start_forces(
+        &mut self,
+        at: Evaluation,
+        nodal: Nodal<'_>,
+        step: Step,
+        forces: &mut [f64],
+    ) -> (Energy, f64) {
+        if let Evaluation::Start(blend) = at {
+            (self.evaluation, self.step) = (Evaluation::End(blend), step);
         }
-        let Some(needs) = self.needs(|p| p.start) else { return Ok(outcome.energy) };
+        let (mut outcome, mut squares) = (Outcome::default(), 0.0);
+        for effect in &mut self.surface_effects {
+            effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);
+        }
+        let Some(needs) = self.needs(|p| p.start) else { return (outcome.energy, squares) };
         // Those that weaken before the others.
         let called = [true, false].map(|weakens| self.called(|p| p.start.is_some() && p.weakens == weakens));
         let (mesh, effects) = (&self.mesh, &mut self.effects);
-        with_nodal(state, |nodal| {
-            Batch::for_all(mesh, &self.geometry, nodal, needs, |batch| {
-                if needs.elastic_stress {
-                    effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+        Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+            if needs.elastic_stress {
+                effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
+            }
+            for called in called {
+                for effect in called.among_mut(effects) {
+                    let before = if let Evaluation::Start(_) = at { Some(batch.stress) } else { None };
+                    effect.evaluate(at, step, batch, &mut outcome);
+                    let Some(before) = before else { continue };
+                    for lane in 0..batch.count {
+                        let cell = batch.cells.simplex(lane);
+                        let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
+                        let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
+                        squares += cell.volume * cell.volume * gradients * dot(&added, &added);
+                    }
                 }
-                for called in called {
-                    let effects = called.among_mut(effects);
-                    effects.for_each(|effect| effect.evaluate(evaluation, step, batch, &mut outcome));
-                }
-                batch.scatter(mesh, forces);
-            });
-        })?;
+            }
+            batch.scatter(mesh, forces);
+        });
         self.fastest_flow = self.fastest_flow.max(outcome.fastest_flow);
-        Ok(outcome.energy)
+        (outcome.energy, squares)
     }
 
     /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
     pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
         let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
-        {
-            let displacement = state.displacement.local()?;
-            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, &displacement));
-            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
-        }
-        if !self.surface_effects.is_empty() {
-            with_surface(state, |nodal| {
-                let effects = self.surface_effects.iter();
-                effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
-            })?;
-        }
-        let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
-        let weakening = self.called(|p| p.weakens);
-        let with_energy = self.called(|p| p.energy.is_some());
-        let with_stress = self.called(|p| p.stress.is_some());
-        let strained = self.needs(|p| p.stress).is_some();
         with_nodal(state, |nodal| {
+            let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
+            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
+            let effects = self.surface_effects.iter();
+            effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
+            let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
+            let weakening = self.called(|p| p.weakens);
+            let with_energy = self.called(|p| p.energy.is_some());
+            let with_stress = self.called(|p| p.stress.is_some());
+            let strained = self.needs(|p| p.stress).is_some();
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
                 weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
                 with_energy
@@ -154,8 +171,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
                     squares.take_in(batch.count, &batch.strain, &batch.stress);
                 }
             });
-        })?;
-        Ok((energy, squares.peaks()))
+            Ok((energy, squares.peaks()))
+        })?
     }
 
     /// What the effects are in the linearised equation of motion.
@@ -416,22 +433,15 @@ fn all_of<'a>(stores: Vec<&'a dyn HistoryStore>) -> impl Iterator<Item = History
     stores.into_iter().map(|store| store.history()).chain(earlier)
 }
 
-fn with_nodal(state: &State, body: impl FnOnce(Nodal<'_>)) -> Result<()> {
+/// Calls a function with the fields of the converged state.
+fn with_nodal<T>(state: &State, function: impl FnOnce(Nodal<'_>) -> T) -> Result<T> {
     let displacement = state.displacement.local()?;
     let velocity = state.velocity.local()?;
     let previous_velocity = state.previous_velocity.local()?;
-    body(Nodal {
+    Ok(function(Nodal {
         displacement: &displacement,
         previous_displacement: &displacement,
         velocity: &velocity,
         previous_velocity: &previous_velocity,
-    });
-    Ok(())
-}
-
-fn with_surface(state: &State, body: impl FnOnce(SurfaceState<'_>)) -> Result<()> {
-    let displacement = state.displacement.local()?;
-    let velocity = state.velocity.local()?;
-    body(SurfaceState { displacement: &displacement, velocity: &velocity });
-    Ok(())
+    }))
 }

@@ -1,6 +1,6 @@
 //! The converged state of a run: nodal fields and time. Cell histories live with their effects.
 
-use crate::{error::Result, linear_algebra::petsc::DistributedVector, mesh::Mesh};
+use crate::{error::Result, fem::effect::Step, linear_algebra::petsc::DistributedVector, mesh::Mesh};
 
 /// Nodal fields, `D` values a node, with ghosts up to date.
 #[derive(Debug)]
@@ -42,39 +42,27 @@ impl State {
         })
     }
 
-    /// Commits the velocity of a solved step and the displacement `u_n = u_{n-1} + k v_n`. Collective.
-    pub fn commit(&mut self, solved: &DistributedVector, time: f64, step_length: f64) -> Result<()> {
-        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
-        self.velocity.copy_from(solved)?;
-        self.velocity.update_ghosts()?;
-        {
-            let velocity = self.velocity.local()?;
-            let mut displacement = self.displacement.local_mut()?;
-            displacement.iter_mut().zip(velocity.iter()).for_each(|(u, v)| *u += step_length * v);
-        }
-        self.time = time;
-        self.step += 1;
-        self.step_length = step_length;
-        Ok(())
-    }
-
-    /// Commits velocity and displacement of a solved step. Collective.
-    pub fn commit_both(
+    /// Commits the velocity of a solved step and the displacement at its end, `u_n = u_{n-1} + k v_n` unless it is given. Collective.
+    pub fn commit(
         &mut self,
         velocity: &DistributedVector,
-        displacement: &DistributedVector,
-        time: f64,
-        step_length: f64,
+        displacement: Option<&DistributedVector>,
+        step: Step,
     ) -> Result<()> {
-        if let Some(previous) = &mut self.previous_displacement {
-            std::mem::swap(previous, &mut self.displacement);
-        }
-        self.displacement.copy_from(displacement)?;
-        self.displacement.update_ghosts()?;
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
         self.velocity.copy_from(velocity)?;
         self.velocity.update_ghosts()?;
-        (self.time, self.step_length) = (time, step_length);
+        if let Some(displacement) = displacement {
+            if let Some(previous) = &mut self.previous_displacement {
+                std::mem::swap(previous, &mut self.displacement);
+            }
+            self.displacement.copy_from(displacement)?;
+            self.displacement.update_ghosts()?;
+        } else {
+            let (velocity, mut displacement) = (self.velocity.local()?, self.displacement.local_mut()?);
+            displacement.iter_mut().zip(velocity.iter()).for_each(|(u, v)| *u += step.length * v);
+        }
+        (self.time, self.step_length) = (step.time, step.length);
         self.step += 1;
         Ok(())
     }

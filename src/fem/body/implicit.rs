@@ -3,15 +3,12 @@
 use super::{Body, Called};
 use crate::{
     fem::{
-        effect::{
-            Blend, Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, SurfaceStep,
-            Tangents, Term,
-        },
+        effect::{Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents, Term},
         space::{Batch, Geometry, Needs, Nodal},
     },
     linear_algebra::{
         simd::Pack,
-        tensor::{Mandel, add_scaled, component, dot, symmetric_part},
+        tensor::{Mandel, component, dot, symmetric_part},
     },
     mesh::Mesh,
 };
@@ -48,47 +45,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         cells.chain(surface.map(|e| e.name()))
     }
 
-    /// Adds the forces of the state that a step starts from to `forces` (with ghosts): `nodal` has the blended displacement, and the
-    /// converged displacement as the previous one. Gives the sum of the squares of the forces of each effect on cells: no residual can be
-    /// less than their rounding, also where large forces cancel.
-    pub fn add_start_forces(
-        &mut self,
-        blend: Blend,
-        nodal: Nodal<'_>,
-        step: Step,
-        forces: &mut [f64],
-    ) -> f64 {
-        (self.evaluation, self.step) = (Evaluation::End(blend), step);
-        let (start, mut outcome) = (Evaluation::Start(blend), Outcome::default());
-        for effect in &mut self.surface_effects {
-            effect.evaluate(start, step, nodal.previous_displacement, forces, &mut outcome);
-        }
-        let Some(needs) = self.needs(|p| p.start) else { return 0.0 };
-        let called = self.called(|p| p.start.is_some());
-        let (mesh, effects) = (&self.mesh, &mut self.effects);
-        let mut squares = 0.0;
-        Batch::for_all(mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-            for effect in called.among_mut(effects) {
-                let before = batch.stress;
-                effect.evaluate(start, step, batch, &mut outcome);
-                for lane in 0..batch.count {
-                    let cell = batch.cells.simplex(lane);
-                    let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
-                    let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
-                    squares += cell.volume * cell.volume * gradients * dot(&added, &added);
-                }
-            }
-            batch.scatter(mesh, forces);
-        });
-        squares
-    }
-
     /// Energies of a solved step that is not yet committed; writes trial histories.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
-        let Nodal { displacement: after, previous_displacement: before, velocity, .. } = nodal;
         let evaluation = self.evaluation;
         for effect in &mut self.surface_effects {
-            effect.add_step_energy(evaluation, step, SurfaceStep { before, after, velocity }, energy);
+            effect.add_step_energy(evaluation, step, nodal, energy);
         }
         let (mut cells, _) = self.cells_and_contacts();
         let (called, needs) = cells.flowing();

@@ -1,9 +1,9 @@
 use super::{
-    Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, SurfaceState,
-    SurfaceStep, Tangents, evolution::Evolution, node_history::NodeHistory,
+    Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, Tangents,
+    evolution::Evolution, node_history::NodeHistory,
 };
 use crate::{
-    fem::space::SurfacePoint,
+    fem::space::{Nodal, SurfacePoint},
     laws::contact,
     linear_algebra::tensor::{Vector, add_scaled, dot},
 };
@@ -205,16 +205,16 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn add_energy(&self, at: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+    fn add_energy(&self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         for (group, bonding) in self.groups().zip(&self.bonding.converged) {
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = value_at(state.displacement, point);
+                let displacement = value_at(nodal.displacement, point);
                 let share = point.weight * bonding * bonding;
                 let potential = law.potential(&displacement, normal);
                 energy.stored_in_bonds += share * potential;
                 if at == Evaluation::Converged {
-                    let change = value_at(state.velocity, point).map(|v| step.length * v);
+                    let change = value_at(nodal.velocity, point).map(|v| step.length * v);
                     let before = std::array::from_fn(|i| displacement[i] - change[i]);
                     let gain = potential - law.potential(&before, normal);
                     energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
@@ -223,20 +223,20 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         }
     }
 
-    fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy) {
+    fn add_step_energy(&mut self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         let Evaluation::End(blend) = at else { return };
-        self.advance(Evolution { blend, length: step.length }, ends.after);
+        self.advance(Evolution { blend, length: step.length }, nodal.displacement);
         let bondings = self.bonding.converged.iter().zip(&self.bonding.trial);
         for (group, (before, after)) in self.groups().zip(bondings) {
             let (before, after) = (before * before, after * after);
-            let potentials =
-                [ends.before, ends.after].map(|displacement| self.potential(group, displacement));
+            let ends = [nodal.previous_displacement, nodal.displacement];
+            let potentials = ends.map(|displacement| self.potential(group, displacement));
             energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
             energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&value_at(ends.after, point), &point.normal);
+                let traction = self.laws[*law].traction(&value_at(nodal.displacement, point), &point.normal);
                 energy.numerical +=
-                    step.length * point.weight * after * dot(&traction, &value_at(ends.velocity, point));
+                    step.length * point.weight * after * dot(&traction, &value_at(nodal.velocity, point));
             }
         }
     }

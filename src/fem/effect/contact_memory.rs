@@ -1,10 +1,10 @@
 use super::{
-    Blend, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect,
-    SurfaceState, SurfaceStep, Tangents, node_history::NodeHistory,
+    Blend, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, Tangents,
+    node_history::NodeHistory,
 };
 use crate::{
     error::{Error, Result},
-    fem::space::SurfacePoint,
+    fem::space::{Nodal, SurfacePoint},
     laws::contact::Memory,
     mesh::Mesh,
 };
@@ -124,15 +124,15 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
         }
     }
 
-    fn add_energy(&self, _: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy) {
+    fn add_energy(&self, _: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         for ((_, point), pressure) in self.points.iter().zip(&self.pressure.converged) {
-            energy.contact += point.weight * pressure * step.length * along(state.velocity, point);
+            energy.contact += point.weight * pressure * step.length * along(nodal.velocity, point);
         }
     }
 
     /// No energies: what the pressure takes up is counted with that of the normal law.
-    fn add_step_energy(&mut self, _: Evaluation, step: Step, ends: SurfaceStep<'_>, _: &mut Energy) {
-        self.advance(step, ends.after);
+    fn add_step_energy(&mut self, _: Evaluation, step: Step, nodal: Nodal<'_>, _: &mut Energy) {
+        self.advance(step, nodal.displacement);
     }
 
     /// The foundation counts as the spring that it is for a displacement held for a long time.

@@ -46,7 +46,7 @@ pub use peaks::{PeakSquares, Peaks};
 pub use step::{Blend, Evaluation, Step};
 pub use step_error::{Curvature, StressError};
 pub use support::fixed_components;
-pub use surface::{SurfaceEffect, SurfaceState, SurfaceStep};
+pub use surface::SurfaceEffect;
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
 pub use viscoplastic_flow::ViscoplasticFlow;

@@ -1,24 +1,5 @@
 use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError};
-
-/// Nodal fields of the converged state with ghosts, `D` values a node.
-#[derive(Debug, Clone, Copy)]
-pub struct SurfaceState<'a> {
-    /// Displacement in m.
-    pub displacement: &'a [f64],
-    /// Velocity in m/s.
-    pub velocity: &'a [f64],
-}
-
-/// An implicit step that was solved and not yet committed: nodal fields, `D` values a node, with ghosts.
-#[derive(Debug, Clone, Copy)]
-pub struct SurfaceStep<'a> {
-    /// Displacement before the step in m.
-    pub before: &'a [f64],
-    /// Displacement at its end in m.
-    pub after: &'a [f64],
-    /// Velocity at its end in m/s.
-    pub velocity: &'a [f64],
-}
+use crate::fem::space::Nodal;
 
 /// An effect at nodes of boundaries whose force follows the displacement.
 pub trait SurfaceEffect<const D: usize> {
@@ -44,12 +25,13 @@ pub trait SurfaceEffect<const D: usize> {
         outcome: &mut Outcome,
     );
 
-    /// Adds its energies after the commit.
-    fn add_energy(&self, at: Evaluation, step: Step, state: SurfaceState<'_>, energy: &mut Energy);
+    /// Adds its energies after the commit, given displacement and velocity of the converged state.
+    fn add_energy(&self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy);
 
-    /// Writes the trial history of a solved implicit step and adds the energies that need the histories before and after it: what it
-    /// dissipates, and the terms of the scheme.
-    fn add_step_energy(&mut self, at: Evaluation, step: Step, ends: SurfaceStep<'_>, energy: &mut Energy);
+    /// Writes the trial history of an implicit step that was solved and not yet committed, and adds the energies that need the
+    /// histories before and after it: what it dissipates, and the terms of the scheme. `nodal` has displacement and velocity at the end
+    /// of the step and the displacement before it.
+    fn add_step_energy(&mut self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy);
 
     /// Adds the squares of the force at the end of a step that was solved and not yet committed, given the displacement there, and of
     /// the error that its trial history makes in the force, given the histories before.

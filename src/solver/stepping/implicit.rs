@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Energy, Form, Step},
+        effect::{Blend, Energy, Evaluation, Form, Step},
         space::Nodal,
         state::State,
     },
@@ -82,7 +82,7 @@ impl Implicit {
             velocity: &velocity,
             previous_velocity: &velocity,
         };
-        self.squares = body.add_start_forces(self.blend, nodal, step, forces);
+        (_, self.squares) = body.add_start_forces(Evaluation::Start(self.blend), nodal, step, forces);
         Ok(())
     }
 
@@ -145,7 +145,7 @@ impl Implicit {
 
     /// Commits the solved step to the state. Collective.
     pub(super) fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
-        state.commit_both(solved, &self.end, step.time, step.length)
+        state.commit(solved, Some(&self.end), step)
     }
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells; 0 for steps of implicit Euler.

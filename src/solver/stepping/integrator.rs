@@ -112,7 +112,7 @@ impl Integrator {
     /// Commits the solved velocity to the state. Collective.
     pub(super) fn commit(&mut self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         match self {
-            Self::LaggedEuler(_) => state.commit(solved, step.time, step.length),
+            Self::LaggedEuler(_) => state.commit(solved, None, step),
             Self::Implicit(scheme) => scheme.commit(state, solved, step),
         }
     }
