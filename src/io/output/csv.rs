@@ -22,8 +22,13 @@ pub(super) struct CsvFile {
 }
 
 impl CsvFile {
+    /// Starts an empty table, or continues one after the row whose first column is `goes_on_after`.
+    pub(super) fn open(path: &Path, header: &str, goes_on_after: Option<f64>) -> Result<Self> {
+        goes_on_after.map_or_else(|| Self::create(path, header), |last| Self::resume(path, header, last))
+    }
+
     /// Starts an empty table.
-    pub(super) fn create(path: &Path, header: &str) -> Result<Self> {
+    fn create(path: &Path, header: &str) -> Result<Self> {
         pass()?;
         let mut file = File::create(path).map_err(|e| Error::unwritable(path, e))?;
         writeln!(file, "{header}").map_err(|e| Error::unwritable(path, e))?;
@@ -32,7 +37,7 @@ impl CsvFile {
 
     /// Continues a table, keeping the rows whose first column is at most `last`; creates one if there is none or its header
     /// differs.
-    pub(super) fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
+    fn resume(path: &Path, header: &str, last: f64) -> Result<Self> {
         pass()?;
         let Ok(old) = File::open(path) else { return Self::create(path, header) };
         let mut lines = BufReader::new(old).lines();

@@ -143,10 +143,7 @@ impl History {
         let path = folder.join("history.csv");
         let energies = in_columns(Energy::COLUMNS, "energy_imbalance").join(",");
         let header = format!("{STEP_COLUMNS},{energies}");
-        Ok(Self(match goes_on_after {
-            Some(step) => CsvFile::resume(&path, &header, step as f64)?,
-            None => CsvFile::create(&path, &header)?,
-        }))
+        Ok(Self(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?))
     }
 
     /// Writes the row of a step.

@@ -62,10 +62,7 @@ impl<const D: usize> Probes<D> {
         let axes = &["x", "y", "z"][..D];
         let columns = |what: &str| axes.iter().map(|a| format!(",{what}_{a}")).collect::<String>();
         let header = format!("step,time,probe{}{}", columns("displacement"), columns("velocity"));
-        self.file = Some(match goes_on_after {
-            Some(step) => CsvFile::resume(&path, &header, step as f64)?,
-            None => CsvFile::create(&path, &header)?,
-        });
+        self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?);
         Ok(())
     }
 

@@ -68,10 +68,7 @@ impl<const D: usize> Profiles<D> {
             .collect::<String>();
         let header =
             format!("time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}");
-        self.file = Some(match goes_on_after {
-            Some(time) => CsvFile::resume(&path, &header, time)?,
-            None => CsvFile::create(&path, &header)?,
-        });
+        self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
     }
 

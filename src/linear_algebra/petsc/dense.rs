@@ -1,4 +1,4 @@
-use super::{check, index, reference::Reference, sys};
+use super::{DistributedVector, check, index, reference::Reference, sys};
 use crate::error::{Error, Result};
 use std::ptr;
 
@@ -6,8 +6,8 @@ use std::ptr;
 #[derive(Debug)]
 pub struct DenseCholesky {
     factor: Reference<sys::_p_Mat>,
-    vectors: [Reference<sys::_p_Vec>; 2],
-    size: usize,
+    /// Right-hand side and solution.
+    vectors: [DistributedVector; 2],
 }
 
 impl DenseCholesky {
@@ -21,31 +21,22 @@ impl DenseCholesky {
             check(sys::MatCholeskyFactor(raw, ptr::null_mut(), ptr::null()))?;
             let given = Reference::new(|vector| sys::MatCreateVecs(raw, vector, ptr::null_mut()))?;
             let found = Reference::new(|vector| sys::MatCreateVecs(raw, ptr::null_mut(), vector))?;
-            Ok(Self { factor, vectors: [given, found], size })
+            Ok(Self { factor, vectors: [given, found].map(|raw| DistributedVector { raw }) })
         }
     }
 
     /// Replaces a right-hand side by the solution.
     pub fn solve(&mut self, values: &mut [f64]) -> Result<()> {
-        let [given, found] = [&self.vectors[0], &self.vectors[1]].map(Reference::get);
-        if values.len() != self.size {
-            return Err(Error::Internal(format!(
-                "{} values for a factor of {} rows",
-                values.len(),
-                self.size
-            )));
+        let [given, found] = &mut self.vectors;
+        let rows = given.owned()?.len();
+        if values.len() != rows {
+            return Err(Error::Internal(format!("{} values for a factor of {rows} rows", values.len())));
         }
-        // SAFETY: live vectors of the matrix' size, which is that of the values; arrays are given back before the next call.
-        unsafe {
-            let mut array = ptr::null_mut();
-            check(sys::VecGetArray(given, &mut array))?;
-            ptr::copy_nonoverlapping(values.as_ptr(), array, values.len());
-            check(sys::VecRestoreArray(given, &mut array))?;
-            check(sys::MatSolve(self.factor.get(), given, found))?;
-            check(sys::VecGetArray(found, &mut array))?;
-            ptr::copy_nonoverlapping(array, values.as_mut_ptr(), values.len());
-            check(sys::VecRestoreArray(found, &mut array))
-        }
+        given.owned_mut()?.copy_from_slice(values);
+        // SAFETY: live objects of one size; the two vectors differ.
+        check(unsafe { sys::MatSolve(self.factor.get(), given.raw.get(), found.raw.get()) })?;
+        values.copy_from_slice(&found.owned()?);
+        Ok(())
     }
 }
 
