@@ -57,35 +57,20 @@ pub fn describe_json() -> String {
 /// Runs the study and writes its tables; with `with_ablation` the base job is run without each of its effects as well.
 /// Collective.
 pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit> {
-    let say = |words: &str| {
-        if session.is_first() {
-            let _ = writeln!(std::io::stdout(), "{words}");
-        }
-    };
+    let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;
-    let mut reference = None;
-    if let Some(PlannedReference::Run(planned)) = &plan.reference {
-        match announced(session, planned, 1, "reference", &say)? {
-            Some(ran) => reference = Some(ran),
-            None => return stopped(&say),
-        }
-    }
-    let mut ran = Vec::new();
-    for (index, planned) in plan.runs.iter().enumerate() {
-        let count = format!("{}/{}", index + 1, plan.runs.len());
-        match announced(session, planned, repetitions, &count, &say)? {
-            Some(one) => ran.push(one),
-            None => return stopped(&say),
-        }
-    }
-    let mut on_meshes = Vec::new();
-    for planned in &plan.split {
-        match announced(session, planned, 1, "split", &say)? {
-            Some(one) => on_meshes.push(one),
-            None => return stopped(&say),
-        }
-    }
-    let mut results = assembled(session, plan, reference.as_ref(), &ran, &on_meshes)?;
+    let number = |index: usize| format!("{}/{}", index + 1, plan.runs.len());
+    let runs = plan.runs.iter().enumerate();
+    let once = |planned, what| announced(session, planned, 1, what, &say);
+    let reference = reference_run(plan).map(|planned| once(planned, "reference"));
+    let Some(reference) = reference.into_iter().collect::<Result<Option<Vec<Ran>>>>()? else {
+        return stopped(&say);
+    };
+    let ran = runs.map(|(index, planned)| announced(session, planned, repetitions, &number(index), &say));
+    let Some(ran) = ran.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(&say) };
+    let on_meshes = plan.split.iter().map(|planned| once(planned, "split"));
+    let Some(on_meshes) = on_meshes.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(&say) };
+    let mut results = assembled(session, plan, reference.first(), &ran, &on_meshes)?;
     if with_ablation {
         match ablate::ablate(session, plan, &say)? {
             Some(ablation) => results.ablation = Some(ablation),
@@ -107,17 +92,9 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
 /// Runs a share of the study's runs, each in its own folder, and writes no tables: the study, started on as many ranks when
 /// all shares are done, finds them finished. Collective.
 pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
-    let say = |words: &str| {
-        if session.is_first() {
-            let _ = writeln!(std::io::stdout(), "{words}");
-        }
-    };
+    let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;
-    let reference = match &plan.reference {
-        Some(PlannedReference::Run(planned)) => Some(&**planned),
-        _ => None,
-    };
-    let once = reference.into_iter().chain(&plan.split).map(|planned| (planned, 1));
+    let once = reference_run(plan).into_iter().chain(&plan.split).map(|planned| (planned, 1));
     let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
     let mut failed = 0;
     for (index, (planned, repetitions)) in all.iter().enumerate().filter(|(index, _)| part.has(*index)) {
@@ -128,6 +105,23 @@ pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
         }
     }
     Ok(if failed > 0 { Exit::Failed } else { Exit::Done })
+}
+
+/// Writes lines to the terminal, on the first rank.
+fn speaker(session: &Session) -> impl Fn(&str) {
+    move |words| {
+        if session.is_first() {
+            let _ = writeln!(std::io::stdout(), "{words}");
+        }
+    }
+}
+
+/// The run that is the reference, if it is one.
+fn reference_run(plan: &Plan) -> Option<&Planned> {
+    match &plan.reference {
+        Some(PlannedReference::Run(planned)) => Some(planned),
+        _ => None,
+    }
 }
 
 fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
@@ -174,9 +168,7 @@ fn assembled(
         targets: Vec::new(),
         ablation: None,
     };
-    if let (Some(PlannedReference::Run(planned)), Some(ran)) = (&plan.reference, reference) {
-        results.reference = Some(result(planned, ran, take));
-    }
+    results.reference = reference_run(plan).zip(reference).map(|(planned, ran)| result(planned, ran, take));
     for (at, ran) in ran.iter().enumerate().filter(|(_, ran)| ran.record.is_complete()) {
         let run = &mut results.runs[at];
         let added = Compared::with_reference(plan, &plan.runs[at], &ran.record, reference)
