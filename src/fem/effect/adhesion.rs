@@ -5,7 +5,7 @@ use super::{
 use crate::{
     fem::space::{Nodal, SurfacePoint},
     laws::contact,
-    linear_algebra::tensor::{Vector, add_scaled, dot},
+    linear_algebra::tensor::{add_scaled, dot},
 };
 
 /// Adhesion on contact boundaries, with one bonding `b` for each node.
@@ -73,7 +73,7 @@ impl<const D: usize> Adhesion<D> {
         let [mut drive, mut energy, mut viscosity] = [0.0; 3];
         for (law, point) in group {
             let law = &self.laws[*law];
-            drive += point.weight * law.drive(&value_at(displacement, point), &point.normal);
+            drive += point.weight * law.drive(&point.value(displacement), &point.normal);
             energy += point.weight * law.energy;
             viscosity += point.weight * law.viscosity;
         }
@@ -83,7 +83,7 @@ impl<const D: usize> Adhesion<D> {
     /// Energy in J that intact bonds at the points of a node store.
     fn potential(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> f64 {
         let of_point = |(law, point): &(usize, SurfacePoint<D>)| {
-            point.weight * self.laws[*law].potential(&value_at(displacement, point), &point.normal)
+            point.weight * self.laws[*law].potential(&point.value(displacement), &point.normal)
         };
         group.iter().map(of_point).sum()
     }
@@ -106,8 +106,8 @@ impl<const D: usize> Adhesion<D> {
             [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
             energy.debonding += (before * before - *after * *after) * self.potential(group, displacement);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&value_at(displacement, point), &point.normal);
-                push(point, point.weight * *after * *after, &traction, forces);
+                let traction = self.laws[*law].traction(&point.value(displacement), &point.normal);
+                point.add(point.weight * *after * *after, &traction, forces);
             }
         }
         self.bonding.trial = trial;
@@ -144,7 +144,7 @@ impl<const D: usize> Adhesion<D> {
             let mut truncated = false;
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = value_at(displacement, point);
+                let displacement = point.value(displacement);
                 pull = add_scaled(&pull, point.weight, &law.traction(&displacement, normal));
                 if tangents.is_some() {
                     let own = law.tangent(&displacement, normal);
@@ -156,8 +156,7 @@ impl<const D: usize> Adhesion<D> {
                 }
             }
             let Some((_, point)) = group.first() else { continue };
-            let target = &mut forces[point.node as usize * D..][..D];
-            target.iter_mut().zip(&pull).for_each(|(force, pull)| *force -= square * pull);
+            point.add(-square, &pull, forces);
             if let Some(tangents) = &mut tangents {
                 // The bonding depends on the displacement. Traction and gradient of the drive are parallel unless a length is truncated.
                 let tangent = std::array::from_fn(|i| {
@@ -167,15 +166,6 @@ impl<const D: usize> Adhesion<D> {
             }
         }
     }
-}
-
-fn value_at<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> Vector<D> {
-    std::array::from_fn(|i| nodal[point.node as usize * D + i])
-}
-
-fn push<const D: usize>(point: &SurfacePoint<D>, factor: f64, value: &Vector<D>, forces: &mut [f64]) {
-    let target = &mut forces[point.node as usize * D..][..D];
-    target.iter_mut().zip(value).for_each(|(force, value)| *force += factor * value);
 }
 
 impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
@@ -209,12 +199,12 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         for (group, bonding) in self.groups().zip(&self.bonding.converged) {
             for (law, point) in group {
                 let (law, normal) = (&self.laws[*law], &point.normal);
-                let displacement = value_at(nodal.displacement, point);
+                let displacement = point.value(nodal.displacement);
                 let share = point.weight * bonding * bonding;
                 let potential = law.potential(&displacement, normal);
                 energy.stored_in_bonds += share * potential;
                 if at == Evaluation::Converged {
-                    let change = value_at(nodal.velocity, point).map(|v| step.length * v);
+                    let change = point.value(nodal.velocity).map(|v| step.length * v);
                     let before = std::array::from_fn(|i| displacement[i] - change[i]);
                     let gain = potential - law.potential(&before, normal);
                     energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
@@ -234,9 +224,9 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
             energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
-                let traction = self.laws[*law].traction(&value_at(nodal.displacement, point), &point.normal);
+                let traction = self.laws[*law].traction(&point.value(nodal.displacement), &point.normal);
                 energy.numerical +=
-                    step.length * point.weight * after * dot(&traction, &value_at(nodal.velocity, point));
+                    step.length * point.weight * after * dot(&traction, &point.value(nodal.velocity));
             }
         }
     }
@@ -246,7 +236,7 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
         for (group, bonding) in self.groups().zip(self.bonding.last_three()) {
             let off = curvature.error(bonding.map(|b| b * b));
             for (law, point) in group {
-                let potential = self.laws[*law].potential(&value_at(displacement, point), &point.normal);
+                let potential = self.laws[*law].potential(&point.value(displacement), &point.normal);
                 let twice = 2.0 * point.weight * potential;
                 error.error += off * off * twice;
                 error.size += bonding[0] * bonding[0] * twice;
@@ -256,11 +246,11 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
 
     fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
         for (law, point) in &self.points {
-            let (law, x) = (&self.laws[*law], value_at(x, point));
+            let (law, x) = (&self.laws[*law], point.value(x));
             let along = dot(&x, &point.normal);
             let more = law.stiffness - law.tangential_stiffness();
-            push(point, point.weight * law.tangential_stiffness(), &x, forces);
-            push(point, point.weight * more * along, &point.normal, forces);
+            point.add(point.weight * law.tangential_stiffness(), &x, forces);
+            point.add(point.weight * more * along, &point.normal, forces);
         }
     }
 

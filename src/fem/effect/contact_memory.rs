@@ -59,7 +59,7 @@ impl<const D: usize> ContactMemory<D> {
         let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
         for (((law, point), (before, after)), start) in self.points.iter().zip(pressures).zip(&self.before) {
             let slope;
-            [*after, slope] = law.follow(*before, [*start, along(displacement, point)], step.length);
+            [*after, slope] = law.follow(*before, [*start, point.along(displacement)], step.length);
             self.slopes.push(slope);
         }
     }
@@ -68,7 +68,7 @@ impl<const D: usize> ContactMemory<D> {
     fn add_forces(&self, blend: Blend, mut tangents: Option<&mut Tangents>, forces: &mut [f64]) {
         for (((_, point), pressure), slope) in self.points.iter().zip(&self.pressure.trial).zip(&self.slopes)
         {
-            push(point, point.weight * pressure, forces);
+            point.add(point.weight * pressure, &point.normal, forces);
             if let Some(tangents) = &mut tangents {
                 let stiffness = blend.length * point.weight * slope;
                 tangents.push_node(
@@ -79,17 +79,6 @@ impl<const D: usize> ContactMemory<D> {
             }
         }
     }
-}
-
-fn along<const D: usize>(nodal: &[f64], point: &SurfacePoint<D>) -> f64 {
-    let value = &nodal[point.node as usize * D..][..D];
-    value.iter().zip(&point.normal).map(|(value, normal)| value * normal).sum()
-}
-
-/// Adds a force along the normal, out of the body if it is positive.
-fn push<const D: usize>(point: &SurfacePoint<D>, force: f64, forces: &mut [f64]) {
-    let target = &mut forces[point.node as usize * D..][..D];
-    target.iter_mut().zip(&point.normal).for_each(|(target, normal)| *target += force * normal);
 }
 
 impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
@@ -109,13 +98,13 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
             Evaluation::Converged => {
                 let pressures = self.pressure.converged.iter().zip(&mut self.pressure.trial);
                 for ((law, point), (before, after)) in self.points.iter().zip(pressures) {
-                    *after = law.advance(*before, along(displacement, point), step.length);
-                    push(point, -point.weight * *after, forces);
+                    *after = law.advance(*before, point.along(displacement), step.length);
+                    point.add(-point.weight * *after, &point.normal, forces);
                 }
             }
             Evaluation::Start(_) => {
                 self.before.clear();
-                self.before.extend(self.points.iter().map(|(_, point)| along(displacement, point)));
+                self.before.extend(self.points.iter().map(|(_, point)| point.along(displacement)));
             }
             Evaluation::End(blend) => {
                 self.advance(step, displacement);
@@ -126,7 +115,7 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
 
     fn add_energy(&self, _: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         for ((_, point), pressure) in self.points.iter().zip(&self.pressure.converged) {
-            energy.contact += point.weight * pressure * step.length * along(nodal.velocity, point);
+            energy.contact += point.weight * pressure * step.length * point.along(nodal.velocity);
         }
     }
 
@@ -149,7 +138,7 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
 
     fn add_stiffness(&self, x: &[f64], forces: &mut [f64]) {
         for (law, point) in &self.points {
-            push(point, point.weight * law.stiffness() * along(x, point), forces);
+            point.add(point.weight * law.stiffness() * point.along(x), &point.normal, forces);
         }
     }
 

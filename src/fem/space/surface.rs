@@ -18,6 +18,24 @@ pub struct SurfacePoint<const D: usize> {
     pub weight: f64,
 }
 
+impl<const D: usize> SurfacePoint<D> {
+    /// The value of a nodal field of `D` values for each node.
+    pub fn value(&self, nodal: &[f64]) -> Vector<D> {
+        std::array::from_fn(|i| nodal[self.node as usize * D + i])
+    }
+
+    /// The component of such a value along the normal.
+    pub fn along(&self, nodal: &[f64]) -> f64 {
+        dot(&self.value(nodal), &self.normal)
+    }
+
+    /// Adds a multiple of a vector to such a value.
+    pub fn add(&self, factor: f64, vector: &Vector<D>, nodal: &mut [f64]) {
+        let target = &mut nodal[self.node as usize * D..][..D];
+        target.iter_mut().zip(vector).for_each(|(target, value)| *target += factor * value);
+    }
+}
+
 /// Cosine of the angle beyond which facets around a node count as different faces of the body (40 degrees).
 const SAME_FACE: f64 = 0.766_044_443_118_978;
 

@@ -11,9 +11,8 @@ use crate::{
     laws::contact::NodeContext,
     linear_algebra::tensor::{Mandel, Vector, apply, dot, norm},
     mesh::shape::facet_normal,
-    parallel::{agreement::Agreed, session::Session},
+    parallel::{agreement::Agreed, exchange::exchange, session::Session},
 };
-use mpi::{datatype::PartitionMut, topology::Communicator, traits::Root};
 use std::path::Path;
 
 /// A boundary whose values are written.
@@ -83,7 +82,10 @@ impl<const D: usize> Profiles<D> {
         let width = if self.with_friction { 2 * D + 3 } else { D + 3 };
         for profile in &self.profiles {
             let rows = session.agree(profile.rows(body, state, stress, self.with_friction))?;
-            let rows = gather(session, &rows);
+            // All rows to rank 0.
+            let mut counts = vec![0; session.ranks()];
+            counts[0] = rows.len();
+            let (rows, _) = exchange(session.world(), &rows, &counts)?;
             let written = self.file.as_mut().map_or(Ok(()), |file| {
                 let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
                 rows.sort_by(|a, b| compare(a, b));
@@ -181,32 +183,6 @@ fn free_component<const D: usize, const S: usize>(
     let free: Vector<D> = std::array::from_fn(|i| if body.fixed[at + i] { 0.0 } else { point.normal[i] });
     let size = norm(&free);
     if size == 0.0 { 0.0 } else { (0..D).map(|i| free[i] * nodal[at + i]).sum::<f64>() / size }
-}
-
-/// The rows of all ranks on rank 0; nothing elsewhere. Collective.
-fn gather(session: &Session, mine: &[f64]) -> Vec<f64> {
-    let world = session.world();
-    let count = i32::try_from(mine.len()).expect("the rows of a boundary stay below 2^31 numbers");
-    let root = world.process_at_rank(0);
-    if !session.is_first() {
-        root.gather_into(&count);
-        root.gather_varcount_into(mine);
-        return Vec::new();
-    }
-    let mut counts = vec![0i32; session.ranks()];
-    root.gather_into_root(&count, &mut counts[..]);
-    let starts: Vec<i32> = counts
-        .iter()
-        .scan(0, |at, n| {
-            let start = *at;
-            *at += n;
-            Some(start)
-        })
-        .collect();
-    let mut all = vec![0.0; counts.iter().sum::<i32>() as usize];
-    let mut parts = PartitionMut::new(&mut all[..], counts, &starts[..]);
-    root.gather_varcount_into_root(mine, &mut parts);
-    all
 }
 
 fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {

@@ -7,7 +7,7 @@
 use super::{
     Contact, Derivatives,
     friction::Friction,
-    point::{Unknown, Vectors::Newton},
+    point::{Point, Unknown, Vectors::Newton},
 };
 use xxhash_rust::xxh3::Xxh3;
 
@@ -140,16 +140,7 @@ impl<const D: usize> Contact<D> {
     /// `direction` of the velocity. To be called after [`map_direction`](Self::map_direction).
     pub fn add_derivative(&self, direction: &[f64], forces: &mut [f64]) {
         debug_assert_eq!(self.derivatives, Derivatives::AlongDirection);
-        for point in &self.points {
-            match point.unknown {
-                Unknown::Parameter => point.add_force(Newton, point.change, forces),
-                Unknown::Velocity => {
-                    let along = point.normal_component(Newton, direction);
-                    point.add_force(Newton, point.slope * along, forces);
-                }
-                Unknown::Held => {}
-            }
-        }
+        self.add_changes(direction, |point| point.change, forces);
         if let Some(friction) = &self.friction {
             friction.add_derivative(forces);
         }
@@ -159,21 +150,24 @@ impl<const D: usize> Contact<D> {
     /// are to be called after [`linearise_parameters`](Self::linearise_parameters).
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
-        for point in &self.points {
-            match point.unknown {
-                Unknown::Parameter => {
-                    let along = point.along(Newton, direction);
-                    point.add_force(Newton, point.slope * point.stretch * along, forces);
-                }
-                Unknown::Velocity => {
-                    let along = point.normal_component(Newton, direction);
-                    point.add_force(Newton, point.slope * along, forces);
-                }
-                Unknown::Held => {}
-            }
-        }
+        let change = |point: &Point<D>| point.slope * point.stretch * point.along(Newton, direction);
+        self.add_changes(direction, change, forces);
         if let Some(friction) = &self.friction {
             friction.add_slopes(&self.points, direction, forces);
+        }
+    }
+
+    /// Adds the forces of the changes of the pressures: of these where the unknown is the parameter, and of the change `direction` of the
+    /// velocity where it is the velocity.
+    #[inline]
+    fn add_changes(&self, direction: &[f64], of_parameter: impl Fn(&Point<D>) -> f64, forces: &mut [f64]) {
+        for point in &self.points {
+            let change = match point.unknown {
+                Unknown::Parameter => of_parameter(point),
+                Unknown::Velocity => point.slope * point.normal_component(Newton, direction),
+                Unknown::Held => continue,
+            };
+            point.add_force(Newton, change, forces);
         }
     }
 
