@@ -87,6 +87,14 @@ impl Session {
         agree(&self.world, result)
     }
 
+    /// What a function gives on rank 0, where alone it is called; `None` elsewhere, and its failure on all ranks. Collective.
+    pub fn on_first<T, E: Into<Error>>(
+        &self,
+        function: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Option<T>, Agreed> {
+        self.agree(self.is_first().then(function).transpose())
+    }
+
     /// Sum over all ranks of each entry. Collective.
     pub fn sum<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
         let mut all = [0.0; N];

@@ -73,7 +73,7 @@ pub(super) fn check<const D: usize, const S: usize>(
 ) -> Result<Report, Agreed> {
     let quality = mesh.quality_summary(session);
     let folder = loaded.job.output_folder();
-    session.agree(if session.is_first() { refuse_unwritable(folder) } else { Ok(()) })?;
+    session.on_first(|| refuse_unwritable(folder))?;
     let ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     session.agree(check_loads(&loaded.job, &ready.body, &ready.state))?;
     session.agree(report(session, loaded, &ready, quality))

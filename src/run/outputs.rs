@@ -81,7 +81,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             profiles.open(&folder, profiles_after)?;
             History::open(&folder, step)
         };
-        let history = session.agree(session.is_first().then(tables).transpose())?;
+        let history = session.on_first(tables)?;
         let keep = job.checkpoint.as_ref().map_or(2, |c| c.keep as usize);
         let spent = start.elapsed();
         let checkpoints = 0;
@@ -173,11 +173,10 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let path = checkpoint_path(&self.folder, state.step);
         let header = Header::new(session, &self.identity, body, state, totals);
         checkpoint::save(session, &path, &header, body, state)?;
-        if session.is_first() {
+        session.on_first(|| {
             self.checkpoints += length(&path);
-        }
-        let pruned = if session.is_first() { prune(&self.folder, self.keep) } else { Ok(()) };
-        session.agree(pruned)?;
+            prune(&self.folder, self.keep)
+        })?;
         self.spent += start.elapsed();
         Ok(path)
     }

@@ -70,8 +70,7 @@ pub(super) fn restore<const D: usize, const S: usize>(
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.
 /// Collective.
 fn newest(session: &Session, folder: &Path) -> Result<Vec<PathBuf>, Agreed> {
-    let found = if session.is_first() { list(folder) } else { Ok(Vec::new()) };
-    let found = session.agree(found)?;
+    let found = session.on_first(|| list(folder))?.unwrap_or_default();
     let mut count = found.len() as u64;
     session.world().process_at_rank(0).broadcast_into(&mut count);
     let mut steps: Vec<u64> = found.into_iter().map(|(step, _)| step).collect();

@@ -35,7 +35,7 @@ impl Scene {
             job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
             job::Mesh::Box(of) => generated(session, cuboid(of), of.partition).map(Self::Three)?,
             job::Mesh::File(path) => {
-                session.agree(if session.is_first() { refuse_missing(path, loaded) } else { Ok(()) })?;
+                session.on_first(|| refuse_missing(path, loaded))?;
                 from_file(session, path)?
             }
         };
@@ -70,8 +70,7 @@ fn generated<const D: usize, G: Grid<D>>(
         let piece = session.agree(grid.part(session.rank(), session.ranks()))?;
         return Mesh::assemble(session, piece, grid.names());
     }
-    let whole = session.is_first().then(|| grid.whole()).transpose();
-    split(session, session.agree(whole)?)
+    split(session, session.on_first(|| grid.whole())?)
 }
 
 /// Refuses a mesh file that does not exist, at its key in the job.
@@ -92,7 +91,7 @@ fn from_file(session: &Session, path: &Path) -> Result<Scene, Agreed> {
             _ => file.mesh(session).map(Scene::Three),
         };
     }
-    let whole = session.agree(session.is_first().then(|| gmsh::read(path)).transpose())?;
+    let whole = session.on_first(|| gmsh::read(path))?;
     let mut dimension = match whole {
         Some(AnyMesh::Two(_)) => 2,
         _ => 3,

@@ -50,13 +50,13 @@ pub(super) fn run<const D: usize, const S: usize>(
     let job = &loaded.job;
     let folder = job.output_folder();
     let mut log = Log::new(session.is_first(), clock.on_terminal);
-    session.agree(if session.is_first() { claim_folder(job, start, &mut log) } else { Ok(()) })?;
+    session.on_first(|| claim_folder(job, start, &mut log))?;
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
     let goes_on = start.goes_on();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
-    session.agree(if session.is_first() { prepare_folder(folder, goes_on, &mut log) } else { Ok(()) })?;
+    session.on_first(|| prepare_folder(folder, goes_on, &mut log))?;
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
         log.line(&restored.words);
@@ -279,12 +279,10 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let written = self.session.agree(summary).and_then(|mut summary| {
             summary.range_warnings().for_each(|warning| self.log.warning(warning));
             summary.warnings = self.log.warnings().to_vec();
-            let mut written = Ok(());
-            if self.session.is_first() {
+            self.session.on_first(|| {
                 header::closing(&mut self.log, &summary, self.job.output_folder());
-                written = summary.write(self.job.output_folder());
-            }
-            self.session.agree(written)
+                summary.write(self.job.output_folder())
+            })
         });
         self.keep_first(&mut result, written);
         let closed = self.session.agree(self.outputs.close());

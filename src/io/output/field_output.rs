@@ -54,14 +54,14 @@ impl<const D: usize> FieldOutput<D> {
         let (Some(time), true) = (goes_on_after, exists) else {
             return Ok(Self { file: create()?, is_wanted });
         };
-        session.agree(if session.is_first() { refuse_other_fields(&path, is_wanted) } else { Ok(()) })?;
+        session.on_first(|| refuse_other_fields(&path, is_wanted))?;
         let file = match FieldFile::resume(folder, session.world(), parts, time, compression) {
             Ok(resumed) => resumed,
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
                 log.warning(format!("{error}; it is kept as {}, a new one is begun", aside.display()));
-                let moved = if session.is_first() { std::fs::rename(&path, &aside) } else { Ok(()) };
-                session.agree(moved.map_err(|e| Error::unwritable(&aside, e)))?;
+                let moved = || std::fs::rename(&path, &aside).map_err(|e| Error::unwritable(&aside, e));
+                session.on_first(moved)?;
                 create()?
             }
         };

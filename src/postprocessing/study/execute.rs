@@ -28,11 +28,7 @@ pub(super) enum Outcome {
 /// Runs a planned run, unless its folder holds it already. A run that fails is an outcome, not an error. Collective.
 pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Result<Outcome> {
     let folder = planned.loaded.job.output_folder();
-    let mut digests = Ok(String::new());
-    if session.is_first() {
-        digests = digest(planned, session.ranks());
-    }
-    let digest = session.agree(digests)?;
+    let digest = session.on_first(|| digest(planned, session.ranks()))?.unwrap_or_default();
     let found = if session.is_first() { Record::of_finished(folder, &digest, repetitions) } else { None };
     if let Some(record) = Record::share(session, found)? {
         return Ok(Outcome::Ran { record: Box::new(record), found: true });
@@ -41,10 +37,7 @@ pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) 
     for _ in 0..repetitions {
         let finished = match run_once(session, planned) {
             Ok(Exit::Stopped) => return Ok(Outcome::Stopped),
-            Ok(_) => {
-                let mine = if session.is_first() { record.add_summary(folder) } else { Ok(()) };
-                session.agree(mine)
-            }
+            Ok(_) => session.on_first(|| record.add_summary(folder)),
             Err(error) => Err(error),
         };
         if let Err(error) = finished {
@@ -52,14 +45,12 @@ pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) 
             break;
         }
     }
-    let mut written = Ok(());
-    if session.is_first() {
+    session.on_first(|| {
         if record.error.is_none() {
-            written = record.complete(folder);
+            record.complete(folder)?;
         }
-        written = written.and_then(|()| record.write(folder));
-    }
-    session.agree(written)?;
+        record.write(folder)
+    })?;
     match Record::share(session, Some(record))? {
         Some(record) => Ok(Outcome::Ran { record: Box::new(record), found: false }),
         None => Ok(Outcome::Stopped),

@@ -77,8 +77,7 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
             None => return stopped(&say),
         }
     }
-    let written = if session.is_first() { write::all(plan, &results) } else { Ok(()) };
-    session.agree(written)?;
+    session.on_first(|| write::all(plan, &results))?;
     let tables = table::all(&results).iter().map(|t| t.text()).collect::<Vec<_>>().join("\n");
     say(&format!("\n{tables}\nfiles      {}", plan.folder.display()));
     let failed = results.runs.iter().chain(&results.reference).filter(|run| run.error.is_some()).count();
