@@ -134,11 +134,7 @@ impl<const D: usize> GlobalMesh<D> {
 impl<const D: usize> Mesh<D> {
     /// The shape qualities of the cells of all ranks in short. Collective.
     pub fn quality_summary(&self, session: &Session) -> Quality {
-        let quality = |cell: usize| {
-            let nodes = self.cell(cell);
-            let corners: [Vector<D>; 4] = std::array::from_fn(|i| self.nodes[nodes[i.min(D)] as usize]);
-            (self.cell_ids[cell] as usize, shape::quality(&corners[..=D]))
-        };
+        let quality = |cell| (self.cell_ids[cell] as usize, shape::quality(&self.corners(cell)[..=D]));
         let own = Quality::of((0..self.cell_count()).map(quality));
         let smallest = -session.largest([-own.smallest])[0];
         let worst = if own.smallest == smallest { own.worst_cell as f64 } else { f64::INFINITY };

@@ -92,6 +92,19 @@ impl<const D: usize> Mesh<D> {
         &self.cells[cell * (D + 1)..(cell + 1) * (D + 1)]
     }
 
+    /// The corners of a cell; only the first `D + 1` of the four are meant.
+    #[inline]
+    pub fn corners(&self, cell: usize) -> [Vector<D>; 4] {
+        let nodes = self.cell(cell);
+        std::array::from_fn(|i| self.nodes[nodes[i.min(D)] as usize])
+    }
+
+    /// The corners of a facet.
+    #[inline]
+    pub fn facet_corners(&self, facet: u32) -> [Vector<D>; D] {
+        self.facets[facet as usize].map(|node| self.nodes[node as usize])
+    }
+
     /// Global number of a local node.
     #[inline]
     pub fn global_node(&self, local: u32) -> u32 {

@@ -29,7 +29,7 @@ impl<const D: usize> Mesh<D> {
             for &facet in facets(contact) {
                 let Some(support) = supported_by[facet as usize] else { continue };
                 if claims.count == 0 {
-                    let corners = self.facets[facet as usize].map(|node| self.nodes[node as usize]);
+                    let corners = self.facet_corners(facet);
                     let names = if support == contact {
                         format!("a support and a contact both claim the boundary `{contact}`")
                     } else {

@@ -100,8 +100,7 @@ fn frames<const D: usize>(
 ) -> Result<Vec<Body<D>>, Agreed> {
     let mut sums = vec![0.0; bodies.count * (D + 1)];
     for (cell, &body) in bodies.of_cell.iter().enumerate() {
-        let of_cell = mesh.cell(cell);
-        let corners: [Vector<D>; 4] = std::array::from_fn(|i| mesh.nodes[of_cell[i.min(D)] as usize]);
+        let corners = mesh.corners(cell);
         let (measure, middle) = (signed_measure(&corners[..=D]), centroid(&corners[..=D]));
         let sum = &mut sums[body as usize * (D + 1)..][..=D];
         (0..D).for_each(|i| sum[i] += measure * middle[i]);

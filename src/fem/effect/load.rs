@@ -49,8 +49,7 @@ impl Load {
     ) -> Result<()> {
         for traction in &self.tractions {
             for &facet in &traction.facets {
-                let nodes = mesh.facets[facet as usize];
-                let corners = nodes.map(|n| mesh.nodes[n as usize]);
+                let (nodes, corners) = (mesh.facets[facet as usize], mesh.facet_corners(facet));
                 let measure = norm(&facet_normal(&corners));
                 for (place, weight) in facet_rule::<D>() {
                     let value = evaluate(&traction.value, time, &point(&corners, place), "traction")?;
@@ -60,11 +59,7 @@ impl Load {
         }
         for body_force in &self.body_forces {
             for (number, cell) in geometry.iter().enumerate() {
-                let nodes = mesh.cell(number);
-                let mut corners = [[0.0; D]; 4];
-                for (corner, &node) in corners.iter_mut().zip(nodes) {
-                    *corner = mesh.nodes[node as usize];
-                }
+                let (nodes, corners) = (mesh.cell(number), mesh.corners(number));
                 for (place, weight) in cell_rule::<D>() {
                     let at = point(&corners[..=D], place);
                     let value = evaluate(&body_force.value, time, &at, "body_force")?;

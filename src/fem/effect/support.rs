@@ -14,7 +14,7 @@ fn fixed_axes<const D: usize>(fix: &Fix, mesh: &Mesh<D>, boundary: &str, facet: 
         Fix::Named(Named::All) => out = [true; D],
         Fix::Axes(axes) => axes.iter().for_each(|axis| out[axis.index()] = true),
         Fix::Named(Named::Normal) => {
-            let normal = facet_normal(&mesh.facets[facet as usize].map(|n| mesh.nodes[n as usize]));
+            let normal = facet_normal(&mesh.facet_corners(facet));
             let size = norm(&normal);
             let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);
             let Some(axis) = along else {

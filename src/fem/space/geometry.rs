@@ -152,11 +152,7 @@ impl<const D: usize> Geometry<D> {
         let measure = |run: &CellRun| {
             let mut pack = SimplexPack::EMPTY;
             for lane in 0..run.count {
-                let mut corners = [[0.0; D]; 4];
-                for (corner, &node) in corners.iter_mut().zip(mesh.cell(run.first + lane)) {
-                    *corner = mesh.nodes[node as usize];
-                }
-                pack.set(lane, &Simplex::new(&corners[..=D]));
+                pack.set(lane, &Simplex::new(&mesh.corners(run.first + lane)[..=D]));
             }
             pack
         };

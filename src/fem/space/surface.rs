@@ -51,7 +51,7 @@ pub fn surface_points<const D: usize>(
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let nodes = mesh.facets[facet as usize];
-        let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+        let normal = facet_normal(&mesh.facet_corners(facet));
         for node in nodes {
             let global = mesh.global_node(node);
             let record = &mut outgoing[mesh.owner(global)];

@@ -104,12 +104,7 @@ impl<const D: usize> Probes<D> {
 
 fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<(usize, [f64; 4])> {
     (0..mesh.cell_count()).find_map(|number| {
-        let nodes = mesh.cell(number);
-        let first = mesh.nodes[nodes[0] as usize];
-        let mut corners = [first; 4];
-        for (corner, &node) in corners.iter_mut().zip(nodes) {
-            *corner = mesh.nodes[node as usize];
-        }
+        let corners = mesh.corners(number);
         let outside = (0..D).any(|i| {
             let along = corners[..=D].iter().map(|c| c[i]);
             let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -123,7 +118,7 @@ fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<(usize, [f6
         let mut shares = [0.0; 4];
         shares[0] = 1.0;
         for a in 1..=D {
-            shares[a] = (0..D).map(|i| cell.gradients[a - 1][i] * (point[i] - first[i])).sum();
+            shares[a] = (0..D).map(|i| cell.gradients[a - 1][i] * (point[i] - corners[0][i])).sum();
             shares[0] -= shares[a];
         }
         shares[..=D].iter().all(|s| *s >= INSIDE).then_some((number, shares))

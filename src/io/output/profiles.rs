@@ -156,7 +156,7 @@ impl<const D: usize> Profile<D> {
             sums.fill(0.0);
             for &facet in &self.facets {
                 let nodes = body.mesh.facets[facet as usize];
-                let normal = facet_normal(&nodes.map(|n| body.mesh.nodes[n as usize]));
+                let normal = facet_normal(&body.mesh.facet_corners(facet));
                 let measure = norm(&normal);
                 let unit = normal.map(|x| x / measure);
                 let sigma = &stress[body.mesh.facet_cells[facet as usize] as usize];

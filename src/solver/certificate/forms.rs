@@ -21,7 +21,7 @@ pub(super) fn add_trace<const D: usize>(
 ) {
     for &facet in contact.facets() {
         let nodes = mesh.facets[facet as usize];
-        let square = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+        let square = facet_normal(&mesh.facet_corners(facet));
         let measure = norm(&square);
         let unit = square.map(|c| c / measure);
         let weighted = nodes.map(|n| {

@@ -246,7 +246,7 @@ impl<const D: usize> Point<D> {
 /// The Gauss points of a facet.
 pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
     let nodes = mesh.facets[facet as usize];
-    let normal = facet_normal(&nodes.map(|n| mesh.nodes[n as usize]));
+    let normal = facet_normal(&mesh.facet_corners(facet));
     let measure = norm(&normal);
     let unit = normal.map(|x| x / measure);
     let rule = facet_rule::<D>().iter();
