@@ -9,6 +9,7 @@ use super::{GlobalMesh, Mesh};
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 use crate::parallel::session::Session;
+use serde::Serialize;
 
 /// Cells whose [quality](super::shape::quality) is below this are called poor: they spoil accuracy and conditioning.
 pub const POOR_QUALITY: f64 = 0.05;
@@ -20,13 +21,14 @@ const DEGENERATE: f64 = 1e-14;
 const COINCIDENT: f64 = 1e-12;
 
 /// The shape qualities of a mesh in short.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quality {
     /// The smallest quality, in (0, 1].
     pub smallest: f64,
     /// The cell that has it.
     pub worst_cell: usize,
     /// Number of cells below [`POOR_QUALITY`].
+    #[serde(rename = "poor_cells")]
     pub poor: usize,
 }
 

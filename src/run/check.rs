@@ -12,7 +12,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{body::Body, state::State},
-    job::{Job, Loaded},
+    job::{Job, Loaded, Probe},
     mesh::{Mesh, check::Quality},
     parallel::{agreement::Agreed, session::Session},
     solver::{certificate::Certificates, stepping::ProblemSize},
@@ -42,27 +42,12 @@ pub struct Report {
     preconditioner_reason: String,
     certificates: Certificates,
     partition: PartitionQuality,
-    cell_quality: CellQuality,
+    cell_quality: Quality,
     estimate: Estimate,
     warnings: Vec<String>,
     output_folder: String,
     #[serde(skip)]
     header: Vec<String>,
-}
-
-/// A probe, which lies inside the body.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Probe {
-    name: String,
-    point: Vec<f64>,
-}
-
-/// The shapes of the cells, from 0 (flat) to 1 (regular).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct CellQuality {
-    smallest: f64,
-    worst_cell: usize,
-    poor_cells: usize,
 }
 
 /// Sets the problem up as a run does, and reports on it. Collective.
@@ -113,12 +98,7 @@ fn report<const D: usize, const S: usize>(
         unknowns: body.unknowns(session),
         effects: body.effect_names(),
         contact_points: inventory.contact_points,
-        probes: job
-            .output
-            .probe
-            .iter()
-            .map(|p| Probe { name: p.name.clone(), point: p.point.clone() })
-            .collect(),
+        probes: job.output.probe.clone(),
         scheme: scheme.scheme().name(),
         steps,
         adaptive: job.time.adaptive.is_some(),
@@ -127,11 +107,7 @@ fn report<const D: usize, const S: usize>(
         preconditioner_reason: reason.to_owned(),
         certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
-        cell_quality: CellQuality {
-            smallest: quality.smallest,
-            worst_cell: quality.worst_cell,
-            poor_cells: quality.poor,
-        },
+        cell_quality: quality,
         estimate: Estimate::new(session, body, &inventory, preconditioner, problem),
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),

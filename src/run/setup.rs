@@ -5,8 +5,8 @@ use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
     io::output::probes::Probes,
-    job::{Job, Loaded},
-    linear_algebra::{petsc::set_option, tensor::Vector},
+    job::Loaded,
+    linear_algebra::petsc::set_option,
     mesh::Mesh,
     parallel::session::Session,
     solver::{
@@ -37,7 +37,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     for (name, value) in &job.solver.petsc {
         session.agree(set_option(name, value))?;
     }
-    let probes = session.agree(probes(session, &mesh, job))?;
+    let probes = session.agree(Probes::locate(session, &mesh, &job.output.probe))?;
     let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
@@ -79,14 +79,4 @@ fn refuse(loaded: &Loaded, verdict: &Verdict) -> Result<()> {
     let (found, remedies): (Vec<&str>, Vec<&str>) =
         verdict.refusals.iter().map(|(found, remedy)| (found.as_str(), remedy.as_str())).unzip();
     Err(loaded.fault("time.step", found.join("; "), remedies.join("; ")))
-}
-
-fn probes<const D: usize>(session: &Session, mesh: &Mesh<D>, job: &Job) -> Result<Probes<D>> {
-    let points: Vec<(String, Vector<D>)> = job
-        .output
-        .probe
-        .iter()
-        .map(|p| (p.name.clone(), std::array::from_fn(|i| p.point.get(i).copied().unwrap_or(0.0))))
-        .collect();
-    Probes::locate(session, mesh, &points)
 }

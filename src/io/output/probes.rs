@@ -4,6 +4,7 @@ use super::csv::{CsvFile, Number, Numbers};
 use crate::{
     error::{Error, Result},
     fem::{space::Simplex, state::State},
+    job::Probe,
     linear_algebra::tensor::Vector,
     mesh::Mesh,
     parallel::session::Session,
@@ -26,11 +27,12 @@ pub(crate) struct Probes<const D: usize> {
 }
 
 impl<const D: usize> Probes<D> {
-    /// Finds the points (name, coordinates in m) in the mesh; one outside the body is refused. Collective.
-    pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, points: &[(String, Vector<D>)]) -> Result<Self> {
+    /// Finds the probes in the mesh; one outside the body is refused. Collective.
+    pub(crate) fn locate(session: &Session, mesh: &Mesh<D>, probes: &[Probe]) -> Result<Self> {
         let mut places = Vec::new();
-        for (name, point) in points {
-            let here = find(mesh, point);
+        for Probe { name, point } in probes {
+            let point = std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0));
+            let here = find(mesh, &point);
             let mine = if here.is_some() { session.rank() as f64 } else { f64::MAX };
             let owner = -session.largest([-mine])[0];
             if owner == f64::MAX {
@@ -41,7 +43,7 @@ impl<const D: usize> Probes<D> {
             places.push(here.filter(|_| owner == mine));
         }
         Ok(Self {
-            names: points.iter().map(|p| p.0.clone()).collect(),
+            names: probes.iter().map(|probe| probe.name.clone()).collect(),
             places,
             file: None,
             room: Default::default(),
