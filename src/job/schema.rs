@@ -35,8 +35,8 @@ impl Kind {
 }
 
 const OPENING: &str = "\
-A job is a TOML file of the tables below. [table] stands once, [[table]] any number of times. A table that is absent
-is an effect that is not simulated. Lengths, forces and times are in SI units; paths are relative to the job file.
+A job is a TOML file with the tables below. [table] occurs at most once, [[table]] any number of times. An effect whose
+table is absent is not simulated. All quantities are in SI units. Paths are relative to the job file.
 
 ";
 

@@ -183,9 +183,13 @@ fn studies_of_the_repository_load() {
 #[test]
 fn every_key_of_a_study_is_described() {
     let text = describe(None).expect("described");
-    for part in
-        ["[[run]]", "[reference.exact]", "[[norm]]", "expected_order", "\"max\": The largest after time 0."]
-    {
+    for part in [
+        "[[run]]",
+        "[reference.exact]",
+        "[[norm]]",
+        "expected_order",
+        "\"max\": The largest value after time 0.",
+    ] {
         assert!(text.contains(part), "{part} is not in {text}");
     }
     assert!(describe(Some("norm")).expect("table").contains("published"));

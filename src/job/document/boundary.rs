@@ -5,35 +5,35 @@ use serde::{Deserialize, Serialize};
 
 use crate::job::Scalar;
 
-/// Boundaries whose displacement is held at its initial value.
+/// A support: boundaries on which components of the displacement keep their initial values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
     /// Names of boundaries.
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
-    /// Which components are held.
+    /// The components of the displacement that keep their initial values.
     #[schemars(example = &"all", example = ["x"])]
     pub fix: Fix,
 }
 
-/// Components of the displacement that a support holds.
+/// The components of the displacement that a support holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Fix {
-    /// All of them, or the one along the normal.
+    /// All components, or the normal one.
     Named(Named),
     /// A list of axes.
     Axes(#[schemars(length(min = 1))] Vec<Axis>),
 }
 
-/// A set of components with a name of its own.
+/// A set of components that has a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Named {
-    /// Every component.
+    /// All components.
     All,
-    /// The component along the normal; the boundary must be flat and square to an axis.
+    /// The normal component. The boundary must be flat and perpendicular to a coordinate axis.
     Normal,
 }
 
@@ -41,11 +41,11 @@ pub enum Named {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// The first.
+    /// The x axis.
     X,
-    /// The second.
+    /// The y axis.
     Y,
-    /// The third.
+    /// The z axis, in 3D only.
     Z,
 }
 
@@ -56,23 +56,23 @@ impl Axis {
     }
 }
 
-/// A force per area on boundaries.
+/// A traction, which is a force per area, on boundaries. If several apply to the same boundary, they are added.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
     /// Names of boundaries.
     #[schemars(length(min = 1), example = ["top"])]
     pub on: Vec<String>,
-    /// One component an axis: numbers, or expressions in t, x, y, z.
+    /// The vector, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
     #[schemars(extend("unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
 }
 
-/// A force per volume in the whole body.
+/// A force per volume on the whole body. If there are several, they are added.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyForce {
-    /// One component an axis: numbers, or expressions in t, x, y, z.
+    /// The vector, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
     #[schemars(extend("unit" = "N/m^d"), example = [0.0, -9.81])]
     pub value: Vec<Scalar>,
 }
@@ -81,11 +81,11 @@ pub struct BodyForce {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
-    /// One component an axis: numbers, or expressions in x, y, z; absent: zero.
+    /// The vector, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = [0.0, 0.0])]
     pub displacement: Option<Vec<Scalar>>,
-    /// One component an axis: numbers, or expressions in x, y, z; absent: zero.
+    /// The vector, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,

@@ -5,35 +5,36 @@ use serde::{Deserialize, Serialize};
 
 use crate::laws::contact::{Adhesion, FrictionLaw, Gap, Memory, NormalLaw, Quadrature};
 
-/// Boundaries that touch an obstacle, and the laws there.
+/// Boundaries that may touch an obstacle, and their contact laws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
     /// Names of boundaries.
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
-    /// Where on a facet the laws hold.
+    /// The points of a facet at which the contact laws are evaluated.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// The contact pressure -sigma_nu.
+    /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
     pub normal: NormalLaw,
-    /// A rigid obstacle that may move, for `compliance` and `unilateral` in place of their `gap`.
+    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance` and `unilateral`; other normal
+    /// laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
-    /// The friction traction; absent: sigma_tau = 0.
+    /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,
-    /// Bonds to an obstacle at rest, made at displacement zero: they pull back what moves away and give way. The bonding b at a node
-    /// falls from 1 as `viscosity b' = -max(b (stiffness R(opening)^2 + tangential_stiffness R(sliding)^2) - energy, 0)`, R
-    /// the cut at `length`, and never comes back; the traction is `b^2 stiffness R(opening)` along the normal and
-    /// `b^2 tangential_stiffness R(sliding)` against the sliding. `contact_pressure` is that of the normal law alone.
-    /// Absent: no bonds.
+    /// Adhesion to an obstacle at rest: bonds that form at displacement zero, resist opening and sliding, and break. The bonding b
+    /// at a node, 1 for intact and 0 for broken bonds, starts at 1 and decreases as `viscosity b' = -max(b (stiffness R(opening)^2
+    /// + tangential_stiffness R(sliding)^2) - energy, 0)`, where R(s) = min(s, length). Broken bonds are not restored. The traction
+    /// is `b^2 stiffness R(opening)` along the normal and `b^2 tangential_stiffness R(sliding)` against the sliding. The output
+    /// `contact_pressure` is the pressure of the normal law without the traction of adhesion. Absent: no adhesion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adhesion: Option<Adhesion>,
-    /// Memory of the foundation: a pressure beside that of the normal law,
-    /// `integral from 0 to t of stiffness_rate exp(-(t - s) / decay_time) max(normal displacement(s), 0) ds`, the field
-    /// `memory_pressure`. `contact_pressure` is that of the normal law alone; the work of both is `contact_dissipation`, negative
-    /// where the foundation gives back more than it took. Absent: no memory.
+    /// Memory of the foundation: a pressure that depends on the history of the normal displacement and is added to the pressure of
+    /// the normal law, `integral from 0 to t of stiffness_rate exp(-(t - s) / decay_time) max(normal displacement(s), 0) ds`. Field
+    /// files contain it as `memory_pressure`; the output `contact_pressure` is the pressure of the normal law only. The work of
+    /// both pressures is part of `contact_dissipation`, which is negative while the foundation returns energy. Absent: no memory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<Memory>,
 }

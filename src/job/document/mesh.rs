@@ -5,57 +5,57 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
-/// Where the cells come from.
+/// The mesh: a generated rectangle or box, or a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mesh {
-    /// A rectangle with its low corner at the origin, cut into triangles; boundaries left, right, bottom, top.
+    /// A rectangle whose lower left corner is the origin, divided into triangles. Its boundaries are left, right, bottom and top.
     Rectangle(Rectangle),
-    /// A box with its low corner at the origin, cut into tetrahedra; boundaries left, right (x), front,
-    /// back (y), bottom, top (z).
+    /// A box whose corner with the smallest coordinates is the origin, divided into tetrahedra. Its boundaries are left and right
+    /// (x), front and back (y), bottom and top (z).
     Box(Cuboid),
-    /// A Gmsh 4.1 file (ASCII or binary), or what `solver partition` made of one (.h5), relative to the job file; its
-    /// physical groups name boundaries and regions.
+    /// A mesh file, relative to the job file: a Gmsh 4.1 file (ASCII or binary), or the .h5 file that `solver partition` made from
+    /// one. The physical groups of the mesh name its boundaries and regions.
     File(#[schemars(extend("format" = "path"), example = "../../meshes/block.msh")] PathBuf),
 }
 
-/// A rectangle with its low corner at the origin, cut into triangles.
+/// A rectangle whose lower left corner is the origin, divided into triangles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
     /// Width and height.
     #[schemars(transform = positive_items, extend("unit" = "m"), example = [1.0, 1.0])]
     pub size: [f64; 2],
-    /// Number of rectangles along x and y; each is cut into 2 triangles (4 when crossed).
+    /// Number of small rectangles along x and y. Each is divided into 2 triangles, or 4 with diagonal = "crossed".
     #[schemars(inner(range(min = 1)), example = [32, 32])]
     pub cells: [u32; 2],
-    /// How each rectangle is cut.
+    /// The diagonals that divide the small rectangles into triangles.
     #[serde(default)]
     pub diagonal: Diagonal,
-    /// How unevenly the cells are spread. With a power p above 1 the i-th of n grid lines lies at the share (i/n)^p of the way
-    /// from the side that cells crowd toward, or, toward both sides, at half of (2i/n)^p from the nearer one. Neighbours differ
-    /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
+    /// Grading: smaller cells near chosen sides. Along an axis of length L with n cells and the exponent p > 1, grid line i has the
+    /// distance L (i/n)^p from the chosen side or, if both sides are chosen, L/2 (2i/n)^p from the nearer one. The lengths of
+    /// neighbouring cells differ at most by a factor of 2^p - 1. The longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: RectangleGrading,
-    /// How the mesh is split among ranks.
+    /// How the mesh is distributed over the ranks.
     #[serde(default)]
     pub partition: Partition,
 }
 
-/// How a generated mesh is split among ranks.
+/// How a generated mesh is distributed over the ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Partition {
-    /// Up to 200,000 cells as metis, above as grid.
+    /// "metis" for at most 200,000 cells, "grid" for more.
     #[default]
     Auto,
-    /// Rank 0 makes the whole mesh, METIS splits its cells, and rank 0 hands the parts out.
+    /// Rank 0 generates the whole mesh, METIS partitions its cells, and rank 0 sends each rank its part.
     Metis,
-    /// Each rank makes the cells of a box of its own; no rank ever holds the whole mesh.
+    /// Each rank generates the cells of its own box; no rank holds the whole mesh. Use it for large meshes.
     Grid,
 }
 
-/// How a rectangle is cut into triangles.
+/// The diagonals that divide a rectangle into triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Diagonal {
@@ -64,23 +64,26 @@ pub enum Diagonal {
     Right,
     /// From lower right to upper left.
     Left,
-    /// Right and left in turn, like a chessboard.
+    /// Right and left in alternation, like the colours of a chessboard.
     Alternating,
-    /// Both, with a node where they cross.
+    /// Both diagonals, with a node at their intersection. Such meshes hardly lock for nearly incompressible bodies.
     Crossed,
 }
 
-/// Spread of a rectangle's cells.
+/// Grading of a rectangle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RectangleGrading {
-    /// Power along x: 1 is uniform; below 1, cells crowd toward the high end.
+    /// Exponent along x. 1: uniform cells. Above 1: smaller cells near the sides in `toward`. Below 1, only without `toward`:
+    /// smaller cells near the right side.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub x: f64,
-    /// Power along y: 1 is uniform; below 1, cells crowd toward the high end.
+    /// Exponent along y. 1: uniform cells. Above 1: smaller cells near the sides in `toward`. Below 1, only without `toward`:
+    /// smaller cells near the side with the largest y.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub y: f64,
-    /// Sides that cells crowd toward, out of left, right, bottom and top, two opposite ones alike; absent: left and bottom.
+    /// Sides near which cells are smaller: any of left, right, bottom and top. If two opposite sides are listed, both have cells of
+    /// the same size. Absent: left and bottom.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(example = ["left", "bottom", "top"])]
     pub toward: Vec<String>,
@@ -92,41 +95,44 @@ impl Default for RectangleGrading {
     }
 }
 
-/// A box with its low corner at the origin, cut into 6 Kuhn tetrahedra a cell.
+/// A box whose corner with the smallest coordinates is the origin, divided into tetrahedra.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
     /// Lengths along x, y and z.
     #[schemars(transform = positive_items, extend("unit" = "m"), example = [1.0, 1.0, 1.0])]
     pub size: [f64; 3],
-    /// Number of boxes along x, y and z; each is cut into 6 tetrahedra.
+    /// Number of small boxes along x, y and z. Each is divided into 6 Kuhn tetrahedra.
     #[schemars(inner(range(min = 1)), example = [8, 8, 8])]
     pub cells: [u32; 3],
-    /// How unevenly the cells are spread. With a power p above 1 the i-th of n grid planes lies at the share (i/n)^p of the way
-    /// from the side that cells crowd toward, or, toward both sides, at half of (2i/n)^p from the nearer one. Neighbours differ
-    /// in length at most by a factor of 2^p - 1; the longest cell is at most p times as long as without grading.
+    /// Grading: smaller cells near chosen sides. Along an axis of length L with n cells and the exponent p > 1, grid plane i has
+    /// the distance L (i/n)^p from the chosen side or, if both sides are chosen, L/2 (2i/n)^p from the nearer one. The lengths of
+    /// neighbouring cells differ at most by a factor of 2^p - 1. The longest cell is at most p times as long as without grading.
     #[serde(default)]
     pub grading: CuboidGrading,
-    /// How the mesh is split among ranks.
+    /// How the mesh is distributed over the ranks.
     #[serde(default)]
     pub partition: Partition,
 }
 
-/// Spread of a box's cells.
+/// Grading of a box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CuboidGrading {
-    /// Power along x: 1 is uniform; below 1, cells crowd toward the high end.
+    /// Exponent along x. 1: uniform cells. Above 1: smaller cells near the sides in `toward`. Below 1, only without `toward`:
+    /// smaller cells near the right side.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub x: f64,
-    /// Power along y: 1 is uniform; below 1, cells crowd toward the high end.
+    /// Exponent along y. 1: uniform cells. Above 1: smaller cells near the sides in `toward`. Below 1, only without `toward`:
+    /// smaller cells near the side with the largest y.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub y: f64,
-    /// Power along z: 1 is uniform; below 1, cells crowd toward the high end.
+    /// Exponent along z. 1: uniform cells. Above 1: smaller cells near the sides in `toward`. Below 1, only without `toward`:
+    /// smaller cells near the top.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub z: f64,
-    /// Sides that cells crowd toward, out of left, right, front, back, bottom and top, two opposite ones alike; absent: left,
-    /// front and bottom.
+    /// Sides near which cells are smaller: any of left, right, front, back, bottom and top. If two opposite sides are listed, both
+    /// have cells of the same size. Absent: left, front and bottom.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(example = ["left", "bottom", "top"])]
     pub toward: Vec<String>,
@@ -138,7 +144,7 @@ impl Default for CuboidGrading {
     }
 }
 
-/// Every item must be above zero.
+/// Requires every item to be above zero.
 fn positive_items(schema: &mut Schema) {
     if let Some(items) = schema.get_mut("items").and_then(|items| items.as_object_mut()) {
         items.insert("exclusiveMinimum".into(), 0.into());

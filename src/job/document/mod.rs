@@ -1,5 +1,5 @@
-//! The job as plain structs: the single source of every key's name, meaning, unit, range and default. Those of material laws stand
-//! with the laws.
+//! The job as plain structs: the single source of the name, meaning, unit, range and default of each key. The keys of material and
+//! contact laws are defined with the laws.
 //!
 //! Doc comments become the text of `solver describe`; the `schemars` attributes become the ranges that
 //! `validate` checks before these structs are filled.
@@ -26,83 +26,82 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A job: the body, what acts on it, how long, and what to keep. A table that is absent is an effect that
-/// does not exist in the run.
+/// A job: the body, its loads and contacts, the simulated time and the output. An effect whose table is absent is not simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
-    /// What the job is about; changes nothing in the run.
+    /// Title, source and authors of the job. They do not affect the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<About>,
-    /// The body's mesh.
+    /// The mesh of the body.
     pub mesh: Mesh,
-    /// The material of every cell that no region names.
+    /// The material of all cells that belong to no [[region]].
     pub material: Material,
-    /// Parts of the body, named by the mesh's physical groups, that are of another material.
+    /// Parts of the body with another material, named by the physical groups of the mesh.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub region: Vec<Region>,
-    /// Boundaries whose displacement is held at its initial value.
+    /// Boundaries on which components of the displacement keep their initial values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub support: Vec<Support>,
-    /// Forces per area on boundaries.
+    /// Tractions, which are forces per area, on boundaries. Tractions on the same boundary are added.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub traction: Vec<Traction>,
-    /// Forces per volume in the whole body; several add up.
+    /// Forces per volume on the whole body. Several body forces are added.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub body_force: Vec<BodyForce>,
-    /// Boundaries that touch an obstacle.
+    /// Boundaries that may touch an obstacle, and their contact laws.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact: Vec<Contact>,
-    /// The state at time 0; absent: at rest in the mesh's own shape.
+    /// The state at time 0. Absent: zero displacement and velocity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial: Option<Initial>,
-    /// How long and in which steps.
+    /// The end of the run, the steps and the time scheme.
     pub time: Time,
-    /// How the equations of a step are solved.
+    /// How the equations of a step are solved. Every key is optional.
     #[serde(default)]
     pub solver: Solver,
-    /// What is written, and where.
+    /// The output folder and its contents.
     #[serde(default)]
     pub output: Output,
-    /// When the complete state is saved; absent: only when the run is stopped or fails.
+    /// When the complete state is saved for a restart. Absent: only when the run is stopped or fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<Checkpoint>,
-    /// Numbers this job is known to give, by the quoted name of the quantity, such as "final_von_mises" or
-    /// "probe.tip.velocity_y"; every example job is a regression test.
+    /// Expected results, by the quoted name of the quantity, such as "final_von_mises" or "probe.tip.velocity_y". The tests of the
+    /// solver compare the example jobs with them; a run ignores them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("key_help" = "quote the whole name: \"probe.tip.velocity_y\" = { value = .., relative = .. }"))]
     pub check: BTreeMap<String, Expected>,
 }
 
-/// What the job is about; changes nothing in the run.
+/// Title, source and authors of the job. They do not affect the run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct About {
-    /// One line that says what happens.
+    /// One line that states what the job simulates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = "Dynamic viscoplastic contact with normal damped response")]
     pub title: Option<String>,
-    /// Where the problem comes from.
+    /// The source of the problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = "Wang and Cheng (2022), section 5")]
     pub reference: Option<String>,
-    /// Who wrote the job.
+    /// The authors of the job.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub authors: Vec<String>,
 }
 
-/// A number the job is known to give, and how far off the run may be.
+/// An expected result and its tolerance; at least one of `relative` and `absolute` is required.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
-    /// The expected number, in the quantity's own unit.
+    /// The expected value, in the unit of the quantity.
     #[schemars(example = 0.00602756)]
     pub value: f64,
-    /// Largest accepted |difference| / |value|.
+    /// Largest accepted |result - value| / |value|.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0), example = 1e-6)]
     pub relative: Option<f64>,
-    /// Largest accepted |difference|, in the quantity's own unit.
+    /// Largest accepted |result - value|, in the unit of the quantity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0), example = 1e-9)]
     pub absolute: Option<f64>,

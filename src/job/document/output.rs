@@ -5,86 +5,88 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is written, and where.
+/// The output folder and its contents.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Where the run leaves its files, relative to the job file; absent: out/ and the job file's name.
+    /// The folder for all files of the run, relative to the job file. Absent: out/NAME for the job file NAME.toml.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("format" = "path"), example = "out/wang_cheng_2022")]
     pub folder: Option<PathBuf>,
-    /// When displacement, velocity and stress fields are written; absent: the last state only.
+    /// When the fields (displacement, velocity, stress and others) are written to fields.vtkhdf. Absent: only at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = serde_json::json!({ "every": 8 }), example = serde_json::json!({ "interval": 0.1 }))]
     pub fields: Option<Every>,
-    /// Whether the field error_indicator is written with the fields: for each cell an estimate of the error that the mesh makes
-    /// in its stress, in the norm of the elastic energy, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu,
-    /// 1987). summary.json gets its total and the share of that in the norm of the stress. Every material needs elasticity.
+    /// Whether the field error_indicator is written with the other fields: for each cell an estimate of the discretisation error of
+    /// its stress in the elastic energy norm, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu, 1987). summary.json
+    /// then contains the norm over the body and its ratio to the norm of the stress. Every material must have elasticity.
     pub error_indicator: bool,
-    /// How hard the numbers of fields.vtkhdf are compressed without loss, by HDF5's shuffle and deflate filters; 0: not at all.
+    /// Level of the lossless compression of fields.vtkhdf by HDF5's shuffle and deflate filters. 0: no compression. Higher levels
+    /// take longer to write.
     #[schemars(range(max = 9), example = 1)]
     pub compression: u8,
-    /// Points that are followed in every step.
+    /// Points whose displacement and velocity are written to probes.csv in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub probe: Vec<Probe>,
-    /// Boundaries whose values are written at every field output.
+    /// Boundaries whose displacements, velocities and pressures are written to profiles.csv whenever fields are written.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<Profile>,
 }
 
-/// How often.
+/// The interval between two outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Every {
-    /// After this many steps.
+    /// Number of steps between two outputs.
     Every(#[schemars(range(min = 1), extend("unit" = "steps"), example = 8)] u64),
-    /// After this much simulated time.
+    /// Simulated time between two outputs.
     Interval(#[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.1)] f64),
 }
 
-/// A point of the body that is followed in every step.
+/// A point of the body whose displacement and velocity are written to probes.csv in every step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// Its name in probes.csv: letters, digits, _ and -.
+    /// The name of the probe in probes.csv, made of the letters a-z and A-Z, digits, _ and -.
     #[schemars(extend("format" = "name"), example = &"tip")]
     pub name: String,
-    /// Where it is at time 0, one coordinate an axis.
+    /// The position in the undeformed body, one coordinate per axis.
     #[schemars(extend("unit" = "m"), example = [1.0, 0.0])]
     pub point: Vec<f64>,
 }
 
-/// A boundary whose values are written at every field output.
+/// A boundary whose displacements, velocities and pressures are written to profiles.csv whenever fields are written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
-    /// Name of the boundary.
+    /// The name of the boundary.
     #[schemars(length(min = 1), example = &"bottom")]
     pub on: String,
 }
 
-/// When the complete state is saved.
+/// When the complete state is saved for a restart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// After this many steps; not together with interval.
+    /// Number of steps between two checkpoints. Not together with `interval`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1), extend("unit" = "steps"), example = 64)]
     pub every: Option<u64>,
-    /// After this much wall time; not together with every.
+    /// Wall time between two checkpoints. Not together with `every`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1800.0)]
     pub interval: Option<f64>,
-    /// How many of the newest are kept.
+    /// Number of checkpoints that are kept; older ones are deleted.
     #[serde(default = "keep")]
     #[schemars(range(min = 1))]
     pub keep: u32,
-    /// Wall time after which the run saves its state and stops with exit code 3; absent: none.
+    /// Wall time after which the run saves a checkpoint and stops with exit code 3. Absent: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 84000.0)]
     pub wall_limit: Option<f64>,
-    /// Wall time that is kept free before the end of a Slurm job, besides the longest step and checkpoint so far: then the run
-    /// saves its state and stops with exit code 3; absent: 30 s, at most a tenth of the time left at the start.
+    /// Reserve of wall time before the end of a Slurm job, in addition to the longest step and checkpoint so far. When the
+    /// remaining time is shorter, the run saves a checkpoint and stops with exit code 3. Absent: 30 s, but at most a tenth of the
+    /// time that remains at the start of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 120.0)]
     pub margin: Option<f64>,

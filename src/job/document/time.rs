@@ -5,35 +5,35 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How long and in which steps.
+/// The end of the run, the steps and the time scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// The time to reach; the run starts at 0.
+    /// The time at which the run ends. It starts at time 0.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
     pub end: f64,
-    /// Length of a step; with [time.adaptive] of the first one tried.
+    /// Length of a step. With [time.adaptive]: length of the first step that is tried.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.015625)]
     pub step: f64,
-    /// How a step is taken.
+    /// The time scheme.
     #[serde(default)]
     pub scheme: Scheme,
-    /// Times at which a step has to end, rising, within the run. A step that would go beyond is cut; fixed steps go on from there in
-    /// their full length.
+    /// Times at which a step must end, in ascending order, above 0 and not after `end`. Use it for sudden changes of loads or gaps.
+    /// A step that would pass such a time is shortened to end there; the next fixed step has its full length again.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "s"), example = [0.25, 0.6])]
     pub land_on: Vec<f64>,
-    /// Steps chosen by their error; absent: fixed steps.
+    /// Adaptive steps, whose lengths are controlled by their estimated error. Absent: fixed steps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Adaptive>,
 }
 
-/// Makes [`Scheme`] of a list: the meaning of each scheme, its name in job files and its properties.
+/// Defines [`Scheme`] by a list: the meaning of each scheme, its name in job files and its properties.
 macro_rules! schemes {
     ($($(#[$about:meta])* $scheme:ident = $name:literal {
         order: $order:literal, is_implicit: $is_implicit:literal, is_two_step: $is_two_step:literal
     })*) => {
-        /// How a step is taken.
+        /// The time scheme.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
         pub enum Scheme {
             $($(#[$about])* #[serde(rename = $name)] $scheme,)*
@@ -64,29 +64,33 @@ macro_rules! schemes {
 }
 
 schemes! {
-    /// Wang and Cheng's (24)-(25): elastic and viscoplastic stress, damage, adhesion and contact memory lag by a step; stable for small
-    /// steps only.
+    /// First order in time: the scheme (24)-(25) of Wang and Cheng (2022). Elastic and viscoplastic stress, damage, adhesion and
+    /// contact memory are taken from the previous step. Stable only for steps below explicit_step_bound, which `solver check`
+    /// prints.
     #[default]
     LaggedEuler = "lagged_euler" { order: 1, is_implicit: false, is_two_step: false }
-    /// Every stress at the end of the step: no bound on the step.
+    /// First order in time: all stresses are taken at the end of the step. No stability bound on the step. Use it for large steps
+    /// and impacts.
     ImplicitEuler = "implicit_euler" { order: 1, is_implicit: true, is_two_step: false }
-    /// Second order in time. What does not yield does not flow, as under implicit_euler.
+    /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. No stability
+    /// bound on the step. Use it for smooth motions; where velocities jump (impacts, sudden loads), it may overshoot.
     Bdf2 = "bdf2" { order: 2, is_implicit: true, is_two_step: true }
 }
 
-/// Steps chosen by their error.
+/// Adaptive steps, whose lengths are controlled by their estimated error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// Accepted error of a step in velocities, stresses and histories, relative to the largest velocity and stress so far; and of loads
-    /// and obstacles within a step in a straight line, relative to the largest of the run.
+    /// Accepted error of a step in velocities, stresses and histories, relative to the largest velocity and stress so far. The same
+    /// number limits how far loads and obstacle motions may deviate from linear functions of time within a step, relative to their
+    /// largest values in the run.
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
-    /// No step is shorter: what jumps is then taken with its error, and the run fails when such a step can't be solved.
+    /// Shortest step. A step of this length is accepted whatever its error; if it cannot be solved, the run fails.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1e-5)]
     pub smallest_step: f64,
-    /// No step is longer. Steps are the first one times powers of two.
+    /// Longest step. The steps are `step` times powers of two, except those shortened to end at a given time.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub largest_step: f64,
 }
@@ -95,36 +99,37 @@ fn adaptive_tolerance() -> f64 {
     1e-3
 }
 
-/// How the equations of a step are solved; every key is optional.
+/// How the equations of a step are solved. Every key is optional.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Residual at which a step counts as solved, relative to the forces that act.
+    /// Norm of the residual at which Newton's method has converged, relative to the norm of the forces.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
-    /// Largest distance of velocity and pressure to a contact graph, each scaled by the graph's own range, at which a
-    /// step counts as solved whatever its residual is.
+    /// Largest accepted distance of normal velocity and contact pressure to the graph of the contact law, each divided by its range
+    /// on the graph. A step with a larger distance fails, even if its residual has converged.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub inclusion_tolerance: f64,
-    /// What solves a step with contact.
+    /// The solution method for steps with contact.
     pub method: Method,
-    /// How linear systems are preconditioned.
+    /// The preconditioner of the linear systems.
     pub preconditioner: Preconditioner,
-    /// The precision of the factors that steps with contact are solved with, where a matrix is factored whole.
+    /// The precision of the matrix factor for steps with contact, where each rank factors the whole matrix: on one rank, or with
+    /// preconditioner cholesky and at most 50,000 unknowns.
     pub factor_precision: FactorPrecision,
-    /// Newton iterations after which a step counts as failed.
+    /// Number of Newton iterations after which a step fails.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
-    /// How friction bounds that follow the contact pressure find it.
+    /// How the dependence of friction bounds on the contact pressure is solved (laws coulomb and slip_weakening).
     pub friction: FrictionIteration,
-    /// Warnings that should not stop the run.
+    /// Limits of the certificates that the job may exceed. Without an entry here, such a job is refused.
     pub accept: Vec<Accept>,
-    /// From how many other velocities of the contact boundary each step is solved again, to look for other solutions:
-    /// where theta_step is not below 1 (accepted as "uniqueness") there may be some. Log and summary say how many different
-    /// solutions were found; the run goes on with the usual one. 0: none.
+    /// Number of additional start velocities of the contact boundary from which each step is solved, to search for other solutions.
+    /// There may be several if theta_step is not below 1 (accepted as "uniqueness"). The log and summary.json give the number of
+    /// different solutions. The run continues with the solution from the usual start velocity. 0: no search.
     #[schemars(range(max = 1000))]
     pub guesses: u32,
-    /// Any PETSc option, as PETSc spells it, without the leading dash; "" for flags.
+    /// PETSc options, with the names that PETSc uses but without the leading dash. Options without a value have the value "".
     #[schemars(example = serde_json::json!({ "snes_monitor": "" }))]
     pub petsc: BTreeMap<String, String>,
 }
@@ -146,64 +151,67 @@ impl Default for Solver {
     }
 }
 
-/// What solves a step with contact.
+/// The solution method for steps with contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Newton's method on the contact graphs.
+    /// Newton's method on the graphs of the contact laws.
     #[default]
     Newton,
-    /// PETSc's solver for variational inequalities, as an independent check: for jobs whose every contact is `unilateral`,
-    /// on boundaries square to the axes. Its PETSc options begin with bounds_.
+    /// PETSc's solver for variational inequalities, for an independent check of jobs in which every contact is frictionless and
+    /// `unilateral`, on boundaries perpendicular to coordinate axes. Its PETSc options have the prefix bounds_.
     Vinewtonrsls,
 }
 
-/// How linear systems are preconditioned.
+/// The preconditioner of the linear systems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioner {
-    /// Chosen by the size of the problem and the number of ranks.
+    /// "cholesky" or "gamg", whichever is estimated to be faster for the problem size, the number of steps and the number of ranks.
+    /// The log gives the reason.
     #[default]
     Auto,
-    /// A sparse factorisation.
+    /// Sparse Cholesky factorisation. Fast if the factor fits in memory and serves many steps.
     Cholesky,
-    /// PETSc's algebraic multigrid.
+    /// PETSc's algebraic multigrid (GAMG), for large problems.
     Gamg,
-    /// Hypre's algebraic multigrid.
+    /// Hypre's algebraic multigrid (BoomerAMG), for large problems. Requires a PETSc with Hypre.
     Boomeramg,
 }
 
-/// The precision of the factors of a matrix, where it is factored whole for steps with contact.
+/// The precision of the matrix factor for steps with contact, where each rank factors the whole matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FactorPrecision {
-    /// Single for large factors, where that is enough.
+    /// Single precision for large 3D problems in which it is faster, double precision otherwise.
     #[default]
     Auto,
-    /// Half the memory and half the time of a solve; solutions are corrected until the residual in double precision is small,
-    /// and where that leads nowhere the factor is made anew in double precision.
+    /// Single precision, which needs half the memory and half the time of a solve. Solutions are refined until the residual in
+    /// double precision is small. If the refinement fails, the matrix is factored again in double precision.
     Single,
-    /// As all other numbers.
+    /// Double precision, as all other numbers.
     Double,
 }
 
-/// How friction bounds that follow the contact pressure find it.
+/// How the dependence of friction bounds on the contact pressure is solved (laws coulomb and slip_weakening).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FrictionIteration {
-    /// Within Newton's method, whose linear systems are then not symmetric; the fixed point is the way out where it fails.
+    /// Newton's method includes the dependence; its linear systems are then nonsymmetric. Where it fails, the step is solved by
+    /// "fixed_point".
     #[default]
     Newton,
-    /// Around Newton's method, which sees given bounds, until they no longer change.
+    /// Newton's method solves the step with given bounds, repeatedly, until the bounds no longer change. Takes about twice the
+    /// iterations of "newton".
     FixedPoint,
 }
 
-/// A refusal that the user takes upon himself.
+/// A limit of the certificates that the job may exceed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Accept {
-    /// Run although theta_step is not below 1 by a margin of 0.001: a step may have several solutions.
+    /// Run although theta_step is not below 1 by a margin of 0.001, so that a step may have several solutions.
     Uniqueness,
-    /// Run although the step is beyond the scheme's bound k_max.
+    /// Run although the step exceeds explicit_step_bound, so that errors may grow.
     ExplicitStability,
 }

@@ -16,15 +16,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compliance {
-    /// Pressure at unit penetration.
+    /// Contact pressure at a penetration of 1 m.
     #[schemars(extend("unit" = "Pa/m^exponent", "exclusiveMinimum" = 0), example = 1e4)]
     pub stiffness: f64,
-    /// Power of the penetration; 1 is a bed of springs.
+    /// Exponent of the penetration. 1: linear springs.
     #[serde(default = "one")]
     #[schemars(range(min = 1, max = 10), example = 1.5)]
     pub exponent: f64,
-    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
-    /// or what [contact.obstacle] says.
+    /// Gap: distance from the undeformed boundary to the obstacle along the outward normal, as a number or an expression in the
+    /// time t and the undeformed coordinates x, y, z. Infinite: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
+    /// there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Option<Scalar>,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Coulomb {
-    /// Largest friction traction per contact pressure.
+    /// Friction coefficient: the largest friction traction divided by the contact pressure.
     #[schemars(range(min = 0), example = 0.3)]
     pub coefficient: f64,
 }

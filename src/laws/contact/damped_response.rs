@@ -16,13 +16,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DampedResponse {
-    /// Normal velocities r_1 < r_2 < ... above zero where the slope changes.
+    /// Normal velocities r_1 < r_2 < ..., above zero, at which the slope changes.
     #[schemars(extend("unit" = "m/s"), example = [0.003, 0.005])]
     pub breakpoints: Vec<f64>,
-    /// Slopes before, between and after the breakpoints: one more than breakpoints; negative ones fall.
+    /// Slopes of the pressure below, between and above the breakpoints: one more than there are breakpoints. A negative slope is a
+    /// pressure that decreases with the velocity.
     #[schemars(length(min = 1), extend("unit" = "Pa s/m"), example = [10.0, -10.0, 10.0])]
     pub slopes: Vec<f64>,
-    /// How the function goes on for negative velocities.
+    /// The pressure p at negative normal velocities r.
     #[serde(default)]
     pub symmetry: Symmetry,
 }
@@ -31,12 +32,12 @@ pub struct DampedResponse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
-    /// p(-r) = p(r): the potential of (72) as printed.
+    /// p(-r) = p(r), as in equation (72) of Wang and Cheng (2022).
     #[default]
     Even,
-    /// p(-r) = -p(r): resists both ways.
+    /// p(-r) = -p(r): the foundation resists motion in both directions.
     Odd,
-    /// p(r) = 0 below zero: only approach is resisted.
+    /// p(r) = 0 for r < 0: the foundation resists approach only.
     OneSided,
 }
 

@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExponentialDamper {
-    /// Pressure that fast motion comes close to.
+    /// Limit of the pressure at high normal velocities.
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 10.0)]
     pub limit: f64,
-    /// Normal velocity at which the pressure lacks 1/e of the limit; `limit / velocity` is the slope at rest.
+    /// Normal velocity at which the pressure is (1 - 1/e) times the limit. The slope at rest is `limit / velocity`.
     #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 0.02)]
     pub velocity: f64,
 }

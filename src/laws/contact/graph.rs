@@ -9,14 +9,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Graph {
-    /// Corners [normal velocity, pressure], velocities ascending; two with the same velocity are an upward jump.
+    /// Corners [normal velocity, pressure] of the polyline, with ascending velocities. Two corners with the same velocity define an
+    /// upward jump.
     #[schemars(length(min = 1), extend("unit" = "[m/s, Pa]"), example = [[0.0, 0.0], [0.003, 0.03]])]
     pub points: Vec<[f64; 2]>,
-    /// Slope below the first point.
+    /// Slope of the pressure at velocities below the first corner.
     #[serde(default)]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub slope_before: f64,
-    /// Slope above the last point.
+    /// Slope of the pressure at velocities above the last corner.
     #[serde(default)]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub slope_after: f64,

@@ -20,24 +20,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 normal_laws! {
-    /// A piecewise linear function of the normal velocity that may fall, equation (72).
+    /// Pressure as a continuous piecewise linear function of the normal velocity that starts at zero and may decrease, equation
+    /// (72) of Wang and Cheng (2022).
     DampedResponse = "damped_response",
-    /// A damper whose pressure rises with the normal velocity toward a limit.
+    /// A damper whose pressure increases with the normal velocity toward a limit.
     ExponentialDamper = "exponential_damper",
-    /// Any polyline of pressure over normal velocity, with upward jumps.
+    /// Pressure as a piecewise linear function of the normal velocity, given by its corners, which may decrease and have upward
+    /// jumps.
     Graph = "graph",
-    /// A spring that is felt beyond the gap.
+    /// An elastic foundation: the pressure is stiffness times the penetration beyond the gap to the power of the exponent.
     Compliance = "compliance",
-    /// A rigid obstacle: the normal displacement never exceeds the gap.
+    /// A rigid obstacle: the normal displacement never exceeds the gap, or the normal velocity never exceeds zero.
     Unilateral = "unilateral",
 }
 
 friction_laws! {
-    /// A given bound on the friction traction.
+    /// Tresca's law: a given bound on the friction traction, which acts even without contact pressure.
     Tresca = "tresca",
-    /// A bound proportional to the contact pressure.
+    /// Coulomb's law: a bound proportional to the contact pressure.
     Coulomb = "coulomb",
-    /// A coefficient that falls with the sliding velocity.
+    /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity).
     SlipWeakening = "slip_weakening",
 }
 

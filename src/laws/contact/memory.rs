@@ -21,19 +21,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// How fast the pressure grows at first, per normal displacement. Held for long, a displacement is opposed like by a spring
-    /// of `stiffness_rate decay_time`. The pressure follows late, so that a body on it swings more and more, whatever the step,
-    /// unless the normal law or the body damp that.
+    /// Initial rate of the memory pressure per normal displacement. Against a displacement held for a long time, the foundation
+    /// acts as a spring of stiffness `stiffness_rate decay_time`. Because the pressure lags behind the displacement, it adds energy
+    /// to oscillations, with any step; use it with a damping normal law or a damped body.
     #[schemars(range(min = 0), extend("unit" = "Pa/(m s)"), example = 1e4)]
     pub stiffness_rate: f64,
-    /// Time in which the foundation forgets all but a part of 1/e.
+    /// Time in which the memory pressure decays to 1/e without further penetration.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 2.0)]
     pub decay_time: f64,
 }
 
 impl Memory {
-    /// What can't stand beside memory, which is of how far a foundation that touches at first was pressed in; friction sees the
-    /// normal law alone. Keys are those of the contact's table.
+    /// The faults of tables that memory cannot be combined with. Memory depends on the indentation of a foundation that touches the
+    /// body from the start; friction uses the pressure of the normal law only. Keys are those of the table of the contact.
     pub fn faults(beside: &Interface) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut refuse = |key: String, message: &str, other: &str| {

@@ -1,4 +1,4 @@
-//! How far a point of the contact boundary is from its obstacle.
+//! The distance of a point of the contact boundary from its obstacle.
 //!
 //! Deformations are small: the gap is measured from the place `x` where the point was at first along its outward normal
 //! `n` there, and compared with the normal displacement. The obstacle itself may move any distance. With `d = x - centre`
@@ -31,10 +31,10 @@ const PARALLEL: f64 = 1e-6;
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Obstacle")]
 pub enum Gap {
-    /// No obstacle: the distance itself in m, at a time, of the point that was at a place at first.
+    /// The gap in m itself, as a function of time and undeformed coordinates.
     #[serde(skip)]
     Distance(Scalar),
-    /// All that lies beyond a plane, in 2D a line.
+    /// A half-space bounded by a plane; in 2D a half-plane bounded by a line.
     Plane(Plane),
     /// A sphere, in 2D a disc.
     Sphere(Sphere),
@@ -44,14 +44,15 @@ pub enum Gap {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plane {
-    /// A point of the plane, one component an axis: numbers, or expressions in t. Motion along the plane is that of a belt.
+    /// A point of the plane, one component per axis: numbers, or expressions in t. Motion of this point along the plane is a
+    /// tangential motion of the obstacle's surface, such as that of a belt.
     #[schemars(extend("unit" = "m"), example = serde_json::json!([0.0, "-0.01 + 0.1*t"]))]
     pub point: Vec<Scalar>,
-    /// The plane's normal, out of the obstacle toward the body, of any length: numbers, or expressions in t.
+    /// The normal of the plane, which points out of the obstacle toward the body, of any length: numbers, or expressions in t.
     #[schemars(example = [0.0, 1.0])]
     pub normal: Vec<Scalar>,
-    /// Angular velocity at which the plane turns in itself about its normal through `point`, counterclockwise seen from the
-    /// body, in 3D: a number, or an expression in t. Only friction feels it. Absent: 0.
+    /// Angular velocity, in 3D, of the rotation of the plane about its normal through `point`, counterclockwise as seen from the
+    /// body: a number, or an expression in t. It affects friction only. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "rad/s"), example = 10.0)]
     pub rotation: Option<Scalar>,
@@ -61,21 +62,21 @@ pub struct Plane {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sphere {
-    /// Its centre, one component an axis: numbers, or expressions in t.
+    /// The centre, one component per axis: numbers, or expressions in t.
     #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, "-1.01 + 0.1*t"]))]
     pub centre: Vec<Scalar>,
-    /// Its radius.
+    /// The radius.
     #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1.0)]
     pub radius: f64,
-    /// Whether the obstacle is all outside of the sphere, with the body inside.
+    /// Whether the obstacle is the space outside the sphere, with the body inside the sphere.
     #[serde(default)]
     pub hollow: bool,
-    /// Angular velocity at which the sphere turns about its centre, counterclockwise, in 3D seen from where `axis` points: a
-    /// number, or an expression in t. Only friction feels it. Absent: 0.
+    /// Angular velocity of the rotation about the centre, counterclockwise; in 3D about `axis`, as seen against its direction: a
+    /// number, or an expression in t. It affects friction only. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,
-    /// What the sphere turns about in 3D, a vector of any length; absent in 2D.
+    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` in 3D, not allowed in 2D.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = [0.0, 1.0, 0.0])]
     pub axis: Option<Vec<f64>>,

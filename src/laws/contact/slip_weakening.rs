@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SlipWeakening {
-    /// Coefficient at rest; not below the dynamic one.
+    /// Friction coefficient at rest. At least `dynamic`.
     #[serde(rename = "static")]
     #[schemars(range(min = 0), example = 0.5)]
     pub at_rest: f64,
-    /// Coefficient when sliding fast.
+    /// Limit of the friction coefficient at high sliding velocities.
     #[schemars(range(min = 0), example = 0.3)]
     pub dynamic: f64,
-    /// Sliding velocity over which the coefficient falls.
+    /// Sliding velocity at which the coefficient has decreased from `static` to `dynamic` except for 1/e of the difference.
     #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 0.01)]
     pub decay_velocity: f64,
 }

@@ -5,14 +5,15 @@ use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where on a facet the contact laws hold.
+/// The points of a facet at which the contact laws are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quadrature {
-    /// At its nodes (trapezoidal rule): each node has its own law.
+    /// The nodes of the facet (trapezoidal rule). Required with friction, adhesion, memory, compliance, rigid obstacles and graphs
+    /// with jumps.
     #[default]
     Nodal,
-    /// At Gauss points.
+    /// Gauss points inside the facet.
     Gauss,
 }
 
@@ -21,7 +22,7 @@ pub enum Quadrature {
 pub struct ContactTable {
     /// Normal law, friction law and obstacle.
     pub interface: Interface,
-    /// Where on a facet the laws hold.
+    /// The points of a facet at which the contact laws are evaluated.
     pub quadrature: Quadrature,
     /// Bonds to the obstacle.
     pub adhesion: Option<Adhesion>,

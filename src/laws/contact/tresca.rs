@@ -1,4 +1,4 @@
-//! Tresca friction: a bound on the friction traction that is given.
+//! Tresca friction: a given bound on the friction traction.
 
 use super::friction_law::FrictionBound;
 use schemars::JsonSchema;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tresca {
-    /// Largest friction traction.
+    /// The largest friction traction.
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 2.0)]
     pub bound: f64,
 }

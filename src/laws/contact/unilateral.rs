@@ -16,11 +16,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Unilateral {
-    /// What is bounded.
+    /// The quantity that the obstacle bounds.
     #[serde(default)]
     pub bound: Bound,
-    /// Distance to the obstacle along the normal, at time t at the point x, y, z; infinite: nothing to touch. Absent: 0,
-    /// or what [contact.obstacle] says.
+    /// Gap: distance from the undeformed boundary to the obstacle along the outward normal, as a number or an expression in the
+    /// time t and the undeformed coordinates x, y, z. Infinite: no obstacle. Absent: 0, or the distance to [contact.obstacle] if
+    /// there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "0.01 - 0.1*t")]
     pub gap: Option<Scalar>,
@@ -33,7 +34,7 @@ pub enum Bound {
     /// The normal displacement never exceeds the gap.
     #[default]
     Displacement,
-    /// The normal velocity never exceeds zero: the body only ever moves away.
+    /// The normal velocity never exceeds zero: the boundary can only move away from the obstacle.
     Velocity,
 }
 

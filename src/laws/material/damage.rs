@@ -22,17 +22,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Damage {
-    /// Elastic energy per volume Y above which damage grows; stress squared over twice Young's modulus in tension.
+    /// Elastic energy per volume Y above which damage grows. In uniaxial tension, Y is the square of the stress divided by twice
+    /// Young's modulus.
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 50.0)]
     pub threshold: f64,
-    /// What slows damage: Y at twice the threshold takes about viscosity/threshold to break a cell.
+    /// Viscosity of damage: the larger, the slower damage grows. With Y at twice the threshold a cell breaks in a time of about
+    /// viscosity / threshold.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 10.0)]
     pub viscosity: f64,
-    /// Power of what is left, 1 - d; 0 is Frémond and Nedjar's law.
+    /// Exponent of 1 - d in the growth rate. 0: the law of Frémond and Nedjar (1996).
     #[serde(default)]
     #[schemars(range(min = 0, max = 10), example = 1.0)]
     pub exponent: f64,
-    /// Damage that no cell exceeds; what then is left keeps broken cells from moving freely.
+    /// Upper bound of the damage. The remaining stiffness keeps broken cells from moving freely.
     #[serde(default = "nearly_all")]
     #[schemars(range(min = 0), extend("exclusiveMaximum" = 1), example = 0.99)]
     pub largest: f64,

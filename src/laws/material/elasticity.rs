@@ -4,15 +4,15 @@ use super::isotropic::Isotropic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a 2D body stands for.
+/// The hypothesis of a plane problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Hypothesis {
-    /// A thin plate, free of stress across its thickness.
+    /// A thin plate without stress in the direction of its thickness.
     PlaneStress,
-    /// A slice of a long body that can't strain along its length.
+    /// A section of a long body that cannot strain in the direction of its length.
     PlaneStrain,
-    /// Three dimensions: a 3D body has no hypothesis in its job.
+    /// Three dimensions. Job files of 3D bodies contain no hypothesis.
     #[serde(skip)]
     Space,
 }

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Viscosity {
-    /// Factor of the strain rate's trace; may be negative as long as d volumetric + shear stays positive.
+    /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d.
     #[schemars(extend("unit" = "Pa s"), example = 25.0)]
     pub volumetric: f64,
-    /// Factor of the strain rate itself.
+    /// Factor of the strain rate.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
     pub shear: f64,
 }

@@ -1,4 +1,4 @@
-//! The study as plain structs: the single source of every key's name, meaning, unit, range and default.
+//! The study as plain structs: the single source of the name, meaning, unit, range and default of each key.
 
 use crate::{
     io::output::{
@@ -11,187 +11,192 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{path::PathBuf, sync::LazyLock};
 
-/// A study: a job that is run on several meshes, with several steps and schemes, and held against a reference.
+/// A study: a job that is run on several meshes, with several steps and schemes, and compared with a reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
-    /// What the study is about; changes nothing.
+    /// Title, source and notes of the study. They affect no run.
     #[serde(default)]
     pub about: About,
-    /// The job that all runs are made from.
+    /// The job from which all runs are derived.
     pub base: Base,
-    /// Runs, one by one, from coarse to fine.
+    /// Single runs, from coarse to fine.
     #[serde(default)]
     pub run: Vec<Run>,
-    /// Runs in all combinations of lists; beside [[run]] they are added behind those.
+    /// Runs for all combinations of the values in lists. They follow the runs of [[run]].
     pub product: Option<Product>,
-    /// What runs are held against; absent: they are only timed.
+    /// The solution with which runs are compared. Absent: runs are timed only.
     pub reference: Option<Reference>,
-    /// At which times runs are held against the reference.
+    /// The times at which runs are compared with the reference.
     #[serde(default)]
     pub compare: Compare,
-    /// How errors are measured.
+    /// The norms in which errors are measured.
     #[serde(default)]
     pub norm: Vec<Norm>,
-    /// Values at points, held against the reference's.
+    /// Values at points that are compared with those of the reference.
     #[serde(default)]
     pub probe: Vec<ProbeError>,
-    /// How wall time is measured.
+    /// The measurement of wall time.
     #[serde(default)]
     pub timing: Timing,
-    /// Pictures beside those of work and precision.
+    /// Pictures in addition to the work-precision diagrams.
     #[serde(default)]
     pub pictures: Pictures,
-    /// Where the study leaves its files.
+    /// The output folder of the study.
     #[serde(default)]
     pub output: Output,
 }
 
-/// What the study is about; changes nothing.
+/// Title, source and notes of the study. They affect no run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct About {
-    /// One line that says what is asked.
+    /// One line that states the subject of the study.
     #[schemars(example = &"Errors of Wang and Cheng's scheme")]
     pub title: Option<String>,
-    /// Where published numbers come from.
+    /// The source of the published numbers.
     #[schemars(example = &"Wang and Cheng (2022), Table 1")]
     pub reference: Option<String>,
-    /// What the reader of the results should know; a paragraph each.
+    /// Notes for the reader of the results, one paragraph each.
     #[serde(default)]
     pub notes: Vec<String>,
 }
 
-/// The job that all runs are made from.
+/// The job from which all runs are derived.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Base {
-    /// The job file, relative to the study's. Its profiles, checkpoints and expected numbers are left out of the runs.
+    /// The job file, relative to the study file. The runs ignore its profiles, checkpoints and expected results.
     #[schemars(extend("format" = "path"), example = "../papers/wang_cheng_2022.toml")]
     pub job: PathBuf,
-    /// Keys of the job to override in all runs, as with --set.
+    /// Overrides of keys of the job for all runs, as with --set.
     #[serde(default)]
     #[schemars(example = ["time.end=0.5"])]
     pub set: Vec<String>,
 }
 
-/// A run: what is absent is as in the base job.
+/// A run. The values of absent keys are those of the base job.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
-    /// Its name, and its folder's; absent: made of what it differs by.
+    /// The name of the run and of its folder. Absent: derived from the keys in which the runs differ.
     #[schemars(extend("format" = "name"), example = &"coarse")]
     pub name: Option<String>,
     /// Cells along each axis of a generated mesh.
     #[schemars(length(min = 2, max = 3), inner(range(min = 1)), example = [8, 8])]
     pub cells: Option<Vec<u32>>,
-    /// Length of a time step.
+    /// Length of a step.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub step: Option<f64>,
-    /// Tolerance of adaptive steps; their bounds are those of the base job's [time.adaptive], or 1/4096 and 64 of its steps.
+    /// Tolerance of adaptive steps. The shortest and longest steps are those of [time.adaptive] of the base job or, if absent,
+    /// 1/4096 and 64 times its step.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1), example = 0.02)]
     pub adaptive: Option<f64>,
     /// Time scheme.
     pub scheme: Option<Scheme>,
-    /// The solver's tolerance.
+    /// Tolerance of the solver, [solver] tolerance.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1), example = 1e-8)]
     pub tolerance: Option<f64>,
-    /// More keys of the job to override, as with --set.
+    /// Further overrides of keys of the job, as with --set.
     #[serde(default)]
     #[schemars(example = ["mesh.rectangle.diagonal=left"])]
     pub set: Vec<String>,
 }
 
-/// Runs in all combinations of lists; an absent list is the base job's value.
+/// Runs for all combinations of the values in lists. For an absent list, the value of the base job is used.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Product {
     /// Cells along each axis of a generated mesh, from coarse to fine.
     #[schemars(example = [[8, 8], [16, 16]])]
     pub cells: Vec<Cells>,
-    /// Lengths of a time step, from long to short.
+    /// Lengths of a step, from long to short.
     #[schemars(transform = positive_items, extend("unit" = "s"), example = [0.0625, 0.03125])]
     pub steps: Vec<f64>,
-    /// Tolerances of adaptive steps, from loose to tight: more runs beside those of `steps`.
+    /// Tolerances of adaptive steps, from loose to tight. The runs with adaptive steps are added to those with `steps`.
     #[schemars(transform = positive_items, example = [0.1, 0.01])]
     pub adaptive: Vec<f64>,
     /// Time schemes.
     #[schemars(example = ["lagged_euler", "bdf2"])]
     pub schemes: Vec<Scheme>,
-    /// The solver's tolerances, from loose to tight: shows where the solver's error begins to spoil the answer.
+    /// Tolerances of the solver, from loose to tight. They show from which tolerance on the solver's error affects the results.
     #[schemars(transform = positive_items, example = [1e-4, 1e-7, 1e-10])]
     pub tolerances: Vec<f64>,
 }
 
-/// Cells along each axis.
+/// Number of cells along each axis.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub struct Cells(#[schemars(length(min = 2, max = 3), inner(range(min = 1)))] pub Vec<u32>);
 
-/// What runs are held against.
+/// The solution with which runs are compared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
-    /// Another run, finer in space and time or of another scheme; the steps of the runs must be whole multiples of its
+    /// Another run, finer in space and time or with another scheme. The steps of the other runs must be integer multiples of its
     /// step.
     Run(Run),
-    /// A solution known as expressions in t, x, y, z.
+    /// An exact solution, given by expressions in t, x, y, z.
     Exact(Exact),
 }
 
-/// A solution known as expressions. A quantity that no norm needs may be absent.
+/// An exact solution, given by expressions in the time t and the undeformed coordinates x, y, z. Quantities that no norm uses may
+/// be absent.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Exact {
-    /// Displacement, one component an axis.
+    /// Displacement, one component per axis.
     #[schemars(extend("unit" = "m"), example = serde_json::json!(["0", "-0.1*t*x"]))]
     pub displacement: Vec<Scalar>,
-    /// Velocity, one component an axis.
+    /// Velocity, one component per axis.
     #[schemars(extend("unit" = "m/s"), example = serde_json::json!(["0", "-0.1*x"]))]
     pub velocity: Vec<Scalar>,
-    /// Total stress: xx, yy, xy in two dimensions (with zz last where it is not zero), xx, yy, zz, yz, xz, xy in three.
+    /// Total stress: xx, yy, xy in two dimensions, followed by zz if it is not zero; xx, yy, zz, yz, xz, xy in three.
     #[schemars(extend("unit" = "Pa"), example = serde_json::json!(["0", "0", "-40*t"]))]
     pub stress: Vec<Scalar>,
 }
 
-/// At which times runs are held against the reference.
+/// The times at which runs are compared with the reference.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Compare {
-    /// At multiples of this time, itself a multiple of every run's step; absent: after every step of a run.
+    /// Time between two comparisons, a multiple of the step of every run. Absent: every step of a run is compared.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.0625)]
     pub interval: Option<f64>,
-    /// Takes the reference's steps on the mesh of each run, too: the distance of a run to these is the error of its steps,
-    /// their distance to the reference that of its mesh. For a reference that is a run, on generated meshes.
+    /// Whether errors are split into those of the steps and those of the mesh. For this purpose, the steps of the reference are
+    /// also computed on the mesh of each run: the difference between the run and this solution is the error of the steps, the
+    /// difference between this solution and the reference is the error of the mesh. Requires a reference that is a run, and
+    /// generated meshes.
     pub split: bool,
 }
 
-/// A norm of the difference between run and reference.
+/// A norm of the difference between a run and the reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Norm {
-    /// What is compared.
+    /// The quantity that is compared.
     pub of: Quantity,
     /// The norm in space.
     #[serde(rename = "in")]
     pub space: Space,
-    /// What is made of the values over time.
+    /// The norm in time.
     pub over: Over,
-    /// The order that theory predicts; absent: of smooth solutions, 1 in V and Q and 2 in H with the mesh, that of
-    /// the scheme with the step, the lower one where both change.
+    /// The order of convergence that theory predicts. Absent: the order for smooth solutions, which is 1 in V and Q and 2 in H for
+    /// the mesh size, the order of the scheme for the step, and the lower of the two if both change.
     #[schemars(extend("exclusiveMinimum" = 0), example = 1.0)]
     pub expected_order: Option<f64>,
-    /// Published errors, one for each [[run]] in their order: printed beside ours with ratio and order.
+    /// Published errors, one for each [[run]] in the same order. Tables show them beside the computed errors, with their ratio and
+    /// order.
     #[serde(default)]
     #[schemars(transform = positive_items, example = [0.0573, 0.0204])]
     pub published: Vec<f64>,
-    /// Errors to reach: a table tells of each scheme the fastest run that does.
+    /// Target errors. For each target and scheme, a table shows the fastest run that reaches it.
     #[serde(default)]
     #[schemars(transform = positive_items, example = [1e-2, 1e-3])]
     pub targets: Vec<f64>,
 }
 
-/// What is compared.
+/// The quantity that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -204,7 +209,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// The field of field files that holds it.
+    /// The field of field files that contains the quantity.
     pub fn field(self) -> &'static OutputField {
         match self {
             Self::Displacement => &DISPLACEMENT,
@@ -217,27 +222,27 @@ impl Quantity {
 /// The norm in space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub enum Space {
-    /// Of displacement and velocity: the square root of the integral of their square.
+    /// For displacement and velocity: the square root of the integral of the square.
     H,
-    /// Of displacement and velocity: the square root of the integral of the square of their strain.
+    /// For displacement and velocity: the square root of the integral of the square of the strain.
     V,
-    /// Of stress: the square root of the integral of stress : stress.
+    /// For stress: the square root of the integral of stress : stress.
     Q,
 }
 
-/// What is made of the values over time.
+/// The norm in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Over {
-    /// The largest after time 0.
+    /// The largest value after time 0.
     Max,
-    /// The square root of the sum of step times square, after time 0.
+    /// The square root of the sum over all steps after time 0 of the step length times the square.
     Sum,
-    /// The one at the end.
+    /// The value at the end.
     End,
 }
 
-/// A value at a point, held against the reference's.
+/// A value at a point that is compared with that of the reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeError {
@@ -247,18 +252,18 @@ pub struct ProbeError {
     /// A column of probes.csv.
     #[schemars(example = &"velocity_y")]
     pub value: String,
-    /// What is made of the differences over time.
+    /// The norm in time of the difference.
     pub over: Over,
 }
 
-/// How wall time is measured.
+/// The measurement of wall time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Timing {
-    /// How often each run is repeated; the reference runs once.
+    /// How many times each run is executed. The reference is executed once.
     #[schemars(range(min = 1))]
     pub repetitions: u32,
-    /// Which of the repetitions counts.
+    /// The repetition whose wall time is used.
     pub take: Take,
 }
 
@@ -268,7 +273,7 @@ impl Default for Timing {
     }
 }
 
-/// Which of the repetitions counts.
+/// The repetition whose wall time is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Take {
@@ -278,28 +283,28 @@ pub enum Take {
     Median,
 }
 
-/// Pictures beside those of work and precision.
+/// Pictures in addition to the work-precision diagrams.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pictures {
-    /// Runs whose errors are drawn over time, seven at most; absent: the most accurate of each scheme.
+    /// Runs whose errors are drawn over time, at most seven. Absent: the most accurate run of each scheme.
     #[schemars(length(max = 7), example = ["coarse", "fine"])]
     pub over_time: Vec<String>,
-    /// Runs whose errors are drawn on the body, at the time when they are largest.
+    /// Runs whose errors are drawn on the body, each at the time of its largest error.
     #[schemars(example = ["fine"])]
     pub in_space: Vec<String>,
 }
 
-/// Where the study leaves its files.
+/// The output folder of the study.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// The folder, relative to the study file; absent: out/ and the study file's name. Runs have folders below it.
+    /// The folder, relative to the study file. Absent: out/NAME for the study file NAME.toml. Each run has a subfolder.
     #[schemars(extend("format" = "path"), example = "out/table_1")]
     pub folder: Option<PathBuf>,
 }
 
-/// Every item must be above zero.
+/// Requires every item to be above zero.
 fn positive_items(schema: &mut schemars::Schema) {
     if let Some(items) = schema.get_mut("items").and_then(|items| items.as_object_mut()) {
         items.insert("exclusiveMinimum".into(), 0.into());
@@ -309,12 +314,13 @@ fn positive_items(schema: &mut schemars::Schema) {
 static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(schema_of::<Study>);
 
 const OPENING: &str = "\
-A study is a TOML file of the tables below: solver study STUDY.toml. It runs a job on several meshes, with several
-steps and schemes, and measures errors against a reference and what they cost. Paths are relative to the study file.
+A study is a TOML file with the tables below; run it with solver study STUDY.toml. It runs a job on several meshes, with
+several steps and schemes, and measures the errors with respect to a reference and the computing time. Paths are relative
+to the study file.
 
 ";
 
-/// Studies, as a kind of document.
+/// The kind of document that studies are.
 pub(super) fn kind() -> Kind {
     Kind { name: "study", prefix: "study.", opening: OPENING, schema: &SCHEMA }
 }

@@ -27,18 +27,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-/// Drucker and Prager's yield set K: sqrt(J2) + friction_coefficient p <= cohesion with the mean stress p (tension positive);
-/// flow at the rate (s - P_K s)/(2 relaxation), where P_K is the nearest point in (t, t).
+/// The law of Drucker and Prager: the viscoplastic strain rate is (s - P_K s)/(2 relaxation), where P_K s is the stress nearest to
+/// s, in the norm (t, t), in the yield set sqrt(J2) + friction_coefficient p <= cohesion with the mean stress p (positive in
+/// tension).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DruckerPrager {
-    /// The viscosity lambda: the larger, the slower stress beyond the yield set relaxes.
+    /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
-    /// What pressure adds to the yield stress in shear, sqrt(J2) over pressure.
+    /// Increase of the yield stress in shear, sqrt(J2), per pressure.
     #[schemars(range(min = 0), example = 0.6)]
     pub friction_coefficient: f64,
-    /// Yield stress in pure shear without pressure.
+    /// Yield stress in pure shear at zero pressure.
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 1e4)]
     pub cohesion: f64,
 }

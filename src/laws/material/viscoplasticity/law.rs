@@ -77,13 +77,14 @@ macro_rules! laws {
 }
 
 laws! {
-    /// Overstress law with the von Mises yield set.
+    /// Perzyna's overstress law with the von Mises yield condition and optional hardening.
     Perzyna = "perzyna",
-    /// Linear relaxation of stress.
+    /// Maxwell's linear relaxation of stress.
     Maxwell = "maxwell",
-    /// Overstress law with a yield stress that grows with pressure; 3D and plane strain.
+    /// Overstress law with the yield condition of Drucker and Prager, whose yield stress increases with pressure. For 3D and plane
+    /// strain.
     DruckerPrager = "drucker_prager",
-    /// Creep under any stress, by a power of it, with or without strain hardening.
+    /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
     Norton = "norton",
 }
 

@@ -19,15 +19,15 @@ use crate::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Maxwell's linear relaxation: held stress decays as `ds/dt = -dev s / relaxation_time - mean s / volumetric_relaxation_time`;
-/// in plane stress by the in-plane part of the same strain rate.
+/// Maxwell's linear relaxation: at constant strain the stress decays as `ds/dt = -dev s / relaxation_time - mean s /
+/// volumetric_relaxation_time`; in plane stress the strain rate is the in-plane part of that of this law.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Maxwell {
-    /// Time in which held deviatoric stress falls by the factor e.
+    /// Time in which the deviatoric stress decays to 1/e at constant strain.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.5)]
     pub relaxation_time: f64,
-    /// The same of the mean stress; absent: it does not relax.
+    /// Time in which the mean stress decays to 1/e at constant strain. Absent: the mean stress does not relax.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 5.0)]
     pub volumetric_relaxation_time: Option<f64>,

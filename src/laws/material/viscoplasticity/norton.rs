@@ -30,26 +30,28 @@ use crate::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Norton's creep `e' = rate (q/reference_stress)^exponent / (1 + e/hardening_strain)^hardening_exponent` of the equivalent creep strain
-/// e under the von Mises norm q, along the deviator. Without hardening it is steady; e far beyond hardening_strain is Bailey's primary
-/// creep, which grows as `t^(1/(1 + hardening_exponent))` under a steady stress.
+/// Norton's creep: under the von Mises norm q of the stress, the equivalent creep strain e grows as `e' = rate
+/// (q/reference_stress)^exponent / (1 + e/hardening_strain)^hardening_exponent`, in the direction of the stress deviator. Without
+/// hardening, constant stress causes steady creep. With hardening, creep strains far above hardening_strain follow Bailey's law of
+/// primary creep: under constant stress they grow as `t^(1/(1 + hardening_exponent))`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Norton {
-    /// Equivalent creep strain rate at the reference stress, of material that has not crept yet.
+    /// Equivalent creep strain rate at the reference stress, before any creep strain.
     #[schemars(extend("unit" = "1/s", "exclusiveMinimum" = 0), example = 1e-8)]
     pub rate: f64,
-    /// Von Mises norm at which the material creeps at `rate`. The bound of explicit steps holds while the norm is at most this.
+    /// Von Mises norm of the stress at which the creep rate is `rate`. With scheme lagged_euler, explicit_step_bound holds only
+    /// while the von Mises norm is at most reference_stress.
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 1e8)]
     pub reference_stress: f64,
-    /// Power of the stress.
+    /// Exponent of the stress.
     #[schemars(range(min = 1), example = 5.0)]
     pub exponent: f64,
-    /// Equivalent creep strain, kept for every cell, that slows creep by the factor 2^hardening_exponent; absent: no hardening.
+    /// Equivalent creep strain at which the creep rate has decreased by the factor 2^hardening_exponent. Absent: no hardening.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0), example = 1e-3)]
     pub hardening_strain: Option<f64>,
-    /// Power by which creep slows where there is a hardening_strain.
+    /// Exponent of the hardening; used with hardening_strain only.
     #[serde(default = "one")]
     #[schemars(range(min = 0), example = 2.0)]
     pub hardening_exponent: f64,

@@ -13,28 +13,28 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{array, f64::consts::FRAC_1_SQRT_2};
 
-/// Perzyna's law `G(s) = -(1/(2 relaxation)) (f/yield_stress)^(exponent - 1) E (s - P_K s)`, where P_K projects on the von Mises
-/// yield set K and f is the von Mises norm beyond the yield stress.
+/// Perzyna's law: the stress rate is `G(s) = -(1/(2 relaxation)) (f/yield_stress)^(exponent - 1) E (s - P_K s)`, where P_K is the
+/// projection on the yield set of von Mises and the overstress f is the von Mises norm of s minus the yield stress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Perzyna {
-    /// The viscosity lambda: the larger, the slower stress beyond the yield set relaxes.
+    /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
-    /// Von Mises norm at which flow begins.
+    /// Yield stress: von Mises norm of the stress above which the material flows.
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 19.0)]
     pub yield_stress: f64,
-    /// Power of the overstress; 1 is Wang and Cheng's law. Above 1 the yield stress must be positive, and the bound of
-    /// explicit steps holds while the von Mises norm is at most twice the yield stress.
+    /// Exponent of the overstress. 1: the law of Wang and Cheng (2022). Above 1 the yield stress must be positive, and with scheme
+    /// lagged_euler explicit_step_bound holds only while the von Mises norm is at most twice the yield stress.
     #[serde(default = "one")]
     #[schemars(range(min = 1), example = 3.0)]
     pub exponent: f64,
-    /// Growth of the yield stress with the accumulated viscoplastic strain, which is kept for every cell; absent: no hardening.
-    /// What hardening stores is part of viscoplastic_dissipation.
+    /// Increase of the yield stress per accumulated viscoplastic strain. Absent: no hardening. The energy stored by hardening is
+    /// part of viscoplastic_dissipation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0), extend("unit" = "Pa"), example = 100.0)]
     pub hardening_modulus: Option<f64>,
-    /// The norm in which the projection on the yield set is the nearest point.
+    /// The norm in which the projection on the yield set is the nearest stress.
     #[serde(default)]
     pub metric: Metric,
 }
@@ -43,14 +43,14 @@ fn one() -> f64 {
     1.0
 }
 
-/// A norm of stresses.
+/// A squared norm of the stress t, with the elastic tensor E.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
-    /// (E t, t): Wang and Cheng's.
+    /// (E t, t), as in Wang and Cheng (2022).
     #[default]
     Elasticity,
-    /// (E^-1 t, t): the usual choice in plasticity.
+    /// (E^-1 t, t), the usual choice in plasticity.
     Compliance,
     /// (t, t).
     Frobenius,
