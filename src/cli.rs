@@ -28,11 +28,11 @@ use std::{
 const EXAMPLES: &str = "\
 Examples:
   mpirun -n 2 solver job.toml              run a job on two processes
-  solver check job.toml                    see what it would simulate and cost
+  solver check job.toml                    check it; print its effects and its cost
   solver job.toml --set time.step=0.01     run it with another step
-  solver job.toml --restart                go on where it stopped
+  solver job.toml --restart                continue a stopped run
   solver partition m.msh -n 64 -o m.h5     split a mesh for runs on up to 64 processes
-  solver describe contact                  read about the keys of [[contact]]
+  solver describe contact                  print the meaning of the keys of [[contact]]
 
 Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
 
@@ -197,7 +197,7 @@ fn remedy(arguments: &[OsString]) -> Option<String> {
     let first = words.first()?;
     if first.starts_with('-') {
         let command = words.iter().find(|word| COMMANDS.contains(word))?;
-        return Some(format!("the command stands first, its options behind it: solver {command} ..."));
+        return Some(format!("the command comes first, followed by its options: solver {command} ..."));
     }
     if COMMANDS.contains(first) { None } else { misspelt_command(Path::new(first)) }
 }
@@ -208,7 +208,7 @@ fn is_job(path: &Path) -> bool {
 
 fn job_behind_restart(job: &str) -> String {
     format!(
-        "--restart takes a checkpoint (FILE.h5), and {job} is a job. To go on from the newest checkpoint of its output \
+        "--restart takes a checkpoint (FILE.h5), but {job} is a job. To continue from the newest checkpoint of its output \
          folder, write the job first: solver {job} --restart"
     )
 }

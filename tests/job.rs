@@ -94,7 +94,7 @@ fn flow_that_keeps_the_volume_is_warned_of_where_cells_lock() {
     let warned = |overrides: &[&str]| {
         let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
         let loaded = Job::load(&path, &overrides).unwrap_or_else(|error| panic!("{error}"));
-        loaded.warnings.iter().any(|words| words.starts_with("material.viscoplasticity keeps the volume"))
+        loaded.warnings.iter().any(|words| words.starts_with("material.viscoplasticity conserves volume"))
     };
     let strain = "material.hypothesis=plane_strain";
     assert!(warned(&[strain]) && !warned(&[]), "von Mises flow locks in plane strain, not in plane stress");

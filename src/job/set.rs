@@ -11,13 +11,10 @@ pub(super) fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Faul
     let fault =
         |message: &str, help: &str| Err(Fault::new(Place::new(file, 0..text.len()), message, "").help(help));
     let Some(equals) = equals_sign(text) else {
-        return fault("an override without a value", "write --set time.step=0.01");
+        return fault("this override has no value", "write --set time.step=0.01");
     };
     let Ok(keys) = Key::parse(text[..equals].trim()) else {
-        return fault(
-            "this is not a key",
-            "write keys with dots between them: --set contact.0.quadrature=gauss",
-        );
+        return fault("this is not a key", "join keys by dots: --set contact.0.quadrature=gauss");
     };
     let key_place = Place::new(file, 0..text[..equals].trim_end().len());
     let mut value = read_value(text, equals + 1, file)?;
@@ -46,9 +43,9 @@ fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
     let start = start + text[start..].len() - text[start..].trim_start().len();
     let end = start + text[start..].trim_end().len();
     let place = Place::new(file, start..end);
-    let help = "write --set time.step=0.01; strings that are no plain words need quotes";
+    let help = "write --set time.step=0.01; strings that are not plain words need quotes";
     let Some(first) = text[start..end].chars().next() else {
-        return Err(Fault::new(place, "an override without a value", "").help(help));
+        return Err(Fault::new(place, "this override has no value", "").help(help));
     };
     match parse_value(text, file, start..end) {
         Ok(node) => Ok(node),
@@ -87,15 +84,15 @@ fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(
                     insert(&mut items[index], rest, value, key)
                 }
                 _ => {
-                    let message = format!("`{part}` is no entry of this list");
+                    let message = format!("this list has no entry `{part}`");
                     let help = format!("it has {count}, counted from 0; {count} adds another");
                     Err(Fault::new(key.clone(), message, "").help(help))
                 }
             }
         }
         other => {
-            let message = format!("`{part}` can't be set inside of {}", other.kind());
-            Err(Fault::new(key.clone(), message, "").help("leave out the last part of the key"))
+            let message = format!("`{part}` cannot be set inside {}", other.kind());
+            Err(Fault::new(key.clone(), message, "").help("delete the last part of the key"))
         }
     }
 }

@@ -109,9 +109,10 @@ impl Walk<'_> {
         }
         present.sort_by_key(|(_, child)| &child.key);
         for (name, child) in present.iter().skip(1) {
-            let message = format!("`{name}` beside `{}`", present[0].0);
+            let message = format!("`{name}` and `{}` exclude each other", present[0].0);
             let help = format!("give exactly one of {} in [{path}]", list(&known));
-            self.faults.push(Fault::new(child.key.clone(), message, "only one of them can hold").help(help));
+            self.faults
+                .push(Fault::new(child.key.clone(), message, "only one of them is allowed").help(help));
         }
         if present.is_empty() && meant.is_none() {
             let message = format!("[{path}] is empty");
@@ -147,7 +148,7 @@ impl Walk<'_> {
     fn missing(&mut self, node: &Node, key: &str, schema: Option<Schema>, path: &str) {
         let place = if path.is_empty() { format!("the {}", self.kind.name) } else { format!("[{path}]") };
         let message = format!("missing key `{key}` in {place}");
-        let label = if path.is_empty() { "" } else { "this table lacks it" };
+        let label = if path.is_empty() { "" } else { "this key is missing here" };
         let mut fault = Fault::new(node.key.clone(), message, label);
         if let Some(schema) = schema {
             let meaning = schema.text("description").unwrap_or_default().replace('\n', " ");
@@ -251,10 +252,10 @@ impl Walk<'_> {
         let key = path.rsplit('.').next().unwrap_or(path);
         match &node.value {
             Value::Table(_) if schema.accepts("array") && item_accepts("object") => {
-                fault = fault.help(format!("there may be several: write [[{path}]] with two brackets"));
+                fault = fault.help(format!("several are possible: write [[{path}]] with two brackets"));
             }
             Value::Array(_) if schema.accepts("object") => {
-                fault = fault.help(format!("there is only one: write [{path}] with one bracket"));
+                fault = fault.help(format!("only one is possible: write [{path}] with one bracket"));
             }
             Value::Text(text)
                 if schema.accepts("array") && (item_accepts("string") || schema.words().is_empty()) =>
@@ -262,10 +263,10 @@ impl Walk<'_> {
                 fault = fault.help(format!("write a list: {key} = [\"{text}\"]"));
             }
             Value::Text(_) if schema.accepts("number") || schema.accepts("integer") => {
-                fault = fault.help("numbers stand without quotes; expressions are not possible here");
+                fault = fault.help("write numbers without quotes; this key accepts no expression");
             }
             Value::Float(number) if schema.accepts("integer") && number.fract() == 0.0 => {
-                fault = fault.help(format!("write {number:.0}, without a point"));
+                fault = fault.help(format!("write {number:.0}, without a decimal point"));
             }
             _ => {}
         }

@@ -58,7 +58,7 @@ pub(super) fn cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
         let smallest = DEGENERATE * longest_edge(&corners[..=D]).powi(D as i32);
         if !(measure.is_finite() && measure.abs() > smallest) {
             return Err(Error::Refused(format!(
-                "{} around {} is degenerate: its {} is {measure:e} {}. Merge its nodes or mesh that place anew",
+                "{} around {} is degenerate: its {} is {measure:e} {}. Merge its nodes or remesh that region",
                 tags.cell(cell),
                 place(&mesh.centroid(cell)),
                 if D == 2 { "area" } else { "volume" },
@@ -78,8 +78,7 @@ pub(super) fn cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
         .map(|&cell| format!("{} around {}", tags.cell(cell), place(&mesh.centroid(cell))))
         .collect();
     Err(Error::Refused(format!(
-        "{} of {} cells are inverted (their nodes run the other way round than those of the rest): {}{}. Mesh that \
-         place anew, or reorient the surface",
+        "{} of {} cells are inverted (the order of their nodes is opposite to that of the other cells): {}{}. Remesh that region, or reorient the surface",
         inverted.len(),
         mesh.cell_count(),
         first.join(", "),
@@ -112,7 +111,7 @@ fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) ->
             let (p, q) = (&mesh.nodes[a as usize], &mesh.nodes[b as usize]);
             if norm(&add_scaled(p, -1.0, q)) <= tolerance {
                 return Err(Error::Refused(format!(
-                    "{} and {} lie at the same place {}: the cells around them are not joined. Merge them (Gmsh: \
+                    "{} and {} have the same position {}: the cells around them are not connected. Merge them (Gmsh: \
                      Coherence, or Mesh.RemoveDuplicateNodes)",
                     tags.node(a.min(b) as usize),
                     tags.node(a.max(b) as usize),
@@ -222,14 +221,14 @@ mod tests {
     fn unjoined_nodes_at_one_place_are_refused() {
         let nodes = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0 + 1e-13], [0.0, 1.0]];
         let error = refusal(&nodes, &[0, 1, 2, 3, 4, 5]);
-        assert!(error.contains("node 0 and node 3 lie at the same place (0, 0)"), "{error}");
+        assert!(error.contains("node 0 and node 3 have the same position (0, 0)"), "{error}");
     }
 
     #[test]
     fn a_node_on_the_edge_of_another_cell_is_refused() {
         let nodes = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
         let error = refusal(&nodes, &[0, 1, 2, 0, 4, 3, 4, 2, 3]);
-        assert!(error.contains("node 4 at (0.5, 0.5) hangs on an edge of cell 0"), "{error}");
+        assert!(error.contains("node 4 at (0.5, 0.5) is a hanging node on an edge of cell 0"), "{error}");
     }
 
     #[test]
@@ -243,7 +242,10 @@ mod tests {
                 cells.swap(5, 6);
             }
             let error = refusal::<3>(&nodes, &cells);
-            assert!(error.contains("node 4 at (") && error.contains("hangs on a face of cell 0"), "{error}");
+            assert!(
+                error.contains("node 4 at (") && error.contains("is a hanging node on a face of cell 0"),
+                "{error}"
+            );
         }
     }
 

@@ -206,7 +206,7 @@ impl<const D: usize> Mesh<D> {
     pub fn topology(&self) -> Result<Topology<D>> {
         let topology = Topology::<D>::new(&self.cells, self.nodes.len(), &Tags::default())?;
         if topology.facets_without_neighbour() < self.facets.len() {
-            return Err(Error::Refused("the mesh counts facets as outer ones that lie between cells".into()));
+            return Err(Error::Refused("the mesh lists facets between cells as boundary facets".into()));
         }
         Ok(topology)
     }
@@ -293,8 +293,9 @@ fn encode(names: &Names) -> String {
 }
 
 fn decode(text: &str) -> Result<Names> {
-    let (regions, boundaries) =
-        text.split_once("\n\n").ok_or_else(|| Error::Internal("the mesh's names arrived garbled".into()))?;
+    let (regions, boundaries) = text
+        .split_once("\n\n")
+        .ok_or_else(|| Error::Internal("the names of the mesh were damaged in transfer".into()))?;
     let list = |text: &str| text.lines().map(str::to_owned).collect();
     Ok(Names { regions: list(regions), boundaries: list(boundaries) })
 }

@@ -38,7 +38,7 @@ pub(super) fn refuse_hanging_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &
         });
         if hangs {
             return Err(Error::Refused(format!(
-                "{} at {} hangs on {} of {} without belonging to it. Mesh both sides so that they share their nodes \
+                "{} at {} is a hanging node on {} of {}. Mesh both sides so that they share their nodes \
                  there",
                 tags.node(node as usize),
                 place(point),

@@ -31,10 +31,10 @@ impl<const D: usize> Mesh<D> {
                 if claims.count == 0 {
                     let corners = self.facet_corners(facet);
                     let names = if support == contact {
-                        format!("a support and a contact both claim the boundary `{contact}`")
+                        format!("a support and a contact both contain the boundary `{contact}`")
                     } else {
                         format!(
-                            "the support on `{support}` and the contact on `{contact}` both claim a facet"
+                            "the support on `{support}` and the contact on `{contact}` have a facet in common"
                         )
                     };
                     claims.first = format!("{names}: around {}", place(&centroid(&corners)));
@@ -61,7 +61,10 @@ mod tests {
         let mut mesh = Mesh { nodes, facets, boundaries, ..Mesh::default() };
         assert_eq!(mesh.claimed_twice(&["left", "top"], &["bottom", "right"]), Claims::default());
         let claims = mesh.claimed_twice(&["left", "bottom"], &["bottom"]);
-        assert_eq!(claims.first, "a support and a contact both claim the boundary `bottom`: around (0.5, 0)");
+        assert_eq!(
+            claims.first,
+            "a support and a contact both contain the boundary `bottom`: around (0.5, 0)"
+        );
         assert_eq!(claims.count, 2);
         let shared = mesh.boundaries[2].facets[1];
         mesh.boundaries[0].facets.push(shared);

@@ -44,7 +44,7 @@ fn partition<const D: usize>(
     let cells = mesh.cell_count();
     if cells < ranks {
         return Err(Error::Refused(format!(
-            "the mesh has {cells} cells, fewer than the {ranks} ranks or parts it is split for: take at most {cells}, or refine \
+            "the mesh has {cells} cells, fewer than the {ranks} ranks or parts: use at most {cells}, or refine \
              the mesh"
         )));
     }

@@ -78,7 +78,7 @@ impl<const D: usize> Piece<D> {
         if !(ascending(&self.node_ids) && ascending(&self.cell_ids) && ascending(&self.facet_ids)) {
             Err("ids are not in order")
         } else if !below(&self.owners, parts) {
-            Err("a node has an owner that is no part")
+            Err("a node has an owner that is not a part")
         } else if !self.nodes.as_flattened().iter().all(|x| x.is_finite()) {
             Err("a coordinate is not finite")
         } else if !(below(&self.cells, nodes) && below(self.facets.as_flattened(), nodes)) {
@@ -86,7 +86,7 @@ impl<const D: usize> Piece<D> {
         } else if !below(&self.facet_cells, cells) {
             Err("a facet lies on a cell that does not exist")
         } else if !(self.cell_regions.iter().all(regions) && self.named.iter().all(named)) {
-            Err("a region, boundary or facet is named that does not exist")
+            Err("a name belongs to a region, boundary or facet that does not exist")
         } else {
             Ok(())
         }

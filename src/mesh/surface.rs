@@ -165,13 +165,12 @@ fn crowded<const D: usize>(same: &[[u32; D]], tags: &Tags) -> Error {
     let cells: Vec<String> = same.iter().take(4).map(|e| tags.cell((e[D - 1] >> 3) as usize)).collect();
     if same.len() == 2 {
         return Error::Refused(format!(
-            "{} and {} overlap: both lie on the same side of the {name} they share. Remove doubled or folded \
-             parts of the mesh",
+            "{} and {} overlap: both lie on the same side of the {name} they share. Remove duplicate or folded parts of the mesh",
             cells[0], cells[1]
         ));
     }
     Error::Refused(format!(
-        "{} cells share one {name}: {}{}. At most two can: remove doubled or overlapping parts of the mesh",
+        "{} cells share one {name}: {}{}. At most two cells can: remove duplicate or overlapping parts of the mesh",
         same.len(),
         cells.join(", "),
         if same.len() > 4 { ", ..." } else { "" }

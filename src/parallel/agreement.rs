@@ -91,7 +91,7 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
 /// of its own leaves the others in it, so that they never come to the agreement; the run ends with exit code 4 in either case.
 fn end_alone_after_grace(rank: i32, error: &Error) -> Sender<()> {
     let words = format!(
-        "error: rank {rank}: {error}\nOther ranks wait inside the library and can't be told: the run ends here."
+        "error: rank {rank}: {error}\nOther ranks wait inside the library and cannot be notified: the run ends here."
     );
     let (dropped, waiting) = channel();
     std::thread::spawn(move || {

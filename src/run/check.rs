@@ -159,7 +159,7 @@ impl Report {
             .collect();
         let whole = match memory.whole_mesh_at_start {
             0 => String::new(),
-            bytes => format!("; rank 0 holds the whole mesh at first, {}", size(bytes)),
+            bytes => format!("; rank 0 holds the whole mesh initially, {}", size(bytes)),
         };
         lines.push(format!(
             "memory     about {} over all ranks ({}){whole}",
@@ -168,8 +168,7 @@ impl Report {
         ));
         let seconds = &self.estimate.seconds;
         lines.push(format!(
-            "time       about {} to set up, {} a step, {} in all without output; rough, from one core of a common \
-             server, divided by the ranks",
+            "time       about {} for setup, {} per step, {} in total without output; a rough estimate from one core of a common server, divided by the number of ranks",
             duration(seconds.set_up),
             duration(seconds.step),
             duration(seconds.run)

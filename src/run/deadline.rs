@@ -81,7 +81,7 @@ impl Deadline {
     pub(super) fn log_limit(&self, log: &mut Log) {
         let Limits { slurm, margin, .. } = self.limits;
         if let Some(over) = self.over {
-            log.warning(format!("{SLURM_END} is over by {over:.0} s; it is passed over"));
+            log.warning(format!("{SLURM_END} is {over:.0} s in the past and is ignored"));
         } else if slurm.is_finite() {
             log.line(format!(
                 "limit      the Slurm job ends in {slurm:.0} s; the run stops a step, a checkpoint and {margin:.0} s before"

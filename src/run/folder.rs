@@ -33,7 +33,7 @@ pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
         Err(Error::Refused(format!("cannot write {}: {why}; {remedy}", folder.display())))
     };
     if !there.is_dir() {
-        return refuse(format!("{} is no folder", there.display()));
+        return refuse(format!("{} is not a folder", there.display()));
     }
     match access(there, Access::WRITE_OK | Access::EXEC_OK) {
         Ok(()) => Ok(()),
@@ -52,11 +52,10 @@ fn refuse_unfinished(folder: &Path) -> Result<()> {
         Some("completed") => return Ok(()),
         Some("stopped") => "was stopped",
         Some("failed") => "failed",
-        _ => "did not come to its end",
+        _ => "did not finish",
     };
     Err(Error::Refused(format!(
-        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); go on from there with --restart, or start anew \
-         and lose it with --force",
+        "{}: the folder holds a run that {what}, saved up to step {newest} ({}); continue from there with --restart, or start again and lose it with --force",
         folder.display(),
         file.display()
     )))
@@ -79,11 +78,11 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     let refuse = |what: String| Err(Error::Refused(format!("{}: {what}; {remedy}", folder.display())));
     let text = std::fs::read_to_string(&file).map_err(|error| Error::unreadable(&file, error))?;
     let Ok(there) = Job::from_text(&text, "job.toml", folder, &[]).map(|loaded| loaded.job) else {
-        return refuse("the folder holds results of a job that can't be read any more (its job.toml)".into());
+        return refuse("the folder contains results of a job whose job.toml cannot be read".into());
     };
     if !folder.join(LOG).exists() && there.to_toml()? != text {
         return refuse(
-            "the folder holds a job.toml that no run has written, and that would be replaced".into(),
+            "the folder contains a job.toml that no run has written and that would be overwritten".into(),
         );
     }
     let mut differing = differing_keys(&there.physics()?, &job.physics()?);
@@ -101,7 +100,7 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     differing.truncate(SHOWN);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     refuse(format!(
-        "the folder holds the results of another job; what differs: {}{more}",
+        "the folder contains the results of another job; different keys: {}{more}",
         differing.join(", ")
     ))
 }
@@ -157,9 +156,9 @@ mod tests {
             (Some(r#"{"status": "stopped", "steps": 8}"#), 8, "a run that was stopped, saved up to step 8"),
             (Some(r#"{"status": "failed", "steps": 8}"#), 8, "a run that failed"),
             // Killed: without a summary, with that of an earlier run, with one that was cut off.
-            (None, 8, "did not come to its end"),
-            (Some(completed), 9, "did not come to its end"),
-            (Some(&completed[..20]), 8, "did not come to its end"),
+            (None, 8, "did not finish"),
+            (Some(completed), 9, "did not finish"),
+            (Some(&completed[..20]), 8, "did not finish"),
         ] {
             let said = refused(summary, &[checkpoint, 2]).expect("refused");
             assert!(said.contains(words) && said.contains("--restart") && said.contains("--force"), "{said}");
@@ -175,7 +174,7 @@ mod tests {
         for path in [SUMMARY, "summary.json/out/deep"] {
             let said = refused(path).expect("refused");
             assert!(said.contains(&format!("cannot write {}", folder.path().join(path).display())), "{said}");
-            assert!(said.contains("summary.json is no folder"), "{said}");
+            assert!(said.contains("summary.json is not a folder"), "{said}");
         }
         // What root may not write either.
         assert!(refuse_unwritable(Path::new("/proc/self/out")).is_err());

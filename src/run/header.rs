@@ -43,7 +43,7 @@ pub(super) fn lines<const D: usize, const S: usize>(
         match job.solver.method {
             Method::Vinewtonrsls => "PETSc's vinewtonrsls",
             Method::Newton if scheme.is_nonlinear() => "Newton with line search",
-            Method::Newton => "one linear solve a step",
+            Method::Newton => "one linear solve per step",
         },
         job.solver.tolerance
     ));

@@ -31,15 +31,14 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         let on = table.on.join(", ");
         if deepest > TOO_DEEP * size {
             out.push(format!(
-                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside of its obstacle, {:.1} % of the body's \
-                 size: the first steps throw it out; correct the gap, the obstacle or [initial] displacement",
+                "contact.{number}: the boundary {on} starts up to {deepest:.3e} m inside its obstacle, {:.1} % of the body's size: the first steps will eject it; correct the gap, the obstacle or [initial] displacement",
                 100.0 * deepest / size
             ));
         }
         if deepest == f64::NEG_INFINITY && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
             let remedy = match contact.gap {
-                Gap::Sphere(_) => "see whether the body or the obstacle is inside of the sphere: `hollow`",
-                _ => "turn the plane's `normal` round: it points out of the obstacle toward the body",
+                Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
+                _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
             };
             out.push(format!(
                 "contact.{number}: the body lies behind its obstacle, so that the boundary {on} touches nothing; {remedy}"

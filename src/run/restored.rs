@@ -32,7 +32,7 @@ pub(super) fn candidates(session: &Session, start: &Start, folder: &Path) -> Res
         Start::Newest => {
             let found = newest(session, folder)?;
             let words =
-                || format!("{}: no checkpoint to go on from; run without --restart", folder.display());
+                || format!("{}: no checkpoint to continue from; run without --restart", folder.display());
             session.agree(if found.is_empty() { Err(Error::Refused(words())) } else { Ok(found) })
         }
     }
@@ -51,7 +51,7 @@ pub(super) fn restore<const D: usize, const S: usize>(
         match session.agree(checkpoint::restore(session, path, identity, body, state)) {
             Ok(header) => {
                 let file = path.display().to_string();
-                let words = format!("going on from {file} (step {}, t = {} s)", header.step, header.time);
+                let words = format!("continuing from {file} (step {}, t = {} s)", header.step, header.time);
                 return Ok(Some(Restored { file, totals: header.totals, faults, words }));
             }
             Err(error) if error.exit() == Exit::Refused => return Err(error),
@@ -62,7 +62,7 @@ pub(super) fn restore<const D: usize, const S: usize>(
         return Ok(None);
     }
     session.agree(Err(Error::Refused(format!(
-        "no good checkpoint to go on from; run without --restart\n{}",
+        "no intact checkpoint to continue from; run without --restart\n{}",
         faults.join("\n")
     ))))
 }

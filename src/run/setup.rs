@@ -47,7 +47,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",
             error.to_string(),
-            "PETSc can't use these options: correct them or leave them out",
+            "PETSc rejects these options: correct or delete them",
         ),
         _ => error.into(),
     })?;
@@ -57,7 +57,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
         Exit::Internal => loaded.fault(
             "material",
             format!("the equations of a step can't be solved: {error}"),
-            "see whether density and viscosity, in SI units, are of sensible size for this mesh and step",
+            "check that density and viscosity, in SI units, have sensible values for this mesh and step",
         ),
         _ => error.into(),
     })?;

@@ -132,8 +132,7 @@ impl Summary {
         });
         let strain = (self.peaks.strain > LARGEST_STRAIN).then(|| {
             format!(
-                "the strain reached {:.3}, beyond {LARGEST_STRAIN}: the equations are those of small strains and take no account \
-                 of the change of shape",
+                "the strain reached {:.3}, beyond {LARGEST_STRAIN}: the equations assume small strains and neglect the change of shape",
                 self.peaks.strain
             )
         });

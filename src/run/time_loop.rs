@@ -153,8 +153,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         match self.certificates.theta_step {
             Some(theta) if !self.certificates.steps_are_unique() && error.is_failure() => {
                 Err(Error::Failed(format!(
-                    "{error}; theta of a step = {theta:.3e} is not below 1 by a margin, which the job accepts: a step may have several \
-                 solutions, and none that goes on from the step before"
+                    "{error}; theta of a step = {theta:.3e} is not below 1 by a margin, which the job accepts: a step may have several solutions, none of which continues the previous step"
                 )))
             }
             _ => Err(error.into()),
@@ -167,8 +166,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             return Ok(());
         }
         Err(Error::Failed(format!(
-            "at t = {:.6e} s energies, stresses or residuals are not finite numbers: see whether loads, velocities and the [time] step, in \
-             SI units, are of sensible size",
+            "at t = {:.6e} s energies, stresses or residuals are not finite numbers: check that loads, velocities and the [time] step, in SI units, have sensible values",
             self.simulation.state.time
         )))
     }
@@ -182,8 +180,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             return Ok(());
         }
         Err(Error::Failed(format!(
-            "at t = {:.6e} s the time scheme has made {made:.1e} times the energy that was put in: explicit stress makes errors \
-             grow; take a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
+            "at t = {:.6e} s the time scheme has generated {made:.1e} times the energy that was supplied: explicit stresses let errors grow; use a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
             self.simulation.state.time
         )))
     }
@@ -196,7 +193,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         }
         if let Some(what) = outcome.landed_on.filter(|_| self.landed < LOGGED_STEPS) {
             self.landed += 1;
-            self.log.quiet_line(format!("step {step} lands on t = {time:.9} s: {what}"));
+            self.log.quiet_line(format!("step {step} ends at t = {time:.9} s: {what}"));
         }
         if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
             return;
@@ -250,14 +247,14 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let mut result = match self.session.agree(ended) {
             Ok(Ended::Completed) => Ok(Exit::Done),
             Ok(Ended::Stopped(reason)) => {
-                self.log.line(format!("stopping on {reason}; go on with --restart"));
+                self.log.line(format!("stopping on {reason}; continue with --restart"));
                 Ok(Exit::Stopped)
             }
             Err(error) => Err(error),
         };
         if !self.simulation.totals.are_finite() {
             self.log.line(
-                "no checkpoint is written of a state that is not finite; earlier ones are left as they are",
+                "the state is not finite: no checkpoint of it is written, and earlier checkpoints are kept",
             );
         } else if result != Ok(Exit::Done) || self.job.checkpoint.is_some() {
             let saved = self.save();

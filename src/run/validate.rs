@@ -37,8 +37,9 @@ fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loa
     let claims = mesh.claimed_twice(&supports, &contacts);
     let more = session.total(claims.count).saturating_sub(1);
     let more = if more > 0 { format!(" and at {more} more facets") } else { String::new() };
-    let fault =
-        || loaded.fault("contact.0.on", format!("{}{more}", claims.first), "give each facet to one of them");
+    let fault = || {
+        loaded.fault("contact.0.on", format!("{}{more}", claims.first), "assign each facet to one of them")
+    };
     session.agree(if claims.count == 0 { Ok(()) } else { Err(fault()) })
 }
 
@@ -70,10 +71,10 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
     session.agree(Err(loaded.fault(
         key,
         format!(
-            "without density the problem is quasistatic, and these motions are free: {}",
+            "without density the problem is quasistatic, and nothing prevents these rigid motions: {}",
             free.join("; ")
         ),
-        "add supports, or contact that can hold them, or give a density",
+        "add supports or a contact that prevents them, or give a density",
     )))
 }
 
@@ -95,11 +96,11 @@ fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Resul
             return Err(loaded.fault(
                 "time.scheme",
                 format!(
-                    "scheme \"{}\" takes elastic stress from the step before: without density and viscosity nothing \
+                    "scheme \"{}\" takes elastic stress from the previous step: without density and viscosity nothing \
                      determines the velocity{place}",
                     scheme.name()
                 ),
-                "give [material] density or [material.viscosity], or take an implicit scheme",
+                "give [material] density or [material.viscosity], or use an implicit scheme",
             ));
         }
     }

@@ -70,7 +70,7 @@ fn meshes_that_claim_more_than_their_file_can_hold_are_refused_before_memory_is_
         let mesh = entry.expect("entry").path();
         if mesh.to_string_lossy().contains("countless") {
             let case = Case::square(4).without("mesh.rectangle").set("mesh.file", &format!("{mesh:?}"));
-            refused(&case.written()).says("cut off or damaged");
+            refused(&case.written()).says("truncated or damaged");
             tried += 1;
         }
     }

@@ -28,7 +28,7 @@ fn results_of_another_job_are_not_overwritten_unless_forced() {
         ("time.step=0.03125", "time.step"),
     ] {
         let outcome = case.run_with(2, &["--set", change]).expect(2);
-        outcome.says("the folder holds the results of another job").says(key).says("--force");
+        outcome.says("the folder contains the results of another job").says(key).says("--force");
         assert_eq!(contents(&case), before, "{change}");
     }
 }
@@ -66,7 +66,7 @@ fn a_run_that_was_stopped_is_not_lost_by_starting_it_again() {
         assert_eq!(contents(&case), before, "nothing is touched");
         case.run_with(ranks, &["--restart", "--set", "checkpoint.wall_limit=1000"])
             .expect(0)
-            .says("going on from");
+            .says("continuing from");
         // It has come to its end, and may run again.
         case.run_with(ranks, &["--set", "checkpoint.wall_limit=1000"]).expect(0);
     }
@@ -79,7 +79,7 @@ fn a_run_that_was_killed_or_failed_is_not_lost_by_starting_it_again() {
     // As one leaves it that was killed later: the summary of a run is removed when the next one begins.
     fs::remove_file(case.folder().join("out/summary.json")).expect("removed");
     let before = contents(&case);
-    case.run_with(2, &[]).expect(2).says("did not come to its end").says("checkpoint-4.h5");
+    case.run_with(2, &[]).expect(2).says("did not finish").says("checkpoint-4.h5");
     assert_eq!(contents(&case), before);
     case.run_with(1, &["--force"]).expect(0).says("checkpoint-4.h5 of an earlier run");
     let failing = small().set("traction.0.value", "[0, '-10*sqrt(0.15 - t)']");
@@ -99,7 +99,7 @@ fn a_run_that_begins_removes_the_summary_of_the_one_before() {
     running.signal("KILL", Target::OneRank);
     running.wait();
     assert!(!case.results().path("summary.json").exists());
-    case.run_with(2, &[]).expect(2).says("did not come to its end").says("--restart");
+    case.run_with(2, &[]).expect(2).says("did not finish").says("--restart");
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn a_restart_does_not_mix_its_rows_with_those_of_another_job() {
     let from = case.results().path("checkpoint-4.h5").display().to_string();
     let folder = format!("output.folder='{}'", other.folder().join("out").display());
     let outcome = case.run_with(1, &["--set", &folder, "--restart", &from]).expect(2);
-    outcome.says("the folder holds the results of another job").says("choose another [output] folder");
+    outcome.says("the folder contains the results of another job").says("choose another [output] folder");
     assert_eq!(contents(&other), before);
     case.run_with(1, &["--restart", "--force"]).expect(2).says("cannot be used with");
 }

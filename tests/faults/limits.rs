@@ -54,7 +54,7 @@ fn a_run_saves_its_state_before_its_slurm_job_ends_whichever_rank_knows() {
         let outcome = with_end(&case, &end.to_string(), knows).expect(3);
         outcome
             .says("the Slurm job ends in")
-            .says("stopping on the end of the Slurm job; go on with --restart");
+            .says("stopping on the end of the Slurm job; continue with --restart");
         let results = case.results();
         let (steps, saved) = newest_checkpoint(&results);
         assert!(saved <= end, "the Slurm job was over");

@@ -92,7 +92,7 @@ fn a_requeued_job_goes_on_from_the_folder_that_it_names_however_it_spells_it() {
         submission
             .run("slurm.sbatch", &first, &again)
             .expect(3)
-            .says(&format!("going on from {}", checkpoint.display()));
+            .says(&format!("continuing from {}", checkpoint.display()));
         assert_eq!(submission.submitted().as_deref(), Some("requeue 7\n"), "{folder}");
         assert!(submission.path(folder).join("checkpoint-2.h5").is_file(), "{folder}");
         // Submitted once more by mistake, it loses nothing.
@@ -118,6 +118,6 @@ fn a_job_that_is_submitted_to_pbs_again_goes_on_from_the_folder_that_it_names() 
         submission
             .run("pbs.sh", &[], &again)
             .expect(3)
-            .says(&format!("going on from {}", checkpoint.display()));
+            .says(&format!("continuing from {}", checkpoint.display()));
     }
 }

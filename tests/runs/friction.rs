@@ -133,7 +133,7 @@ fn a_job_with_friction_says_so_and_one_without_has_nothing_of_it() {
 fn friction_that_can_not_be_right_is_refused_in_words() {
     let block = || Case::of("sliding_block");
     let held = |on: &str, fix: &str| block().set("support", &format!("[{{ on = ['{on}'], fix = {fix} }}]"));
-    held("left", "['y']").run_with(1, &[]).expect(2).says("a support holds the normal of the contact there");
+    held("left", "['y']").run_with(1, &[]).expect(2).says("a support fixes the normal component there");
     held("left", "'all'").set("time.end", "0.002").run(1);
     let brick = Case::of("oblique_sliding").set("contact.0.on", "['bottom', 'left']");
     brick.run_with(2, &[]).expect(2).says("two boundaries with friction meet at an edge there");
@@ -178,7 +178,7 @@ fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_goes_on_to_the_last_b
     assert!(slides > 100 && rides > 20, "{slides} rows of sliding, {rides} of riding");
     let stopped = make().set("checkpoint.every", "100");
     stopped.run_with(2, &["--set", "time.end=0.1"]).expect(0);
-    stopped.run_with(2, &["--restart"]).expect(0).says("going on from");
+    stopped.run_with(2, &["--restart"]).expect(0).says("continuing from");
     for name in ["probes.csv", "history.csv", "profiles.csv"] {
         assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
     }
@@ -194,10 +194,10 @@ fn a_body_that_starts_inside_or_behind_its_obstacle_is_warned_of_on_any_number_o
         let wrong = Case::of("conveyor_belt").set("contact.0.obstacle.plane.normal", "[0, -1]");
         check(&wrong, ranks)
             .says("warning: contact.0: the body lies behind its obstacle")
-            .says("turn the plane's `normal` round");
+            .says("reverse the plane's `normal`");
         let deep = Case::of("conveyor_belt").set("contact.0.obstacle.plane.point", "['t', 0.02]");
         check(&deep, ranks)
-            .says("warning: contact.0: the boundary bottom starts up to 2.000e-2 m inside of its obstacle, 5.0 % of the body's size");
+            .says("warning: contact.0: the boundary bottom starts up to 2.000e-2 m inside its obstacle, 5.0 % of the body's size");
         let right = check(&Case::of("conveyor_belt"), ranks).stdout;
         assert!(!right.contains("warning: contact"), "{right}");
     }

@@ -64,8 +64,8 @@ fn a_restart_keeps_the_fields_of_its_file() {
     let before = std::fs::read(case.results().path("fields.vtkhdf")).expect("fields");
     case.run_with(2, &["--restart", "--set", "output.error_indicator=false"])
         .expect(2)
-        .says("holds error_indicator")
-        .says("go on with output.error_indicator = true");
+        .says("contains error_indicator")
+        .says("continue with output.error_indicator = true");
     let after = std::fs::read(case.results().path("fields.vtkhdf")).expect("fields");
     assert!(before == after, "a refused restart changed the fields");
     case.run_with(3, &["--restart"]).expect(0);

@@ -116,7 +116,7 @@ fn a_hardening_run_that_goes_on_is_the_straight_run_to_the_last_bit() {
     let straight = (straight.run(2), straight);
     let stopped = make();
     stopped.run_with(2, &["--set", "time.end=0.53125"]).expect(0);
-    stopped.run_with(2, &["--restart"]).expect(0).says("going on from");
+    stopped.run_with(2, &["--restart"]).expect(0).says("continuing from");
     same_tables(&straight.0, &stopped.results(), "hardening");
 }
 
@@ -124,5 +124,5 @@ fn a_hardening_run_that_goes_on_is_the_straight_run_to_the_last_bit() {
 fn the_step_bound_is_that_of_the_fastest_relaxation() {
     let law = "{ maxwell = { relaxation_time = 0.01 } }";
     let case = square("plane_strain").set(LAW, law);
-    case.run_with(1, &[]).expect(2).says("the step of 0.03125 s is beyond 2.0000e-2 s");
+    case.run_with(1, &[]).expect(2).says("the step of 0.03125 s exceeds 2.0000e-2 s");
 }

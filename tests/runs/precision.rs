@@ -52,7 +52,7 @@ fn a_restart_with_single_precision_is_the_straight_run_to_the_last_bit() {
     let straight = make().run_and_keep(2);
     let restarted = make();
     restarted.run_with(2, &["--set", "time.end=0.5"]).expect(0);
-    restarted.run_with(2, &["--restart"]).expect(0).says("going on from");
+    restarted.run_with(2, &["--restart"]).expect(0).says("continuing from");
     for name in ["probes.csv", "history.csv"] {
         assert_eq!(straight.results().text(name), restarted.results().text(name), "{name}");
     }

@@ -80,7 +80,7 @@ fn a_run_with_regions_goes_on_on_another_number_of_ranks() {
     for (writers, readers) in [(1, 2), (2, 3), (3, 1)] {
         let case = wheel().set("solver.tolerance", "1e-13");
         case.run_with(writers, &["--set", "time.end=0.025"]).expect(0);
-        case.run_with(readers, &["--restart"]).expect(0).says("going on from");
+        case.run_with(readers, &["--restart"]).expect(0).says("continuing from");
         let what = format!("saved on {writers} ranks, gone on on {readers}");
         assert_same_answer(&straight.0, &case.results(), 1e-8, &what);
     }
@@ -91,5 +91,5 @@ fn a_material_that_nothing_moves_is_refused_with_its_region() {
     let still = wheel().without("material.density").without("material.viscosity");
     still.run_with(1, &[]).expect(2).says("of region \"core\"");
     let empty = wheel().set("material", "{}");
-    empty.run_with(1, &[]).expect(2).says("\"core\"").says("resists nothing");
+    empty.run_with(1, &[]).expect(2).says("\"core\"").says("has no density, no elasticity and no viscosity");
 }

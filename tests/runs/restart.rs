@@ -24,7 +24,7 @@ fn interrupt(case: &Case, ranks: usize) {
 fn go_on(case: &Case, ranks: usize) -> Results {
     case.run_with(ranks, &["--restart"])
         .expect(0)
-        .says("going on from")
+        .says("continuing from")
         .says("checkpoint-8.h5 (step 8, t = 0.5 s)");
     let results = case.results();
     let from = results.summary()["restarted_from"].as_str().map(str::to_owned);
@@ -301,7 +301,7 @@ fn a_damaged_checkpoint_is_passed_over_with_a_warning() {
         outcome
             .says("warning: ")
             .says("checkpoint-16.h5")
-            .says("going on from")
+            .says("continuing from")
             .says("(step 12, t = 0.75 s)");
         assert_identical(&straight.0, &case.results(), "behind a damaged checkpoint");
     }
@@ -314,13 +314,13 @@ fn a_run_is_refused_where_every_checkpoint_is_damaged() {
     truncate(&case.results().path("checkpoint-16.h5"));
     flip_a_bit(&case.results().path("checkpoint-12.h5"));
     let outcome = case.run_with(2, &["--restart"]).expect(2);
-    outcome.says("no good checkpoint").says("checkpoint-16.h5").says("checkpoint-12.h5");
+    outcome.says("no intact checkpoint").says("checkpoint-16.h5").says("checkpoint-12.h5");
 }
 
 #[test]
 fn a_run_is_refused_where_there_is_no_checkpoint() {
     let case = Case::square(4);
-    case.run_with(1, &["--restart"]).expect(2).says("no checkpoint to go on from");
+    case.run_with(1, &["--restart"]).expect(2).says("no checkpoint to continue from");
     let outcome = case.run_with(2, &["--restart", "nowhere.h5"]).expect(2);
     outcome.says("nowhere.h5");
 }

@@ -33,7 +33,7 @@ fn assert_saved(results: &Results, reason: &str) -> u64 {
     assert!((27..8192).contains(&steps), "{steps}");
     assert_eq!(results.checkpoints(), [steps]);
     assert_eq!(results.table("history.csv").rows.len() as u64, steps);
-    assert!(results.text("run.log").contains(&format!("stopping on {reason}; go on with --restart")));
+    assert!(results.text("run.log").contains(&format!("stopping on {reason}; continue with --restart")));
     steps
 }
 
@@ -83,7 +83,7 @@ fn a_run_that_is_killed_goes_on_from_its_last_checkpoint() {
 #[test]
 fn a_run_stops_before_its_wall_time_is_over_and_goes_on() {
     let case = endless().set("time.end", "256").set("checkpoint.wall_limit", "1.5");
-    case.run_with(2, &[]).expect(3).says("stopping on the wall-time limit of 1.5 s; go on with --restart");
+    case.run_with(2, &[]).expect(3).says("stopping on the wall-time limit of 1.5 s; continue with --restart");
     let steps = case.results().checkpoints()[0];
     assert!(steps < 256 * 1024);
     case.run_with(2, &["--restart", "--set", "checkpoint.wall_limit=1000", "--set", "time.end=0.001"])

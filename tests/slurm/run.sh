@@ -92,7 +92,7 @@ wait_for() { # JOB KEY VALUE
 # Slurm lets a requeued job wait for two minutes; waits until it has gone on so many times.
 wait_for_start() { # JOB TIMES
     for ((wait = 0; wait < ${PATIENCE:-900}; wait++)); do
-        [[ $(grep -c '^going on from' clarke-"$1".log 2>/dev/null) -ge $2 ]] && return
+        [[ $(grep -c '^continuing from' clarke-"$1".log 2>/dev/null) -ge $2 ]] && return
         [[ $(status "$1" JobState) =~ TIMEOUT|FAILED|CANCELLED|COMPLETED ]] && break
         sleep 1
     done

@@ -294,8 +294,7 @@ fn held(session: &Session) {
     let mut run: Simulation<3, 6> = simulation(session, &job("x"), &mesh);
     let words = run.advance(session).expect_err("a fault").to_string();
     assert!(
-        words.contains("a support holds a direction there in which the obstacle moves")
-            && words.contains("at 3"),
+        words.contains("a support fixes a direction in which the obstacle moves") && words.contains("at 3"),
         "{words}"
     );
     let mut run: Simulation<3, 6> = simulation(session, &job("y"), &mesh);

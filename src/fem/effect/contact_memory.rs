@@ -34,7 +34,7 @@ impl<const D: usize> ContactMemory<D> {
         points.sort_by_key(|(_, point)| point.node);
         if let Some(pair) = points.windows(2).find(|pair| pair[0].1.node == pair[1].1.node) {
             return Err(Error::Refused(format!(
-                "contact memory at {:?} m: two boundaries meet at an edge there, and a node remembers one displacement only; \
+                "contact memory at {:?} m: two boundaries meet at an edge there, but a node stores the history of one displacement only; \
                  round the edge with facets that turn by less than 40 degrees each, or give the memory to one of them",
                 mesh.nodes[pair[0].1.node as usize]
             )));

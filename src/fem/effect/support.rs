@@ -19,7 +19,7 @@ fn fixed_axes<const D: usize>(fix: &Fix, mesh: &Mesh<D>, boundary: &str, facet: 
             let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);
             let Some(axis) = along else {
                 return Err(Error::Refused(format!(
-                    "support on \"{boundary}\": fix = \"normal\" on a boundary that is not square to an axis is not \
+                    "support on \"{boundary}\": fix = \"normal\" on a boundary that is not perpendicular to an axis is not \
                      available yet (a facet there has the normal {:?}); fix components instead",
                     normal.map(|x| x / size)
                 )));

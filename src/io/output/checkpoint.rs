@@ -183,13 +183,13 @@ fn check<const D: usize, const S: usize>(
         Ok(header) => header,
         Err(e) => {
             return refuse(format!(
-                "the header of the checkpoint can't be understood ({e}); start the run anew"
+                "the header of the checkpoint cannot be parsed ({e}); start the run again"
             ));
         }
     };
     if header.format != FORMAT {
         return refuse(format!(
-            "checkpoint format {} was written by Clarke {}, this one reads format {FORMAT}; go on with that version",
+            "the checkpoint has format {} of Clarke {}, this version reads format {FORMAT}; continue with that version",
             header.format, header.version
         ));
     }
@@ -205,13 +205,12 @@ fn check<const D: usize, const S: usize>(
             })
             .collect();
         return refuse(format!(
-            "the checkpoint belongs to another problem; these keys differ:\n{}\nrestore them, or start the run anew \
-             without --restart",
+            "the checkpoint belongs to another problem; these keys differ:\n{}\nrestore them, or start the run again without --restart",
             lines.join("\n")
         ));
     }
     if header.mesh != digest(body) || header.dimension != D {
-        return refuse("the mesh has changed since the checkpoint was written; start the run anew".into());
+        return refuse("the mesh has changed since the checkpoint was written; start the run again".into());
     }
     Ok(header)
 }

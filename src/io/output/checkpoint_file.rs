@@ -230,8 +230,7 @@ impl Checkpoint {
 
 fn damaged(file: &ParallelFile, dataset: &str) -> Error {
     Error::Failed(format!(
-        "{}: dataset {dataset} does not have the checksum it was written with: memory or disk are faulty. \
-         Go on from another checkpoint with --restart FILE.h5",
+        "{}: dataset {dataset} does not match its checksum: memory or disk may be faulty. Continue from another checkpoint with --restart FILE.h5",
         file.path().display()
     ))
 }

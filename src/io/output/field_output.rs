@@ -59,7 +59,7 @@ impl<const D: usize> FieldOutput<D> {
             Ok(resumed) => resumed,
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
-                log.warning(format!("{error}; it is kept as {}, a new one is begun", aside.display()));
+                log.warning(format!("{error}; the file is kept as {}, and a new one is started", aside.display()));
                 let moved = || std::fs::rename(&path, &aside).map_err(|e| Error::unwritable(&aside, e));
                 session.on_first(moved)?;
                 create()?
@@ -144,9 +144,9 @@ fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
     {
         let holds = file.link_exists(&format!("Fields/{name}"));
         if holds != is_wanted {
-            let word = if holds { "holds" } else { "does not hold" };
+            let word = if holds { "contains" } else { "does not contain" };
             return Err(Error::Refused(format!(
-                "{} {word} {name}, and all its times have the same fields: go on with output.{name} = {holds}, or in another \
+                "{} {word} {name}, and all its times have the same fields: continue with output.{name} = {holds}, or in another \
                  output.folder from a named checkpoint (--restart FILE.h5)",
                 path.display()
             )));

@@ -38,7 +38,7 @@ fn describe_checkpoint(file: &hdf5::File) -> hdf5::Result<String> {
         Ok(value) => format!("{value:#}"),
         Err(_) => String::from_utf8_lossy(&header).into_owned(),
     };
-    let mut text = format!("checkpoint, every byte as written\n\nheader:\n{header}\n");
+    let mut text = format!("checkpoint, intact\n\nheader:\n{header}\n");
     for set in file.group("ids")?.member_names()? {
         let rows = file.dataset(&format!("ids/{set}"))?.size();
         line(&mut text, format!("\n{set}: {rows} rows"));

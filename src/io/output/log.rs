@@ -35,7 +35,7 @@ impl Log {
         let file = file.map_err(|e| Error::unwritable(path, e))?;
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(Error::Refused(format!(
-                "{}: another run is writing into this folder; wait for its end, or choose another [output] folder",
+                "{}: another run is writing into this folder; wait until it ends, or choose another [output] folder",
                 path.parent().unwrap_or(path).display()
             )));
         }

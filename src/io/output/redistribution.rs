@@ -111,7 +111,7 @@ impl Directory {
         for (entry, sender) in entries.chunks_exact(2).zip(senders) {
             let place = &mut places[(entry[0] - first) as usize];
             if *place != NOBODY {
-                fault = Err(Error::Refused(format!("row {} is there twice", entry[0])));
+                fault = Err(Error::Refused(format!("row {} occurs twice", entry[0])));
             }
             *place = [sender as u64, entry[1]];
         }

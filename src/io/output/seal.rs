@@ -46,7 +46,7 @@ pub const CHECKPOINT: Kind = Kind {
     magic: b"ClarkeCheckpoint",
     version: 1,
     noun: "checkpoint",
-    remedy: "Go on from another checkpoint with --restart FILE.h5, or start anew without --restart",
+    remedy: "Continue from another checkpoint with --restart FILE.h5, or start again without --restart",
 };
 
 const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
@@ -98,7 +98,7 @@ fn compare(path: &Path, kind: Kind, found: u64, expected: u64) -> Result<()> {
     Err(refused(
         path,
         kind,
-        format!("its content has the digest {found:016x}, {expected:016x} was written: it is damaged"),
+        format!("its content has the digest {found:016x} instead of {expected:016x}: it is damaged"),
     ))
 }
 
@@ -127,7 +127,7 @@ fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     let mut block = [0; SEAL_BYTES as usize];
     if let Err(error) = file.read_exact(&mut block) {
         return Err(if error.kind() == io::ErrorKind::UnexpectedEof {
-            refused(path, kind, format!("it has only {found} bytes: it is cut off or not a {}", kind.noun))
+            refused(path, kind, format!("it has only {found} bytes: it is truncated or not a {}", kind.noun))
         } else {
             unreadable(error)
         });
@@ -149,11 +149,7 @@ fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     }
     let length = number(24);
     if found != length {
-        return Err(refused(
-            path,
-            kind,
-            format!("it has {found} bytes, {length} were written: it is damaged"),
-        ));
+        return Err(refused(path, kind, format!("it has {found} bytes instead of {length}: it is damaged")));
     }
     Ok((length, number(32)))
 }

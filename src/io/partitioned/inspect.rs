@@ -24,7 +24,7 @@ fn words(header: &Header, counts: &[[u64; 4]]) -> String {
     let kind = if header.dimension == 2 { "triangles" } else { "tetrahedra" };
     let cells = counts.iter().map(|part| part[1]);
     let mut lines = vec![
-        format!("a mesh in {} parts (format {}), every byte as written\n", header.parts, MESH.version),
+        format!("a mesh in {} parts (format {}), intact\n", header.parts, MESH.version),
         format!("cells       {} {kind} in the regions {}", header.cells, header.regions.join(", ")),
         format!("nodes       {}", header.nodes),
         format!(

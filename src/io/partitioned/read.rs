@@ -43,7 +43,10 @@ impl PartitionedFile {
         let header: Header = agree(&communicator, header)?;
         let counts = all_rows::<u64>(&file, "counts")?.as_chunks().0.to_vec();
         if counts.len() != header.parts || !matches!(header.dimension, 2 | 3) {
-            return agree(&communicator, Err(contradiction(&file, "its header and its tables differ")));
+            return agree(
+                &communicator,
+                Err(contradiction(&file, "its header and its tables contradict each other")),
+            );
         }
         Ok(Self { file, communicator, header, counts })
     }
@@ -70,7 +73,7 @@ impl PartitionedFile {
         session.agree(if same {
             Ok(mesh)
         } else {
-            Err(contradiction(&self.file, "the mesh that its parts make is not the one its header tells of"))
+            Err(contradiction(&self.file, "the mesh of its parts is not that of its header"))
         })
     }
 

@@ -61,21 +61,22 @@ fn check_claims(findings: &mut Findings<'_>) {
     let mut contacts: Vec<(String, String)> = Vec::new();
     for (path, name) in names_in(root, "contact") {
         if held.iter().any(|(_, other)| *other == name) {
-            let message = format!("the boundary \"{name}\" is in contact, and a support holds all of it");
-            findings.fault(&path, message, "take it out of one of the two tables");
+            let message =
+                format!("the boundary \"{name}\" has a contact, but a support fixes all its components");
+            findings.fault(&path, message, "remove it from one of the two tables");
         }
         let entry = |path: &str| path.split('.').nth(1).map(str::to_owned);
         if contacts.iter().any(|(other, taken)| *taken == name && entry(other) != entry(&path)) {
             let message = format!("the boundary \"{name}\" is in two [[contact]] tables");
-            findings.fault(&path, message, "a boundary has one contact law: take it out of one of them");
+            findings.fault(&path, message, "a boundary has one contact law: remove it from one of them");
         }
         contacts.push((path, name));
     }
     for (path, name) in names_in(root, "traction") {
         if held.iter().any(|(_, other)| *other == name) {
-            findings
-                .warnings
-                .push(format!("{path}: a support holds all of \"{name}\"; the traction does nothing"));
+            findings.warnings.push(format!(
+                "{path}: a support fixes all components on \"{name}\"; the traction has no effect"
+            ));
         }
     }
 }
@@ -147,6 +148,6 @@ pub(super) fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: u
 pub(super) fn check_flat(findings: &mut Findings<'_>, path: &str, dimension: usize) {
     let scalar: Option<Scalar> = findings.root.read(path);
     if dimension == 2 && scalar.is_some_and(|scalar| scalar.uses(Variable::Z)) {
-        findings.fault(path, "a 2D body has no z", "use t, x and y only");
+        findings.fault(path, "a 2D body has no coordinate z", "use t, x and y only");
     }
 }

@@ -57,8 +57,8 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
         table.interface.normal.as_ref().is_some_and(NormalLaw::is_bound) && table.interface.friction.is_none()
     };
     if tables.is_empty() || !tables.iter().all(is_bound) {
-        let message = "this method solves frictionless contact whose every normal law is `unilateral`";
-        findings.fault("solver.method", message, "use \"newton\", or leave the key out");
+        let message = "this method requires that every contact is frictionless and `unilateral`";
+        findings.fault("solver.method", message, "use \"newton\", or delete the key");
     }
 }
 
@@ -79,24 +79,24 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     for scalar in components.into_iter().flatten().chain(rotations.clone()) {
         if root.read::<Scalar>(&scalar).is_some_and(|scalar| scalar.depends_on_position()) {
             let help = "use t only; `gap` in the law may depend on x, y and z";
-            findings.fault(&scalar, "a rigid obstacle moves as one", help);
+            findings.fault(&scalar, "the motion of a rigid obstacle depends on time only", help);
         }
     }
     for rotation in rotations {
         if root.find(&rotation).is_some() && root.find(&format!("{contact}.friction")).is_none() {
             findings.warnings.push(format!(
-                "{rotation}: only friction feels how an obstacle turns in itself, and there is none on this contact"
+                "{rotation}: the rotation of an obstacle affects friction only, and this contact has no friction"
             ));
         }
     }
     let axis = format!("{obstacle}.sphere.axis");
     if root.read::<Vec<f64>>(&axis).is_some_and(|axis| !axis.is_empty() && axis.iter().all(|&x| x == 0.0)) {
-        findings.fault(&axis, "this axis has no direction", "let it point along what the sphere turns about");
+        findings.fault(&axis, "the axis is the zero vector", "give the direction of the axis of rotation");
     }
     let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
     if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
-        let help = "let it point out of the obstacle toward the body";
-        findings.fault(&format!("{obstacle}.plane.normal"), "this normal has no direction", help);
+        let help = "give the normal that points out of the obstacle toward the body";
+        findings.fault(&format!("{obstacle}.plane.normal"), "the normal is the zero vector", help);
     }
 }
 
@@ -122,22 +122,26 @@ fn check_rotation(findings: &mut Findings<'_>, obstacle: &str, dimension: usize)
     let has = |key: &str| root.find(key).is_some();
     if dimension == 2 {
         if has(&plane) {
-            let help = "delete it; let `point` move along the line for a belt, or let `normal` depend on t for a line that tilts";
-            findings.fault(&plane, "in 2D a plane can't turn in itself", help);
+            let help = "delete it; for a belt, let `point` move along the line; for a tilting line, let `normal` depend on t";
+            findings.fault(&plane, "in 2D a plane cannot rotate about its normal", help);
         }
         if has(&axis) {
-            findings.fault(&axis, "in 2D a sphere turns about its centre", "delete the axis");
+            findings.fault(
+                &axis,
+                "in 2D a sphere has no axis: it rotates about its centre",
+                "delete the axis",
+            );
         }
         return;
     }
     if has(&sphere) && !has(&axis) {
-        let help = "add `axis = [x, y, z]`, what the sphere turns about";
+        let help = "add `axis = [x, y, z]`, the direction of the axis of rotation";
         findings.fault(&sphere, "in 3D a rotation needs an axis", help);
     }
     if has(&axis) && !has(&sphere) {
         findings.fault(
             &axis,
-            "an axis without `rotation` turns nothing",
+            "an axis without `rotation` has no effect",
             "add `rotation`, or delete the axis",
         );
     }

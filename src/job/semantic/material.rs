@@ -20,8 +20,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         let present = |key: &str| material.child(key).is_some();
         let may_be_empty = path == "material" && root.count("region") > 0;
         if !may_be_empty && !["density", "elasticity", "viscosity"].into_iter().any(present) {
-            let message =
-                format!("[{path}] resists nothing: it has neither density, elasticity nor viscosity");
+            let message = format!("[{path}] has no density, no elasticity and no viscosity");
             findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
         }
         for (key, message) in
@@ -39,7 +38,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             }
         }
         if path != "material" && present("hypothesis") {
-            let message = "the hypothesis holds for the whole body";
+            let message = "the hypothesis applies to the whole body";
             findings.fault(&format!("{path}.hypothesis"), message, "give it in [material] only");
         }
     }
@@ -48,7 +47,11 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         let key = format!("{region}.name");
         let Some(name) = root.read::<String>(&key) else { continue };
         if seen.contains(&name) {
-            findings.fault(&key, format!("two regions are called \"{name}\""), "give each its own name");
+            findings.fault(
+                &key,
+                format!("two regions have the name \"{name}\""),
+                "give each region its own name",
+            );
         }
         seen.push(name);
     }
@@ -63,7 +66,9 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let resists = ["density", "elasticity", "viscosity"].into_iter().any(|key| material.child(key).is_some());
     let other = mesh.regions.iter().find(|region| !names.iter().any(|name| name == *region));
     if let (Some(other), false, false) = (other, resists, names.is_empty()) {
-        let message = format!("the region \"{other}\" of the mesh is of [material], which resists nothing");
+        let message = format!(
+            "the region \"{other}\" of the mesh has the material of [material], which has no density, no elasticity and no viscosity"
+        );
         findings.fault("material", message, "add density, elasticity or viscosity, or a [[region]] for it");
     }
 }
@@ -115,8 +120,7 @@ pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         let law: Option<Viscoplasticity> = root.read(&format!("{path}.viscoplasticity"));
         if !crossed && law.is_some_and(|law| law.keeps_volume()) {
             findings.warnings.push(format!(
-                "{path}.viscoplasticity keeps the volume: linear elements lock where all around them flows, whatever Poisson's \
-                 ratio; expect bodies that carry too much, by 10 to 30 % on common meshes; {remedy}"
+                "{path}.viscoplasticity conserves volume: linear elements lock where they and their neighbours flow, for any Poisson's ratio; expect a load capacity that is too high, by 10 to 30 % on common meshes; {remedy}"
             ));
         }
     }

@@ -50,8 +50,9 @@ fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, 
         let power: f64 = root.read(&key).unwrap_or(1.0);
         let named = sides.iter().filter(|(_, side)| ends.contains(&side.as_str()));
         for (item, side) in named.clone().filter(|_| (0.0..=1.0).contains(&power)) {
-            let message = format!("cells can't crowd toward \"{side}\": the power along {axis} is {power}");
-            findings.fault(item, message, format!("give {axis} a power above 1, such as 2, in `{path}`"));
+            let message =
+                format!("cells cannot be smaller near \"{side}\": the exponent along {axis} is {power}");
+            findings.fault(item, message, format!("give {axis} an exponent above 1, such as 2, in `{path}`"));
         }
         if power != 1.0 && named.count() == 0 {
             let message = format!("`toward` names neither end of {axis}");
@@ -59,7 +60,7 @@ fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, 
             findings.fault_at_key(
                 &key,
                 message,
-                format!("add \"{low}\" or \"{high}\" or both to it, or take {axis} out"),
+                format!("add \"{low}\" or \"{high}\" or both to `toward`, or delete {axis}"),
             );
         }
     }
@@ -84,7 +85,7 @@ fn check_count(findings: &mut Findings<'_>) {
         let unknowns = product(1).zip(centres).and_then(|(corners, centres)| corners.checked_add(centres));
         let most = most_unknowns(cells.len() as u64);
         if unknowns.is_none_or(|unknowns| unknowns > most) {
-            findings.fault(&key, "this mesh has too many unknowns", format!("there can be at most {most}"));
+            findings.fault(&key, "this mesh has too many unknowns", format!("at most {most} are possible"));
         }
     }
 }

@@ -25,7 +25,7 @@ fn check_indicator(findings: &mut Findings<'_>) {
     for material in materials {
         if root.find(&material).is_some() && root.find(&format!("{material}.elasticity")).is_none() {
             let message = format!("the error indicator needs [{material}.elasticity]");
-            let help = "it measures errors of stress by their elastic energy: give elasticity, or leave the indicator out";
+            let help = "it measures stress errors in the elastic energy norm: add elasticity, or delete error_indicator";
             findings.fault("output.error_indicator", message, help);
         }
     }
@@ -85,7 +85,7 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
             && point.iter().zip(size).any(|(x, length)| *x < 0.0 || *x > *length)
         {
             let help = format!("the body reaches from the origin to {size:?}");
-            findings.fault(&path, "this probe lies outside of the body", help);
+            findings.fault(&path, "this probe lies outside the body", help);
         }
     }
     for profile in items(root, "output.profile") {

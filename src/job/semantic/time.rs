@@ -15,7 +15,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         for (key, node) in options {
             if key.is_empty() || key.starts_with('-') || key.contains(char::is_whitespace) {
                 let help = "write it as PETSc does, without the leading dash: snes_monitor = \"\"";
-                let message = format!("`{key}` is no PETSc option");
+                let message = format!("`{key}` is not a PETSc option");
                 findings.faults.push(Fault::new(node.key.clone(), message, "").help(help));
             }
         }
@@ -32,7 +32,7 @@ fn check_steps(findings: &mut Findings<'_>) {
             findings.fault("time.step", "the step is longer than the whole run", format!("at most {end}"));
         } else if end / step > MOST_STEPS {
             let message = format!("this run would take {:.0e} steps", end / step);
-            findings.fault("time.step", message, "a longer step, or an earlier end");
+            findings.fault("time.step", message, "choose a longer step or an earlier end");
         }
     }
     if let (Some(smallest), Some(largest)) = (smallest, largest)
@@ -67,14 +67,10 @@ fn check_landings(findings: &mut Findings<'_>) {
         let place = format!("time.land_on.{at}");
         let Some(time) = findings.root.read::<f64>(&place) else { continue };
         if time <= before {
-            let message = "times to land on must rise from above 0";
-            findings.fault(&place, message, format!("a time after {before}, or leave it out"));
+            let message = "these times must be above 0 and in ascending order";
+            findings.fault(&place, message, format!("give a time after {before}, or delete it"));
         } else if let Some(end) = end.filter(|end| time > *end) {
-            findings.fault(
-                &place,
-                "this time to land on is after the end of the run",
-                format!("at most {end}"),
-            );
+            findings.fault(&place, "this time is after the end of the run", format!("at most {end}"));
         }
         before = before.max(time);
     }
@@ -84,10 +80,14 @@ fn check_checkpoint(findings: &mut Findings<'_>) {
     let Some(checkpoint) = findings.root.find("checkpoint") else { return };
     let present = |key: &str| checkpoint.child(key).is_some();
     if present("every") && present("interval") {
-        findings.fault("checkpoint.interval", "`interval` beside `every`", "only one of them can hold");
+        findings.fault(
+            "checkpoint.interval",
+            "`interval` and `every` exclude each other",
+            "delete one of them",
+        );
     }
     if !["every", "interval", "wall_limit", "margin"].into_iter().any(present) {
         let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
-        findings.fault("checkpoint", "[checkpoint] does not say when", help);
+        findings.fault("checkpoint", "[checkpoint] does not state when to save", help);
     }
 }

@@ -68,12 +68,13 @@ impl Adhesion {
     pub fn faults(beside: &Interface) -> Vec<LawFault> {
         let help = format!("delete it, or [{}.adhesion]", beside.path);
         let gap = beside.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
-            let message = "adhesion binds what touches at first: there is no gap";
+            let message = "adhesion requires contact from the start: no gap is allowed";
             LawFault::at_value(gap, message, help.as_str())
         });
         let obstacle = beside.obstacle_moves.then(|| {
-            let message = "bonds follow the displacement of the body alone: the obstacle must be at rest";
-            LawFault::at_key("obstacle", message, format!("keep it where it is, or {help}"))
+            let message =
+                "adhesion requires an obstacle at rest: bonds depend on the displacement of the body only";
+            LawFault::at_key("obstacle", message, format!("keep the obstacle at rest, or {help}"))
         });
         gap.into_iter().chain(obstacle).collect()
     }
@@ -84,7 +85,7 @@ impl Adhesion {
         let most = (self.stiffness + self.tangential_stiffness()) * length * length;
         (most <= energy && most > 0.0).then(|| {
             format!(
-                "at its length a bond has the energy {most} J/m^2, not above {energy}: no bond ever gives way"
+                "no bond ever breaks: the elastic energy of bonds is at most {most} J/m^2, their energy of adhesion {energy}"
             )
         })
     }

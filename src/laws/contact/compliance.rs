@@ -111,7 +111,7 @@ impl Response for Compliance {
     }
 
     fn growth_constants(&self) -> Result<[f64; 2], &'static str> {
-        Err("there is no growth constant because compliance follows the displacement")
+        Err("there is no growth constant because compliance depends on the displacement")
     }
 
     fn energy(&self, penetration: f64) -> Option<f64> {

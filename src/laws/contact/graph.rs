@@ -42,16 +42,16 @@ impl NormalParameters for Graph {
                 fault("the velocities of a graph must ascend", &help);
             } else if after == before && high < low {
                 fault(
-                    "a downward jump has no relaxed monotonicity: no step is small enough to be solvable",
-                    "order the two points upwards, or let the pressure fall along a steep slope",
+                    "a downward jump has no relaxed monotonicity constant: no step is short enough to be solvable",
+                    "order the two points upwards, or replace the jump by a steep slope",
                 );
             } else if after == before && high == low {
-                fault("this point is there twice", "delete one");
+                fault("this point occurs twice", "delete one");
             }
         }
         for (index, three) in self.points.windows(3).enumerate() {
             if three[0][0] == three[2][0] {
-                let help = "two points with the same velocity are a jump; the ones between say nothing";
+                let help = "two points with the same velocity define a jump: delete those between them";
                 let key = format!("points.{}", index + 2);
                 faults.push(LawFault::at_value(key, "three points with the same velocity", help));
             }

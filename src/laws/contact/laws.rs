@@ -68,8 +68,10 @@ impl NormalLaw {
     pub(super) fn faults_beside_obstacle(&self) -> Vec<LawFault> {
         let against =
             self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));
-        let help = "give one of them: the obstacle says how far it is";
-        let gap = self.gap_key().map(|gap| LawFault::at_key(gap, "`gap` beside [contact.obstacle]", help));
+        let help = "delete one of them: the obstacle determines the gap";
+        let gap = self
+            .gap_key()
+            .map(|gap| LawFault::at_key(gap, "`gap` and [contact.obstacle] exclude each other", help));
         against.into_iter().chain(gap).collect()
     }
 }

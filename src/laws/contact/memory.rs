@@ -41,17 +41,17 @@ impl Memory {
             faults.push(LawFault::at_key(key, message, help));
         };
         if let Some(wall) = beside.normal.as_ref().filter(|law| law.is_bound()) {
-            let message = "a rigid obstacle is never pressed in: there is nothing to remember";
+            let message = "memory requires a foundation that can be indented: a rigid obstacle has no memory";
             refuse(wall.table(), message, "");
         } else if let Some(gap) = beside.normal.as_ref().and_then(NormalLaw::gap_key) {
-            refuse(gap, "memory is of what touches at first: there is no gap", "");
+            refuse(gap, "memory requires contact from the start: no gap is allowed", "");
         }
         if beside.has_obstacle {
-            let message = "memory is of what touches at first: there is no obstacle that moves";
+            let message = "memory requires a foundation at rest: no obstacle is allowed";
             refuse("obstacle".into(), message, "");
         }
         if let Some(friction) = beside.friction.as_ref().filter(|law| law.follows_pressure()) {
-            let message = "this friction follows the pressure of the normal law, which memory is not part of";
+            let message = "this friction law depends on the pressure of the normal law, which does not include that of memory";
             refuse(friction.table().into(), message, ", or use tresca");
         }
         faults

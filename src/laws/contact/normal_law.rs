@@ -94,7 +94,7 @@ pub trait NormalParameters {
     /// Why no obstacle can stand beside the law of this name, and what to do.
     fn against_obstacle(&self, name: &str) -> Option<[String; 2]> {
         let help = "delete the obstacle, or use `compliance` or `unilateral`";
-        Some([format!("`{name}` acts at any distance: it has no obstacle"), help.into()])
+        Some([format!("`{name}` does not depend on the distance to an obstacle"), help.into()])
     }
 }
 

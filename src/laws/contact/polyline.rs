@@ -36,15 +36,14 @@ impl Polyline {
             }
             if w == v && q <= p {
                 return Err(Error::Refused(format!(
-                    "contact graph: at velocity {v} the pressure goes from {p} to {q}; only upward jumps have a relaxed \
-                     monotonicity: let it fall along a steep slope"
+                    "contact graph: at velocity {v} the pressure goes from {p} to {q}; only upward jumps have a relaxed monotonicity constant: replace this jump by a steep slope"
                 )));
             }
             slopes.push(if w == v { f64::INFINITY } else { (q - p) / (w - v) });
         }
         slopes.push(slope_after);
         if slopes.iter().any(|slope| slope.is_nan() || *slope == f64::NEG_INFINITY) {
-            return Err(Error::Refused("contact graph: a slope is a number, or infinite upwards".into()));
+            return Err(Error::Refused("contact graph: slopes must be numbers or plus infinity".into()));
         }
         let larger = |[v, p]: [f64; 2], [w, q]: &[f64; 2]| [f64::max(v, w.abs()), f64::max(p, q.abs())];
         let reach = points.iter().fold([0.0; 2], larger);

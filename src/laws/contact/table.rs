@@ -52,7 +52,7 @@ impl ContactTable {
                 (self.memory.is_some(), "memory does not act at Gauss points"),
                 (nodal, "this contact law does not act at Gauss points"),
             ];
-            let help = "use \"nodal\", or leave the key out";
+            let help = "use \"nodal\", or delete the key";
             let not_there = not_there.into_iter().filter(|(is_there, _)| *is_there);
             faults.extend(not_there.map(|(_, message)| LawFault::at_value("quadrature", message, help)));
         }

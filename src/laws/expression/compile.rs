@@ -49,7 +49,7 @@ pub(super) fn compile(text: &str) -> Result<Vec<Instruction>, Fault> {
     parser.sum()?;
     match parser.peek() {
         None => Ok(parser.program),
-        Some(')') => Err(parser.here("this parenthesis closes nothing", "delete it, or open one before it")),
+        Some(')') => Err(parser.here("this parenthesis closes no other", "delete it, or open one before it")),
         Some(',') => {
             Err(parser.here("a comma outside of a function", "numbers are written with a point: 0.5"))
         }

@@ -46,7 +46,7 @@ fn nearly_all() -> f64 {
 
 impl Damage {
     /// The message where elasticity is missing.
-    pub const WITHOUT_ELASTICITY: &'static str = "damage without elasticity has nothing to weaken";
+    pub const WITHOUT_ELASTICITY: &'static str = "damage requires elasticity: it reduces the elastic stress";
 
     /// The law in a material of this elasticity.
     pub fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Elastic<Self> {

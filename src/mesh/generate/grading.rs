@@ -63,8 +63,7 @@ pub(super) fn axis(name: &str, length: f64, cells: usize, grading: Grading) -> R
     points.extend((0..=cells).map(place));
     if let Some(i) = points.windows(2).position(|pair| pair[1] <= pair[0]) {
         return Err(Error::Refused(format!(
-            "mesh grading {power} along {name} gives a cell of zero length at {name} = {}: take a grading \
-             closer to 1, or fewer cells",
+            "mesh grading {power} along {name} gives a cell of zero length at {name} = {}: choose a grading closer to 1, or fewer cells",
             points[i]
         )));
     }

@@ -68,8 +68,7 @@ impl<const D: usize> Bisection<D> {
         let count: usize = bricks.iter().product();
         if count < parts {
             return Err(Error::Refused(format!(
-                "the grid has {count} bricks, fewer than the {parts} ranks: run on at most {count} ranks, refine the mesh, or \
-                 take partition = \"metis\", which splits bricks"
+                "the grid has {count} bricks, fewer than the {parts} ranks: run on at most {count} ranks, refine the mesh, or use partition = \"metis\", which splits bricks"
             )));
         }
         Ok(Self { bricks, parts })

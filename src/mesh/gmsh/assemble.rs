@@ -113,7 +113,7 @@ impl Positions {
         };
         found.ok_or_else(|| {
             Error::Refused(format!(
-                "section $Elements: element {element} has the node {tag}, which $Nodes does not hold"
+                "section $Elements: element {element} has the node {tag}, which $Nodes does not contain"
             ))
         })
     }

@@ -58,9 +58,9 @@ impl<'a> Cursor<'a> {
             self.at += 1;
         }
         match std::str::from_utf8(&self.bytes[self.began..self.at]) {
-            Ok("") => Err(self.refuse(format_args!("the file ends where {what} is due"))),
+            Ok("") => Err(self.refuse(format_args!("the file ends where {what} is expected"))),
             Ok(word) => Ok(word),
-            Err(_) => Err(self.refuse(format_args!("unreadable bytes where {what} is due"))),
+            Err(_) => Err(self.refuse(format_args!("unreadable bytes where {what} is expected"))),
         }
     }
 
@@ -92,7 +92,7 @@ impl<'a> Cursor<'a> {
         let word = self.word(what)?;
         word.parse().map_err(|_| {
             let found: String = word.chars().take(40).collect();
-            self.refuse(format_args!("`{}` where {what}, {kind}, is due", found.escape_debug()))
+            self.refuse(format_args!("`{}` where {what}, {kind}, is expected", found.escape_debug()))
         })
     }
 
@@ -103,7 +103,7 @@ impl<'a> Cursor<'a> {
                 self.at += N;
                 Ok(*chunk)
             }
-            None => Err(self.refuse(format_args!("the file ends where {what} is due"))),
+            None => Err(self.refuse(format_args!("the file ends where {what} is expected"))),
         }
     }
 
@@ -162,7 +162,7 @@ impl<'a> Cursor<'a> {
         match usize::try_from(count) {
             Ok(count) if count <= rest / least => Ok(count),
             _ => Err(self.refuse(format_args!(
-                "{what} is {count}, more than the {rest} bytes left in the file can hold: the file is cut off or damaged"
+                "{what} is {count}, more than the {rest} bytes left in the file can contain: the file is truncated or damaged"
             ))),
         }
     }

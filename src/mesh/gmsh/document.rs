@@ -46,7 +46,7 @@ impl Document {
                         start.escape_debug()
                     )),
                     Some(last) => cursor.refuse(format_args!(
-                        "`{}` after $End{last}, where a section is due",
+                        "`{}` after $End{last}, where a section is expected",
                         start.escape_debug()
                     )),
                 });
@@ -57,12 +57,12 @@ impl Document {
                 "MeshFormat" if !started => format(cursor)?,
                 "Comments" => {}
                 _ if !started => {
-                    return Err(cursor.refuse("$MeshFormat must come first: this is no MSH 4.1 file"));
+                    return Err(cursor.refuse("$MeshFormat must come first: this is not an MSH 4.1 file"));
                 }
                 "MeshFormat" | "PhysicalNames" | "Entities" | "Nodes" | "Elements"
                     if seen.iter().any(|earlier| earlier == section) =>
                 {
-                    return Err(cursor.refuse("this section stands in the file twice"));
+                    return Err(cursor.refuse("the file contains this section twice"));
                 }
                 "PhysicalNames" => document.read_names(cursor)?,
                 "Entities" => document.read_entities(cursor)?,
@@ -70,7 +70,7 @@ impl Document {
                 "Elements" => document.read_elements(cursor)?,
                 "PartitionedEntities" => {
                     return Err(cursor.refuse(
-                        "the mesh is partitioned; the solver partitions by itself. Save it without partitions \
+                        "the mesh is partitioned, but the solver partitions meshes itself. Save it without partitions \
                          (Gmsh: Mesh > Unpartition)",
                     ));
                 }
@@ -81,16 +81,20 @@ impl Document {
                 let word = cursor.word(&end)?;
                 if word != end {
                     let found: String = word.chars().take(40).collect();
-                    return Err(cursor.refuse(format_args!("`{}` where {end} is due", found.escape_debug())));
+                    return Err(
+                        cursor.refuse(format_args!("`{}` where {end} is expected", found.escape_debug()))
+                    );
                 }
             } else if !cursor.skip_past(&end) {
-                return Err(cursor.refuse(format_args!("{end} is missing: the file is cut off")));
+                return Err(cursor.refuse(format_args!("{end} is missing: the file is truncated")));
             }
             seen.push(section.to_string());
         }
         for section in ["MeshFormat", "Nodes", "Elements"] {
             if !seen.iter().any(|earlier| earlier == section) {
-                return Err(Error::Refused(format!("section ${section} is missing: the file holds no mesh")));
+                return Err(Error::Refused(format!(
+                    "section ${section} is missing: the file contains no mesh"
+                )));
             }
         }
         Ok(document)
@@ -165,13 +169,15 @@ impl Document {
                 0 => 0,
                 1 => dimension,
                 other => {
-                    return Err(cursor.refuse(format_args!("the parametric flag is {other}: 0 or 1 is due")));
+                    return Err(
+                        cursor.refuse(format_args!("the parametric flag is {other}: 0 or 1 is expected"))
+                    );
                 }
             };
             let count = cursor.count("the number of nodes of this block", each)?;
             if count > total - self.points.len() {
                 return Err(
-                    cursor.refuse(format_args!("the blocks hold more nodes than the {total} announced"))
+                    cursor.refuse(format_args!("the blocks contain more nodes than the {total} announced"))
                 );
             }
             for _ in 0..count {
@@ -190,7 +196,7 @@ impl Document {
         }
         if self.points.len() != total {
             let held = self.points.len();
-            return Err(cursor.refuse(format_args!("the blocks hold {held} nodes, {total} are announced")));
+            return Err(cursor.refuse(format_args!("the blocks contain {held} nodes, {total} are announced")));
         }
         Ok(())
     }
@@ -235,7 +241,9 @@ impl Document {
             self.blocks.push(block);
         }
         if held != total {
-            return Err(cursor.refuse(format_args!("the blocks hold {held} elements, {total} are announced")));
+            return Err(
+                cursor.refuse(format_args!("the blocks contain {held} elements, {total} are announced"))
+            );
         }
         Ok(())
     }
@@ -246,7 +254,7 @@ fn format(cursor: &mut Cursor) -> Result<()> {
     if version != "4.1" {
         let version: String = version.chars().take(20).collect();
         return Err(cursor.refuse(format_args!(
-            "format version {}: only 4.1 is read. Save the mesh anew with `gmsh -format msh41` or \
+            "format version {}: only 4.1 is read. Save the mesh again with `gmsh -format msh41` or \
              Mesh.MshFileVersion = 4.1",
             version.escape_debug()
         )));
@@ -254,7 +262,7 @@ fn format(cursor: &mut Cursor) -> Result<()> {
     let binary = cursor.int("the file type")?;
     let size = cursor.int("the data size")?;
     if size != 4 && size != 8 {
-        return Err(cursor.refuse(format_args!("data size {size}: 4 or 8 is due")));
+        return Err(cursor.refuse(format_args!("data size {size}: 4 or 8 is expected")));
     }
     match binary {
         0 => Ok(()),
@@ -264,20 +272,22 @@ fn format(cursor: &mut Cursor) -> Result<()> {
                 [1, 0, 0, 0] => false,
                 [0, 0, 0, 1] => true,
                 other => {
-                    return Err(cursor.refuse(format_args!("bytes {other:?} where the number one is due")));
+                    return Err(
+                        cursor.refuse(format_args!("bytes {other:?} where the number one is expected"))
+                    );
                 }
             };
             cursor.encoding = Encoding::Binary { big_endian, wide_sizes: size == 8 };
             Ok(())
         }
-        other => Err(cursor.refuse(format_args!("file type {other}: 0 (ASCII) or 1 (binary) is due"))),
+        other => Err(cursor.refuse(format_args!("file type {other}: 0 (ASCII) or 1 (binary) is expected"))),
     }
 }
 
 fn dimension(cursor: &mut Cursor) -> Result<usize> {
     match cursor.int("a dimension")? {
         dimension @ 0..=3 => Ok(dimension as usize),
-        other => Err(cursor.refuse(format_args!("dimension {other}: 0, 1, 2 or 3 is due"))),
+        other => Err(cursor.refuse(format_args!("dimension {other}: 0, 1, 2 or 3 is expected"))),
     }
 }
 
@@ -297,7 +307,7 @@ fn unknown_element(kind: i32) -> String {
         20..=25 => "triangles of order 3 to 5",
         26..=28 => "lines of order 3 to 5",
         29..=31 => "tetrahedra of order 3 to 5",
-        _ => "elements the solver does not know",
+        _ => "elements unknown to the solver",
     };
     let advice = match kind {
         3 | 5 | 6 | 7 => "Mesh without recombination",

@@ -13,8 +13,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     let mut words = Vec::new();
     if contacts.iter().any(|c| c.friction().is_some_and(|f| f.follows_pressure())) {
         words.push(
-            "friction bounds follow the contact pressure: theta holds for given pressures; that they change with the \
-             solution is not covered, and beyond some coefficient there may be several solutions"
+            "friction bounds depend on the contact pressure: theta holds for given pressures and does not cover their change with the solution; above some friction coefficient there may be several solutions"
                 .into(),
         );
     }
@@ -29,11 +28,11 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
                 _ => String::new(),
             };
             format!(
-                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, which the run is held against"
+                "; {each}for given pressures up to {bound:.4e} Pa each step has one solution, and the run checks the pressures"
             )
         });
         words.push(format!(
-            "slip weakening falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
+            "slip weakening decreases the friction traction by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
              bound: theta does not cover it{covered}"
         ));
     }

@@ -31,7 +31,7 @@ impl Certificates {
             } else {
                 verdict.warnings.push(format!(
                     "theta = {} is not below 1: the continuous problem may have several solutions; more \
-                     viscosity or a contact law that falls less steeply would exclude that",
+                     viscosity or a contact law that decreases less steeply would exclude that",
                     short(theta)
                 ));
                 "not below 1: the continuous problem may have several solutions"
@@ -48,7 +48,7 @@ impl Certificates {
             let size = if product < f64::INFINITY {
                 format!("{product:.4} Pa s")
             } else {
-                "infinite (the supports leave a rigid motion against the contact free)".to_owned()
+                "infinite (the supports do not prevent a rigid motion against the contact)".to_owned()
             };
             verdict.words.push(format!(
                 "m_A = {modulus:.4} Pa s {sign} m_j |gamma|^2 = {size}: condition (13) {meaning}"
@@ -67,7 +67,7 @@ impl Certificates {
             if let Some(flowing) = self.flowing_step_bound.filter(|flowing| (*flowing..bound).contains(&step))
             {
                 verdict.warnings.push(format!(
-                    "the step of {step} s is beyond {flowing:.4e} s: errors may grow where most of the body flows; a step below \
+                    "the step of {step} s exceeds {flowing:.4e} s: errors may grow where most of the body flows; a step below \
                      {flowing:.4e} s or an implicit scheme would exclude that"
                 ));
             }
@@ -79,7 +79,7 @@ impl Certificates {
     fn growth(&self) -> String {
         match (self.growth_constants, &self.unbounded_growth) {
             (Some([rest, slope]), _) => format!(
-                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) asks"
+                "|dj(r)| <= {rest:.4} Pa + {slope:.4} Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) requires"
             ),
             (None, Some(why)) => format!("{why}: hypothesis H(j) does not cover it"),
             (None, None) => "growth constant unknown".into(),
@@ -112,7 +112,7 @@ impl Verdict {
         if step < bound {
             let least = if is_least { "at least " } else { "" };
             let power = if follows_stress {
-                "; of power laws where the overstress is at most the yield stress, and each step is held against the one that occurs"
+                "; for power laws only while the overstress is at most the yield stress; each step checks the overstress that occurs"
             } else {
                 ""
             };
@@ -122,11 +122,12 @@ impl Verdict {
             ));
             return;
         }
-        let found =
-            format!("the step of {step} s is beyond {bound:.4e} s, where explicit stress makes errors grow");
+        let found = format!(
+            "the step of {step} s exceeds {bound:.4e} s, above which explicit stresses let errors grow"
+        );
         self.words.push(found.clone());
         let remedy = format!(
-            "take a step below {bound:.4e} s, [time] scheme = \"implicit_euler\", or accept it with \
+            "use a step below {bound:.4e} s, [time] scheme = \"implicit_euler\", or accept it with \
              [solver] accept = [\"explicit_stability\"]"
         );
         self.judge(found, remedy, accepted);
@@ -180,8 +181,7 @@ mod tests {
         let first = |known: Certificates| known.verdict(1.0 / 64.0, None, &[]).words[0].clone();
         assert_eq!(
             first(paper()),
-            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: contact pressures grow linearly at most, as \
-             hypothesis H(j) asks"
+            "m_j = 10.0000 Pa s/m, |dj(r)| <= 0.0000 Pa + 10.0000 Pa s/m |r|: contact pressures grow linearly at most, as hypothesis H(j) requires"
         );
         let why = Some("the growth constant is infinite".into());
         let wall = first(Certificates { growth_constants: None, unbounded_growth: why, ..paper() });
@@ -231,7 +231,7 @@ mod tests {
     fn the_bound_of_power_laws_says_where_it_holds() {
         let known = Certificates { explicit_bound_follows_stress: true, ..paper() };
         let words = known.verdict(0.01, None, &[]).words;
-        assert!(words.iter().any(|words| words.contains("each step is held against the one that occurs")));
+        assert!(words.iter().any(|words| words.contains("each step checks the overstress that occurs")));
     }
 
     #[test]

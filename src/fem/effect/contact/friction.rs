@@ -73,14 +73,12 @@ impl<const D: usize> Friction<D> {
             let (held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
             if held && law.follows_pressure() {
                 return Err(Error::Refused(format!(
-                    "friction at {place:?} m: a support holds the normal of the contact there and carries its pressure, so \
-                     that the bound of this friction law is not known; free the normal component there, or use tresca"
+                    "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, so that the bound of this friction law is not known; free the normal component there, or use tresca"
                 )));
             }
             if !held && point.stretch < 1.0 - ROUNDING {
                 return Err(Error::Refused(format!(
-                    "friction at {place:?} m: a support holds a component that is neither along the normal of the contact \
-                     nor square to it, so that no free direction is a tangent; hold all components there, or none"
+                    "friction at {place:?} m: a support fixes a component that is neither along the normal of the contact nor perpendicular to it, so that no free direction is tangential; fix all components there, or none"
                 )));
             }
             let (tangents, count) = span_without(&free, &[point.direction]);

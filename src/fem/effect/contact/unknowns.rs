@@ -41,7 +41,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         }
         if with_friction.contains(&node) {
             return Err(Error::Refused(format!(
-                "contact at {:?} m: boundaries meet at an angle that is not square, and friction acts there; round the edge \
+                "contact at {:?} m: boundaries meet at an angle other than 90 degrees, and friction acts there; round the edge \
                  with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
                 mesh.nodes[node]
             )));
@@ -49,7 +49,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         for (number, at) in places {
             if contacts[number].law.has_vertical_parts() {
                 return Err(Error::Refused(format!(
-                    "contact at {:?} m: boundaries meet at an angle that is not square, and a law with jumps or \
+                    "contact at {:?} m: boundaries meet at an angle other than 90 degrees, and a law with jumps or \
                      constraints acts there; round the edge with facets that turn by less than 40 degrees each, or leave \
                      one of the boundaries out of contact",
                     mesh.nodes[node]

@@ -48,8 +48,8 @@ impl Parameters for DruckerPrager {
     type Flow = Elastic<Self>;
 
     const NOT_IN_PLANE_STRESS: Option<[&'static str; 2]> = Some([
-        "Drucker and Prager's law is not for plane stress",
-        "take hypothesis = \"plane_strain\", a 3D body or another law",
+        "Drucker and Prager's law is not available in plane stress",
+        "use hypothesis = \"plane_strain\", a 3D body or another law",
     ]);
 
     fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> Elastic<Self> {

@@ -32,7 +32,7 @@ macro_rules! laws {
 
         impl Viscoplasticity {
             /// The message where elasticity is missing.
-            pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity without elasticity has no stress to relax";
+            pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity requires elasticity: it relaxes the elastic stress";
 
             /// The names of the laws in the job, each with its [`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS).
             pub const NAMES: &'static [(&'static str, Option<[&'static str; 2]>)] =

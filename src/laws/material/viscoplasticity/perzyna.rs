@@ -49,8 +49,8 @@ impl Parameters for Perzyna {
 
     fn fault(&self) -> Option<LawFault> {
         (self.yield_stress == 0.0 && self.exponent != 1.0).then(|| {
-            let message = "a power of the overstress over the yield stress needs a positive yield stress";
-            LawFault::at_value("exponent", message, "give a positive yield_stress, or leave exponent out")
+            let message = "an exponent above 1 requires a positive yield stress";
+            LawFault::at_value("exponent", message, "give a positive yield_stress, or delete exponent")
         })
     }
 

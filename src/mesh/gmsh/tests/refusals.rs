@@ -37,7 +37,7 @@ fn older_versions_are_refused_with_the_way_to_convert() {
 #[test]
 fn a_word_in_place_of_a_number_is_shown_with_its_line() {
     let text = SQUARE.text().replace("\n1 1 0\n", "\n1 one 0\n");
-    refused(&text, &["section $Nodes, line 25", "`one` where a coordinate, a number, is due"]);
+    refused(&text, &["section $Nodes, line 25", "`one` where a coordinate, a number, is expected"]);
     refused(&SQUARE.text().replace("2 1 0 5", "2 1 0 -5"), &["section $Nodes", "`-5`"]);
     refused(&SQUARE.text().replace("2 1 0 5", "2 1 3 5"), &["parametric flag is 3"]);
     refused(&SQUARE.text().replace("2 1 0 5", "4 1 0 5"), &["dimension 4"]);
@@ -47,7 +47,7 @@ fn a_word_in_place_of_a_number_is_shown_with_its_line() {
 fn counts_beyond_the_file_are_refused_before_memory_is_taken() {
     for huge in ["4000000000", "18446744073709551615"] {
         let nodes: &'static str = SQUARE.nodes.replacen("1 5", &format!("1 {huge}"), 1).leak();
-        sample_refused(Sample { nodes, ..SQUARE }, &["section $Nodes", huge, "cut off or damaged"]);
+        sample_refused(Sample { nodes, ..SQUARE }, &["section $Nodes", huge, "truncated or damaged"]);
         let elements: &'static str = SQUARE.elements.replace("2 1 2 2", &format!("2 1 2 {huge}")).leak();
         sample_refused(Sample { elements, ..SQUARE }, &["section $Elements", huge]);
     }
@@ -67,8 +67,11 @@ fn blocks_that_disagree_with_the_announced_number_are_refused() {
 
 #[test]
 fn sections_out_of_shape_are_refused() {
-    refused(&SQUARE.text().replace("$EndNodes", "$EndNods"), &["`$EndNods` where $EndNodes is due"]);
-    refused(&format!("{}$Nodes\n0 0 0 0\n$EndNodes\n", SQUARE.text()), &["stands in the file twice"]);
+    refused(&SQUARE.text().replace("$EndNodes", "$EndNods"), &["`$EndNods` where $EndNodes is expected"]);
+    refused(
+        &format!("{}$Nodes\n0 0 0 0\n$EndNodes\n", SQUARE.text()),
+        &["the file contains this section twice"],
+    );
     refused(&format!("{}$Periodic\n0\n", SQUARE.text()), &["section $Periodic", "$EndPeriodic is missing"]);
     refused(&format!("{}bye\n", SQUARE.text()), &["`bye` after $EndElements"]);
     refused(&SQUARE.text().replace("\"left\"", "left"), &["physical group 3 needs a name in double quotes"]);
@@ -183,13 +186,13 @@ fn faulty_geometry_is_refused_by_the_tags_of_the_file() {
         elements: "1 2 3 4\n2 1 2 2\n3 1 2 3\n4 9 3 4\n",
         ..SQUARE
     };
-    sample_refused(doubled, &["node 1 and node 9 lie at the same place (0, 0)"]);
+    sample_refused(doubled, &["node 1 and node 9 have the same position (0, 0)"]);
     let hanging = Sample {
         nodes: "1 5 1 9\n2 1 0 5\n1\n2\n3\n4\n9\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0.5 0.5 0\n",
         elements: "1 3 3 5\n2 1 2 3\n3 1 2 3\n4 1 9 4\n5 9 3 4\n",
         ..SQUARE
     };
-    sample_refused(hanging, &["node 9 at (0.5, 0.5) hangs on an edge of element 3"]);
+    sample_refused(hanging, &["node 9 at (0.5, 0.5) is a hanging node on an edge of element 3"]);
     let crowded = Sample { elements: "1 2 3 4\n2 1 2 2\n3 1 2 3\n4 1 2 4\n", ..SQUARE };
     sample_refused(crowded, &["element 3 and element 4 overlap"]);
 }
