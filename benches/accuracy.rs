@@ -14,7 +14,7 @@ const PAGE: &str = "docs/what-accuracy-costs.md";
 
 /// Study, start of the heading of one of its tables, what its rows must begin with, and the name of the table in the page.
 const TABLES: [(&str, &str, &[&str], &str); 3] = [
-    ("wang_cheng_work_precision", "What it takes", &[], "work and precision"),
+    ("wang_cheng_work_precision", "Fastest runs for target errors", &[], "work and precision"),
     (
         "wang_cheng_work_precision",
         "Costs",

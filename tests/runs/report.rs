@@ -211,7 +211,7 @@ fn missing_and_damaged_files_are_named_and_the_rest_is_shown() {
     for name in ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf"] {
         let text = std::fs::read(out.join(name)).expect("file");
         std::fs::remove_file(out.join(name)).expect("removed");
-        check_missing(&out, name, "it is not there");
+        check_missing(&out, name, "it does not exist");
         std::fs::write(out.join(name), "[{,\nx y\nz").expect("written");
         check_missing(&out, name, name);
         std::fs::write(out.join(name), text).expect("written");
@@ -261,8 +261,8 @@ fn a_folder_without_a_run_is_refused_with_the_remedy() {
         assert_eq!(outcome.stderr.matches(words).count(), 1, "{}", outcome.stderr);
     };
     refused(&empty, "is not the output folder of a run: it holds none of job.toml");
-    refused(&folder.path().join("nowhere"), "nowhere is not there");
+    refused(&folder.path().join("nowhere"), "nowhere does not exist");
     let case = Case::square(4);
-    refused(&case.written(), "that is a job; give the folder that its run left");
+    refused(&case.written(), "that is a job; give the output folder of its run");
     assert!(!empty.join("report").exists());
 }

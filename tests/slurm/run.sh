@@ -123,7 +123,7 @@ collects=$(sbatch --parsable --dependency=afterok:"$array" --ntasks=2 --time=5 "
 echo "array $array of three tasks: five runs of a study"
 wait_for "$collects" JobState COMPLETED
 [[ $(cat clarke-study-"$array"_*.log | grep -c '^run .* s$') -eq 5 ]]
-[[ $(grep -c 'found finished' clarke-study-"$collects"_*.log) -eq 5 ]]
+[[ $(grep -c 'already finished' clarke-study-"$collects"_*.log) -eq 5 ]]
 cp out/study/study.json array.json
 rm -r out/study
 mpirun --oversubscribe --bind-to none -n 2 "$solver" study study.toml >study.log

@@ -77,7 +77,7 @@ fn a_study_has_the_same_numbers_on_one_two_and_three_ranks() {
             scene
                 .study(ranks, &["--set", &format!("output.folder=out/{ranks}")])
                 .expect(0)
-                .says("ours/published");
+                .says("computed/published");
             let results = crate::scene::read(&scene.path(&format!("out/{ranks}")));
             let at = |run: usize, norm: usize| number(&results, &format!("/runs/{run}/errors/{norm}/error"));
             (0..2)

@@ -8,7 +8,7 @@ fn scene() -> Scene {
 }
 
 fn found(words: &str) -> usize {
-    words.matches("found finished").count()
+    words.matches("already finished").count()
 }
 
 #[test]

@@ -32,7 +32,7 @@ fn the_page_of_a_study_fits_wide_and_narrow_screens() {
 #[test]
 fn errors_are_split_told_over_time_and_compared_by_what_they_take() {
     let scene = paper();
-    scene.study(1, &[]).expect(0).says("What it takes").says("of steps");
+    scene.study(1, &[]).expect(0).says("Fastest runs for target errors").says("error of steps");
     let results = scene.results();
     let runs = results["runs"].as_array().expect("runs");
     assert_eq!(runs.len(), 8);

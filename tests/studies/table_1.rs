@@ -12,7 +12,7 @@ fn velocities_converge_with_the_orders_of_the_papers_table() {
     let folder = tempfile::tempdir().expect("folder");
     let folder = folder.path().join("table");
     let (study, place) = (study.display().to_string(), format!("output.folder={:?}", folder.display()));
-    run(1, &["study", &study, "--set", &place]).expect(0).says("its order");
+    run(1, &["study", &study, "--set", &place]).expect(0).says("published order");
     let results = read(&folder);
     // Between successive rows, by an independent implementation of the scheme; and those of the paper's own column.
     for (row, order, published) in [(1, 1.49, 1.49), (2, 0.70, 0.72), (3, 1.29, 1.28)] {

@@ -61,7 +61,10 @@ impl Found {
         found.summary = found.take("summary.json", "status, sizes, certificates and seconds", |path| {
             let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
             let value: Value = serde_json::from_str(&text).map_err(|error| Error::unreadable(path, error))?;
-            value.is_object().then_some(value).ok_or_else(|| Error::unreadable(path, "it is no JSON object"))
+            value
+                .is_object()
+                .then_some(value)
+                .ok_or_else(|| Error::unreadable(path, "it is not a JSON object"))
         });
         found.history =
             found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
@@ -70,8 +73,8 @@ impl Found {
             found.probes = found.take("probes.csv", "probes over time", |path| Table::read(path, "probe"));
         }
         if folder.join("profiles.csv").exists() || wants(|job| !job.output.profile.is_empty(), &found.job) {
-            found.profiles = found
-                .take("profiles.csv", "what happens along boundaries", |path| Table::read(path, "profile"));
+            found.profiles =
+                found.take("profiles.csv", "values along boundaries", |path| Table::read(path, "profile"));
         }
         found.snapshot = found.take("fields.vtkhdf", "pictures of the body", Snapshot::read);
         Ok(found)
@@ -96,7 +99,7 @@ impl Found {
                 Err(error) => error.to_string(),
             }
         } else {
-            "it is not there".into()
+            "it does not exist".into()
         };
         self.gaps.push(Gap { file, why, lacking });
         None
@@ -107,13 +110,13 @@ fn refuse_what_is_no_run(folder: &Path) -> Result<()> {
     let shown = folder.display();
     let refuse = |words: String| Err(Error::Refused(words));
     if !folder.exists() {
-        return refuse(format!("{shown} is not there; give the output folder of a run"));
+        return refuse(format!("{shown} does not exist; give the output folder of a run"));
     }
     if !folder.is_dir() {
         let remedy = if folder.extension().is_some_and(|extension| extension == "toml") {
-            "that is a job; give the folder that its run left, [output] folder (by default out/ and the job's name beside it)"
+            "that is a job; give the output folder of its run, [output] folder (by default out/ followed by the job's name)"
         } else {
-            "it is no folder; give the output folder of a run"
+            "it is not a folder; give the output folder of a run"
         };
         return refuse(format!("{shown}: {remedy}"));
     }

@@ -17,7 +17,7 @@ const MEMBERS: [(&str, &str, &str); 10] = [
     ("error", "error", ""),
     ("time", "time reached", "s"),
     ("steps", "steps", ""),
-    ("rejected_steps", "steps taken back", ""),
+    ("rejected_steps", "rejected steps", ""),
     ("newton_iterations", "Newton iterations", ""),
     ("linear_iterations", "linear iterations", ""),
     ("final_von_mises", "largest von Mises stress at the end", "Pa"),
@@ -53,7 +53,7 @@ pub(super) fn summary(summary: &Value) -> String {
         }
     }
     if let Some(Value::String(file)) = summary.get("restarted_from") {
-        rows.push(("went on from".into(), file.clone()));
+        rows.push(("restarted from".into(), file.clone()));
     }
     if let Some(bytes) = summary.get("peak_memory_bytes").and_then(Value::as_f64) {
         rows.push(("peak memory of all ranks".into(), format!("{:.0} MB", bytes / 1e6)));
@@ -63,7 +63,7 @@ pub(super) fn summary(summary: &Value) -> String {
         rows.push(("facets between ranks".into(), plain(cut)));
     }
     if let Some(most) = partition.and_then(|p| p.get("imbalance")).and_then(Value::as_f64) {
-        rows.push(("cells of the fullest rank over the average".into(), number(most)));
+        rows.push(("cells of the largest rank relative to the mean".into(), number(most)));
     }
     facts("The run", &rows)
 }
@@ -113,7 +113,7 @@ pub(super) fn certificates(found: &Found) -> String {
             "monotonicity constant m_j",
             known.monotonicity_constant,
             "Pa s/m",
-            "steepest fall of the contact law",
+            "steepest decrease of the contact law",
         ),
         ("growth at rest c₀", growth(0), "Pa", "contact pressures are at most c₀ + c₁ |velocity|"),
         ("growth constant c₁", growth(1), "Pa s/m", "slope of that bound"),
@@ -132,9 +132,9 @@ pub(super) fn certificates(found: &Found) -> String {
     });
     let rows: Vec<Vec<String>> = rows.collect();
     if rows.is_empty() {
-        return paragraph("This problem has no certificates: nothing in it is bounded by one.");
+        return paragraph("No certificate applies to this problem.");
     }
-    let mut out = table("Constants of the problem", &["certificate", "value", "what for"], &rows);
+    let mut out = table("Constants of the problem", &["certificate", "value", "meaning"], &rows);
     let steps = found.history.as_ref().and_then(|history| history.column("dt"));
     let longest = steps.and_then(|steps| steps.into_iter().reduce(f64::max));
     if let Some(step) = longest.or_else(|| found.job.as_ref().map(|job| job.time.step)) {
@@ -145,7 +145,7 @@ pub(super) fn certificates(found: &Found) -> String {
         }
         out.push_str("</ul>\n");
         if verdict.warnings.iter().any(|warning| warning.ends_with("accepted by the job")) {
-            out += &paragraph("The job accepted to run beyond a certificate.");
+            out += &paragraph("The job accepts that a limit of a certificate is exceeded.");
         }
     }
     out
@@ -160,7 +160,7 @@ pub(super) fn phases(summary: &Value) -> Option<Picture> {
         named.filter_map(|(name, s)| Some((name.as_str(), s.as_f64()?))).collect();
     let rest = total.unwrap_or(0.0) - bars.iter().map(|bar| bar.1).sum::<f64>();
     if rest > 0.0 {
-        bars.push(("the rest", rest));
+        bars.push(("other", rest));
     }
     let longest = bars.iter().map(|bar| bar.1).fold(0.0, f64::max);
     if longest <= 0.0 {
@@ -186,7 +186,7 @@ pub(super) fn phases(summary: &Value) -> Option<Picture> {
     let words: Vec<String> = bars.iter().map(|(name, value)| format!("{name} {} s", size(*value))).collect();
     let total = total.map(|total| format!(" Together {} s.", size(total))).unwrap_or_default();
     let caption = format!(
-        "Wall time of each phase, of the slowest rank, with the memory traffic that it needs at the least, where that is counted.{total}"
+        "Wall time of each phase on the slowest rank, with its minimum memory traffic where that is counted.{total}"
     );
     Some(Picture::new(
         "wall_seconds",
@@ -244,7 +244,7 @@ mod tests {
             ("cells", "72"),
             ("peak memory of all ranks", "54 MB"),
             ("facets between ranks", "4"),
-            ("cells of the fullest rank over the average", "1.25"),
+            ("cells of the largest rank relative to the mean", "1.25"),
         ] {
             assert!(page.contains(&row(name, value)), "{name}: {value}\n{page}");
         }

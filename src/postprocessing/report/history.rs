@@ -69,7 +69,7 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
             column: "energy_imbalance",
             quantity: "energy imbalance",
             unit: "",
-            caption: "Energy imbalance of each step: what is missing in its balance over the energy turned over",
+            caption: "Energy imbalance of each step: error of its energy balance relative to the energy turned over",
             is_logarithmic: true,
             tolerance: None,
         },
@@ -159,11 +159,8 @@ fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
     };
     let space = if unit.is_empty() { "" } else { " " };
     let most = format!("at least {}, at most {}{space}{unit}", number(low), number(high));
-    let unseen = if unseen > 0 {
-        format!(" {unseen} steps with exactly 0 have no place here.")
-    } else {
-        String::new()
-    };
+    let unseen =
+        if unseen > 0 { format!(" {unseen} steps with the value 0 are not shown.") } else { String::new() };
     let alt = format!("Chart over time. {caption}; {most}");
     Ok(Some(Picture::new(column, alt, format!("{caption}; {most}.{unseen}"), chart.svg()?)))
 }

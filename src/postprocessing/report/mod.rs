@@ -57,8 +57,7 @@ pub fn report(folder: &Path) -> Result<Made> {
     }
     let path = target.join("index.html");
     let made_by = format!(
-        "Made by solver report, version {VERSION}. All quantities in SI units. The pictures stand beside this page as SVG \
-         and PNG files."
+        "Made by solver report, version {VERSION}. All quantities in SI units. The folder of this page contains the pictures as SVG and PNG files."
     );
     let html = page.html(&made_by);
     write(&path, html.as_bytes())?;
@@ -87,7 +86,7 @@ fn page_of(found: &Found) -> Result<Page> {
     }
     if let Some(text) = &found.text {
         let job = format!(
-            "<details>\n<summary>job.toml, every default spelled out</summary>\n<pre>{}</pre>\n</details>\n",
+            "<details>\n<summary>job.toml with all defaults</summary>\n<pre>{}</pre>\n</details>\n",
             escape(text)
         );
         page.section("Effective job", &job, vec![]);
@@ -129,7 +128,7 @@ fn body_section(page: &mut Page, found: &Found) -> Result<()> {
     let drawn = FIELDS.iter().filter_map(|field| body.of_field(field).transpose());
     let pictures = drawn.collect::<Result<Vec<_>>>()?;
     let words = if pictures.is_empty() {
-        paragraph("fields.vtkhdf holds a mesh, but no fields yet.")
+        paragraph("fields.vtkhdf contains a mesh, but no fields yet.")
     } else {
         String::new()
     };
@@ -185,7 +184,7 @@ fn time_sections(page: &mut Page, found: &Found) -> Result<()> {
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
-        page.section("Energy", &paragraph("history.csv holds no steps yet."), vec![]);
+        page.section("Energy", &paragraph("history.csv contains no steps yet."), vec![]);
         return Ok(());
     }
     let unit = Energy::unit(found.dimension().unwrap_or(3));

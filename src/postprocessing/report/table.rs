@@ -47,7 +47,9 @@ impl Table {
                 word = (*cell).to_owned();
                 row.push(0.0);
             } else {
-                row.push(cell.trim().parse::<f64>().map_err(|_| format!("{cell:?} is no number ({name})"))?);
+                row.push(
+                    cell.trim().parse::<f64>().map_err(|_| format!("{cell:?} is not a number ({name})"))?,
+                );
             }
         }
         self.rows.push(row);

@@ -76,7 +76,7 @@ fn check_cells(study: &Study, base: &Job, document: &mut Document) {
         match base.dimension() {
             None => document.fault(
                 &path,
-                "the base job's mesh is a file: its cells can't be counted out here",
+                "the base job's mesh is a file: its number of cells cannot be chosen here",
                 "name other files in the runs: set = [\"mesh.file=...\"]",
             ),
             Some(dimension) if dimension != count => {

@@ -114,8 +114,11 @@ fn covered(uncovered: f64) -> Result<Vec<String>> {
             "its mesh covers only {covers:.2} % of the reference's body: they are not meshes of the same body"
         )));
     }
-    let words =
-        || format!("its mesh covers {covers:.6} % of the reference's body; errors are of what both cover");
+    let words = || {
+        format!(
+            "its mesh covers {covers:.6} % of the reference's body; errors are measured on the part that both cover"
+        )
+    };
     Ok((uncovered.abs() > 1e-9).then(words).into_iter().collect())
 }
 

@@ -124,7 +124,7 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
 }
 
 fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
-    say("stopped on request; the same command goes on with the runs that are not finished");
+    say("stopped on request; the same command continues with the unfinished runs");
     Ok(Exit::Stopped)
 }
 
@@ -138,7 +138,7 @@ fn announced(
     let Outcome::Ran { record, found } = execute(session, planned, repetitions)? else { return Ok(None) };
     let words = match &record.error {
         Some(error) => format!("failed: {error}"),
-        None if found => "found finished".into(),
+        None if found => "already finished".into(),
         None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
     };
     say(&format!("run {count:<9} {:<40} {words}", planned.name));

@@ -79,7 +79,7 @@ fn cost(norm: &NormResult, curves: &[Curve], axis: Axis, ending: &str) -> Result
     let best = best.collect::<Vec<_>>().join(", ");
     Ok(Picture::new(
         &format!("work-precision-{}-{ending}", norm.name),
-        format!("Chart of errors over {}, a line a scheme: {best}", axis.quantity),
+        format!("Chart of errors over {}, one line per scheme: {best}", axis.quantity),
         format!("{} over {}: {best}.", norm.meaning, axis.quantity),
         chart.svg()?,
     ))
@@ -162,10 +162,7 @@ fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Opti
     Ok(Some(Picture::new(
         &format!("solver-tolerance-{}", shown.name),
         format!("Chart of changes by the solver's tolerance; below a tenth of the error: {most}"),
-        format!(
-            "What the solver's tolerance changes, {}. Below a tenth of the error: {most}.",
-            shown.meaning
-        ),
+        format!("Effect of the solver's tolerance, {}. Below a tenth of the error: {most}.", shown.meaning),
         chart.svg()?,
     )))
 }
@@ -207,7 +204,7 @@ fn over_time(
     Ok(Some(Picture::new(
         &format!("error-over-time-{}", shown.name),
         format!("Chart of errors over time: {worst}"),
-        format!("Where the error sits in time, {}: {worst}.", shown.meaning),
+        format!("Error over time, {}: {worst}.", shown.meaning),
         chart.svg()?,
     )))
 }
@@ -236,7 +233,7 @@ fn on_the_body(
         };
         let mut picture = Body::new(&snapshot).errors(look, cells)?;
         picture.caption = format!(
-            "Where the error of {} sits in space at t = {} s, root of the mean square in each cell, {}. {}",
+            "Error of {} in space at t = {} s, root mean square in each cell, {}. {}",
             run.name,
             number(*worst),
             shown.meaning,

@@ -179,8 +179,9 @@ pub struct Reached {
     pub seconds: Option<f64>,
     /// These over those of the fastest of all schemes.
     pub ratio: Option<f64>,
-    /// Whether `steps` or `mesh` makes the larger part of its error, if that is known.
-    pub ruled_by: Option<&'static str>,
+    /// The larger part of its error, that of `steps` or of `mesh`, if the study separates them.
+    #[serde(rename = "ruled_by")]
+    pub dominant_error: Option<&'static str>,
 }
 
 /// What effects cost and change.

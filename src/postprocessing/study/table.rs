@@ -139,12 +139,12 @@ fn errors(results: &Results, norm: usize) -> Table {
     let mut header = vec!["run", "error", "relative"];
     let split = results.runs.iter().any(|run| part(run, norm).is_some());
     if split {
-        header.extend(["of steps", "of mesh"]);
+        header.extend(["error of steps", "error of mesh"]);
     }
     header.extend(names.iter().map(String::as_str));
     header.push("theory");
     if shown.is_published {
-        header.extend(["published", "its order", "ours/published"]);
+        header.extend(["published", "published order", "computed/published"]);
     }
     header.push("digits/s");
     let mut table = Table::new(format!("{}   [{}]", shown.meaning, shown.name), &header);
@@ -201,10 +201,10 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
 /// For each norm what its errors take: a row a scheme, seconds with the run that took them.
 fn targets(results: &Results) -> Vec<Table> {
     let header =
-        ["error", "scheme", "run", "its error", "ruled by", "steps", "computing s", "over the fastest"];
+        ["target", "scheme", "run", "error", "dominant error", "steps", "computing s", "relative time"];
     let mut tables: Vec<Table> = Vec::new();
     for target in &results.targets {
-        let title = format!("What it takes   [{}]", target.norm);
+        let title = format!("Fastest runs for target errors   [{}]", target.norm);
         if tables.last().is_none_or(|table| table.title != title) {
             tables.push(Table::new(title, &header));
         }
@@ -215,7 +215,7 @@ fn targets(results: &Results) -> Vec<Table> {
                 reached.scheme.clone(),
                 reached.run.clone().unwrap_or_else(|| "none".into()),
                 optional(reached.error, |error| format!("{error:.2e}")),
-                reached.ruled_by.unwrap_or("-").into(),
+                reached.dominant_error.unwrap_or("-").into(),
                 optional(reached.steps, |steps| steps.to_string()),
                 optional(reached.seconds, |s| format!("{s:.3}")),
                 optional(reached.ratio, |ratio| format!("{ratio:.1}")),
@@ -230,7 +230,7 @@ fn costs(results: &Results) -> Table {
         "run",
         "unknowns",
         "steps",
-        "taken back",
+        "rejected",
         "unknowns*steps",
         "set-ups",
         "newton",
@@ -239,7 +239,8 @@ fn costs(results: &Results) -> Table {
         "computing s",
         "solve s",
     ];
-    let mut table = Table::new("Costs   [wall seconds; computing is without writing files]", &header);
+    let mut table =
+        Table::new("Costs   [wall time in seconds; computing excludes the writing of files]", &header);
     for run in results.runs.iter().chain(&results.reference) {
         table.rows.push(cost_cells(run));
     }
@@ -272,8 +273,10 @@ fn tolerances(results: &Results) -> Table {
     let names: Vec<&str> = results.norms.iter().map(|norm| norm.name.as_str()).collect();
     let mut header = vec!["run", "tolerance", "computing s"];
     header.extend(&names);
-    let mut table =
-        Table::new("Change by the solver's tolerance, over the error that is left at the tightest", &header);
+    let mut table = Table::new(
+        "Change by the solver's tolerance, relative to the error at the tightest tolerance",
+        &header,
+    );
     for row in &results.tolerances {
         let mut cells = vec![
             row.run.clone(),
@@ -292,7 +295,9 @@ fn tolerances(results: &Results) -> Table {
         cells.resize(header.len(), "-".into());
         table.rows.push(cells);
     }
-    table.notes.push("!: above a tenth, the solver's error shows beside the discretisation's".into());
+    table
+        .notes
+        .push("!: above 0.1, the solver's error is not negligible beside the discretisation error".into());
     table
 }
 
@@ -300,7 +305,7 @@ fn ablation(results: &Results) -> Option<Table> {
     let ablation = results.ablation.as_ref()?;
     let header =
         ["without", "computing s", "saved s", "displacement (V)", "velocity (H)", "stress (Q)", "status"];
-    let title = "Effects switched off one by one   [relative change of the answer at the end]";
+    let title = "Effects switched off one by one   [relative change of the results at the end]";
     let mut table = Table::new(title, &header);
     let whole = optional(ablation.seconds, |s| format!("{s:.3}"));
     let status = ablation.error.clone().unwrap_or_else(|| "completed".into());

@@ -32,7 +32,7 @@ fn fastest(runs: &[RunResult], line: &str, norm: usize, target: f64) -> Reached 
     let good = |run: &&RunResult| run.line() == line && error(run).is_some_and(|error| error <= target);
     let best = runs.iter().filter(good).filter_map(|run| Some((run, seconds(run)?)));
     let best = best.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(run, _)| run);
-    let ruled_by = best.and_then(|run| {
+    let dominant_error = best.and_then(|run| {
         let error = run.errors.get(norm)?.as_ref()?;
         Some(if error.of_steps? > error.of_mesh? { "steps" } else { "mesh" })
     });
@@ -43,6 +43,6 @@ fn fastest(runs: &[RunResult], line: &str, norm: usize, target: f64) -> Reached 
         steps: best.map(|run| run.counts.steps),
         seconds: best.and_then(seconds),
         ratio: None,
-        ruled_by,
+        dominant_error,
     }
 }
