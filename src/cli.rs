@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Exit, Result},
     io::{
-        output::{inspect::inspect, parallel_file::given_up},
+        output::{inspect::inspect, parallel_file::was_abandoned},
         partitioned,
     },
     job::{self, Job, Loaded},
@@ -372,7 +372,7 @@ fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit
     let session = mpi.session()?;
     let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
     let exit = session.agree(work(&session, clock)).unwrap_or_else(|error| printed(&session, &error));
-    if exit != Exit::Done && given_up() {
+    if exit != Exit::Done && was_abandoned() {
         session.world().barrier();
         std::process::exit(i32::from(exit as u8));
     }

@@ -248,7 +248,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// law bounds; `None` if it nowhere does.
     pub fn slip_pressure(&self, state: &State) -> Result<Option<f64>> {
         let mut weakening =
-            self.contacts.iter().filter(|contact| contact.unknown_fall().is_some()).peekable();
+            self.contacts.iter().filter(|contact| contact.decrease_per_pressure().is_some()).peekable();
         if weakening.peek().is_none() {
             return Ok(None);
         }

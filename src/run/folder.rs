@@ -20,7 +20,7 @@ const SHOWN: usize = 8;
 pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()> {
     let folder = job.output_folder();
     refuse_unwritable(folder)?;
-    log.claim(&folder.join(LOG), false)?;
+    log.lock(&folder.join(LOG), false)?;
     refuse_foreign(job, start)?;
     if *start == Start::Anew { refuse_unfinished(folder) } else { Ok(()) }
 }
@@ -110,7 +110,7 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
 pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);
-    log.claim(&file, true)?;
+    log.lock(&file, true)?;
     log.open(&file, goes_on)?;
     let summary = folder.join(SUMMARY);
     match std::fs::remove_file(&summary) {

@@ -173,7 +173,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
 
     /// Fails if the explicit scheme has produced so much energy that the solution is meaningless.
     fn refuse_growth(&self) -> Result<()> {
-        let made = self.simulation.totals.made_by_scheme();
+        let made = self.simulation.totals.energy_of_scheme();
         let explicit = self.certificates.explicit_step_bound.is_some();
         if !explicit || self.job.solver.accept.contains(&Accept::ExplicitStability) || made <= LARGEST_GROWTH
         {

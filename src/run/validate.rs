@@ -19,7 +19,7 @@ pub(super) fn validate<const D: usize>(
     let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions };
     session.agree(loaded.check_mesh(names))?;
     session.agree(refuse_empty_matrix(mesh, loaded))?;
-    refuse_claims(session, mesh, loaded)?;
+    refuse_conflicts(session, mesh, loaded)?;
     let quality = mesh.quality_summary(session);
     if quality.poor > 0 {
         loaded.warnings.push(format!(
@@ -31,16 +31,20 @@ pub(super) fn validate<const D: usize>(
     Ok(())
 }
 
-fn refuse_claims<const D: usize>(session: &Session, mesh: &Mesh<D>, loaded: &Loaded) -> Result<(), Agreed> {
+fn refuse_conflicts<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    loaded: &Loaded,
+) -> Result<(), Agreed> {
     let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
     let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
-    let claims = mesh.claimed_twice(&supports, &contacts);
-    let more = session.total(claims.count).saturating_sub(1);
+    let conflicts = mesh.conflicts(&supports, &contacts);
+    let more = session.total(conflicts.count).saturating_sub(1);
     let more = if more > 0 { format!(" and at {more} more facets") } else { String::new() };
     let fault = || {
-        loaded.fault("contact.0.on", format!("{}{more}", claims.first), "assign each facet to one of them")
+        loaded.fault("contact.0.on", format!("{}{more}", conflicts.first), "assign each facet to one of them")
     };
-    session.agree(if claims.count == 0 { Ok(()) } else { Err(fault()) })
+    session.agree(if conflicts.count == 0 { Ok(()) } else { Err(fault()) })
 }
 
 /// Refuses a quasistatic body with a rigid motion that neither supports nor contact can hold. Collective.

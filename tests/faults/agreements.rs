@@ -3,7 +3,7 @@
 use crate::{case::Case, mpirun, trials};
 use clarke::{
     error::Exit,
-    io::output::parallel_file::given_up,
+    io::output::parallel_file::was_abandoned,
     job::Job,
     parallel::{
         agreement::{Agreed, fail_at},
@@ -85,7 +85,7 @@ pub fn scenario(words: &str, folder: &Path) {
         println!("all ended alike");
     }
     session.world().barrier();
-    if given_up() {
+    if was_abandoned() {
         std::process::exit(0);
     }
 }

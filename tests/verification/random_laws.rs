@@ -56,7 +56,7 @@ impl Law {
         Self { points, before: numbers.between(-0.5, 3.0), after: numbers.between(-0.5, 3.0) }
     }
 
-    fn steepest_fall(&self) -> f64 {
+    fn steepest_decrease(&self) -> f64 {
         let falls = self.points.windows(2).filter(|p| p[1][0] > p[0][0]);
         let falls = falls.map(|p| (p[0][1] - p[1][1]) / (p[1][0] - p[0][0]));
         falls.fold((-self.before).max(-self.after).max(0.0), f64::max)
@@ -103,7 +103,7 @@ pub fn solve(session: &Session) {
         let law = Law::random(&mut numbers);
         let velocity = numbers.power_of_ten(-3.0, 1.0);
         let step = numbers.power_of_ten(-3.0, 0.0);
-        let fall = law.steepest_fall();
+        let fall = law.steepest_decrease();
         // A fall of 8 Pa s/m leaves theta of a step below 1 for this body at every step.
         let slope = numbers.power_of_ten(-2.0, 0.9);
         let pressure = velocity * if fall > 0.0 { slope / fall } else { numbers.power_of_ten(-1.0, 2.0) };

@@ -32,14 +32,14 @@ pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
 /// Removes all but the newest `keep` checkpoints, and incomplete files of runs that were killed. On one rank.
 pub fn prune(folder: &Path, keep: usize) -> Result<()> {
     let old = list(folder)?.into_iter().skip(keep).map(|(_, path)| path);
-    for path in old.chain(half_written(folder)?) {
+    for path in old.chain(incomplete_files(folder)?) {
         pass()?;
         std::fs::remove_file(&path).map_err(|error| Error::unwritable(&path, error))?;
     }
     Ok(())
 }
 
-fn half_written(folder: &Path) -> Result<Vec<PathBuf>> {
+fn incomplete_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let unreadable = |error| Error::unreadable(folder, error);
     let names = std::fs::read_dir(folder).map_err(unreadable)?.collect::<std::io::Result<Vec<_>>>();
     let is_part = |path: &PathBuf| {

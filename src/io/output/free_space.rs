@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) const TABLES: u64 = 1 << 18;
 
 /// Why a file can't grow by these bytes: the limit of file sizes of this process, or, if it is to look there too, the disk.
-pub(super) fn lacks(path: &Path, more: u64, look_at_disk: bool) -> Result<(), String> {
+pub(super) fn check_space(path: &Path, more: u64, look_at_disk: bool) -> Result<(), String> {
     let length = std::fs::metadata(path).map_or(0, |data| data.len());
     if let Some(limit) =
         getrlimit(Resource::Fsize).current.filter(|limit| length.saturating_add(more) > *limit)
@@ -36,8 +36,8 @@ mod tests {
     fn a_file_may_grow_as_far_as_the_disk_has_room() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
-        assert_eq!(lacks(&file, 1, true), Ok(()));
-        assert!(lacks(&file, 1 << 60, true).unwrap_err().starts_with("No space left on device"));
-        assert_eq!(lacks(&file, 1 << 60, false), Ok(()));
+        assert_eq!(check_space(&file, 1, true), Ok(()));
+        assert!(check_space(&file, 1 << 60, true).unwrap_err().starts_with("No space left on device"));
+        assert_eq!(check_space(&file, 1 << 60, false), Ok(()));
     }
 }

@@ -127,7 +127,7 @@ impl Totals {
     }
 
     /// How many times the energy that came in the scheme has made by itself; 0 where it took some out.
-    pub fn made_by_scheme(&self) -> f64 {
+    pub fn energy_of_scheme(&self) -> f64 {
         let made = larger(-self.energy.numerical, 0.0);
         if made == 0.0 { 0.0 } else { made / self.supplied }
     }

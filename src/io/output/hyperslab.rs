@@ -173,7 +173,7 @@ impl ParallelFile {
         rows: u64,
         width: usize,
     ) -> Result<Rows<'_, T>, Agreed> {
-        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
+        self.require_space(rows.saturating_mul((width * size_of::<T>()) as u64))?;
         let rows = rows as usize;
         let empty = self.new_dataset::<T>().no_chunk();
         let made =
@@ -194,7 +194,7 @@ impl ParallelFile {
         if level == 0 {
             return self.create_rows(name, rows, width);
         }
-        self.need_room(rows.saturating_mul((width * size_of::<T>()) as u64))?;
+        self.require_space(rows.saturating_mul((width * size_of::<T>()) as u64))?;
         let rows = rows as usize;
         let chunk = (CHUNK_BYTES / (width * size_of::<T>())).clamp(1, rows.max(1));
         let empty = self.new_dataset::<T>().shuffle().deflate(level);
@@ -215,7 +215,7 @@ impl ParallelFile {
         width: usize,
         chunk_rows: usize,
     ) -> Result<Rows<'_, T>, Agreed> {
-        self.need_room((chunk_rows * width * size_of::<T>()) as u64)?;
+        self.require_space((chunk_rows * width * size_of::<T>()) as u64)?;
         let empty = self.new_dataset::<T>();
         let growing = Extent { dim: 0, max: None };
         let made = if width == 1 {

@@ -11,7 +11,7 @@ use std::{
 /// Writes lines on rank 0 and nothing elsewhere.
 #[derive(Debug)]
 pub(crate) struct Log {
-    speaks: bool,
+    is_active: bool,
     on_terminal: bool,
     file: Option<File>,
     bar: Option<ProgressBar>,
@@ -20,15 +20,15 @@ pub(crate) struct Log {
 
 impl Log {
     /// A log that writes on rank 0 only and has no file yet; without `on_terminal` its lines go to the file only.
-    pub(crate) fn new(speaks: bool, on_terminal: bool) -> Self {
-        Self { speaks, on_terminal, file: None, bar: None, warnings: Vec::new() }
+    pub(crate) fn new(is_active: bool, on_terminal: bool) -> Self {
+        Self { is_active, on_terminal, file: None, bar: None, warnings: Vec::new() }
     }
 
     /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
     ///
     /// The system releases the lock of a process that was killed. Where files can't be locked, nothing is refused.
-    pub(crate) fn claim(&mut self, path: &Path, create: bool) -> Result<()> {
-        if !self.speaks || self.file.is_some() || !(create || path.exists()) {
+    pub(crate) fn lock(&mut self, path: &Path, create: bool) -> Result<()> {
+        if !self.is_active || self.file.is_some() || !(create || path.exists()) {
             return Ok(());
         }
         let file = OpenOptions::new().create(create).append(true).open(path);
@@ -53,7 +53,7 @@ impl Log {
 
     /// Writes lines.
     pub(crate) fn line(&mut self, words: impl AsRef<str>) {
-        if !self.speaks {
+        if !self.is_active {
             return;
         }
         match &self.bar {
@@ -78,7 +78,7 @@ impl Log {
 
     /// Writes lines to the file and, where no progress bar moves, to the terminal.
     pub(crate) fn quiet_line(&mut self, words: impl AsRef<str>) {
-        if self.speaks {
+        if self.is_active {
             if self.bar.is_none() && self.on_terminal {
                 print_line(words.as_ref());
             }
@@ -95,7 +95,7 @@ impl Log {
 
     /// Shows a progress bar if the output is a terminal.
     pub(crate) fn start_progress(&mut self, steps: u64, taken: u64) {
-        let wanted = self.speaks && self.on_terminal;
+        let wanted = self.is_active && self.on_terminal;
         if wanted && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
             let bar = ProgressBar::new(steps);
             let style = ProgressStyle::with_template(

@@ -10,7 +10,7 @@
 //! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
 //! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks ask for room before they
 //! write (free_space.rs). As MPI closes all files of HDF5 when it ends,
-//! a process that gave a file up leaves without (see [`given_up`]).
+//! a process that gave a file up leaves without (see [`was_abandoned`]).
 
 use super::free_space;
 use crate::error::{Error, Result};
@@ -32,7 +32,7 @@ static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 
 /// Whether a file that could not be written is still open: then the process must end without `MPI_Finalize`. The same on all
 /// ranks that shared the file.
-pub fn given_up() -> bool {
+pub fn was_abandoned() -> bool {
     GIVEN_UP.load(Ordering::Relaxed)
 }
 
@@ -71,7 +71,7 @@ impl ParallelFile {
         communicator: &impl Communicator,
     ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
-        let lacks = free_space::lacks(path, free_space::TABLES, communicator.rank() == 0);
+        let lacks = free_space::check_space(path, free_space::TABLES, communicator.rank() == 0);
         agree(
             &communicator,
             lacks.map_err(|why| Error::Failed(format!("cannot write {}: {why}. {ROOM}", path.display()))),
@@ -124,15 +124,15 @@ impl ParallelFile {
     }
 
     /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
-    pub(super) fn need_room(&self, bytes: u64) -> Result<(), Agreed> {
+    pub(super) fn require_space(&self, bytes: u64) -> Result<(), Agreed> {
         let more = bytes.saturating_add(free_space::TABLES);
-        let lacks = free_space::lacks(&self.path, more, self.communicator.rank() == 0);
+        let lacks = free_space::check_space(&self.path, more, self.communicator.rank() == 0);
         self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
     }
 
     /// Hands everything written so far to the operating system.
     pub fn flush(&self) -> Result<(), Agreed> {
-        self.need_room(0)?;
+        self.require_space(0)?;
         self.written("flush", self.file.flush())
     }
 

@@ -42,7 +42,7 @@ fn table(root: &Node, path: String) -> ContactTable {
             normal: root.read(&key("normal")),
             friction: root.read(&key("friction")),
             has_obstacle: root.find(&key("obstacle")).is_some(),
-            obstacle_moves: obstacle.is_some_and(|obstacle| obstacle.may_drag()),
+            obstacle_moves: obstacle.is_some_and(|obstacle| obstacle.surface_may_move()),
             path,
         },
     }

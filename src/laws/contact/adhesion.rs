@@ -55,13 +55,13 @@ impl Adhesion {
     }
 
     /// The length in m beyond which the traction grows no more; infinite if it always grows.
-    pub fn limit(&self) -> f64 {
+    pub fn truncation_length(&self) -> f64 {
         self.length.unwrap_or(f64::INFINITY)
     }
 
     /// A length in m, cut where the traction grows no more.
-    fn cut(&self, length: f64) -> f64 {
-        length.min(self.limit())
+    fn truncate(&self, length: f64) -> f64 {
+        length.min(self.truncation_length())
     }
 
     /// What can't stand beside bonds, which hold what touches at first to an obstacle at rest; keys are those of the contact's table.
@@ -91,25 +91,25 @@ impl Adhesion {
     }
 
     /// Opening in m, at least zero, and sliding.
-    fn stretch<const D: usize>(displacement: &Vector<D>, normal: &Vector<D>) -> (f64, Vector<D>) {
+    fn opening_and_sliding<const D: usize>(displacement: &Vector<D>, normal: &Vector<D>) -> (f64, Vector<D>) {
         let along = dot(displacement, normal);
         ((-along).max(0.0), add_scaled(displacement, -along, normal))
     }
 
     /// Traction in Pa of whole bonds on the body.
     pub fn traction<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
-        let (opening, sliding) = Self::stretch(displacement, normal);
+        let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let size = norm(&sliding);
-        let cut = if size > self.cut(size) { self.cut(size) / size } else { 1.0 };
-        let pull = normal.map(|n| self.stiffness * self.cut(opening) * n);
+        let cut = if size > self.truncate(size) { self.truncate(size) / size } else { 1.0 };
+        let pull = normal.map(|n| self.stiffness * self.truncate(opening) * n);
         add_scaled(&pull, -self.tangential_stiffness() * cut, &sliding)
     }
 
     /// Energy in J/m² that whole bonds store: the traction is minus its derivative.
     pub fn potential<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
-        let (opening, sliding) = Self::stretch(displacement, normal);
+        let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let of = |length: f64| {
-            let cut = self.cut(length);
+            let cut = self.truncate(length);
             cut * (length - 0.5 * cut)
         };
         self.stiffness * of(opening) + self.tangential_stiffness() * of(norm(&sliding))
@@ -117,19 +117,19 @@ impl Adhesion {
 
     /// What drives debonding, in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
     pub fn drive<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
-        let (opening, sliding) = Self::stretch(displacement, normal);
-        let square = |length: f64| self.cut(length).powi(2);
+        let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
+        let square = |length: f64| self.truncate(length).powi(2);
         self.stiffness * square(opening) + self.tangential_stiffness() * square(norm(&sliding))
     }
 
     /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
     pub fn tangent<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> [Vector<D>; D] {
-        let (opening, sliding) = Self::stretch(displacement, normal);
-        let along = if opening > 0.0 && opening < self.limit() { self.stiffness } else { 0.0 };
+        let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
+        let along = if opening > 0.0 && opening < self.truncation_length() { self.stiffness } else { 0.0 };
         let size = norm(&sliding);
         // Beyond the bond's length only the direction of the traction changes.
-        let (across, radial) = if size > self.limit() {
-            let across = self.tangential_stiffness() * self.limit() / size;
+        let (across, radial) = if size > self.truncation_length() {
+            let across = self.tangential_stiffness() * self.truncation_length() / size;
             (across, across / (size * size))
         } else {
             (self.tangential_stiffness(), 0.0)
@@ -144,9 +144,10 @@ impl Adhesion {
 
     /// The derivative of [`Adhesion::drive`] by the displacement, in J/m^3.
     pub fn drive_gradient<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
-        let (opening, sliding) = Self::stretch(displacement, normal);
-        let along = if opening < self.limit() { -2.0 * self.stiffness * opening } else { 0.0 };
-        let across = if norm(&sliding) > self.limit() { 0.0 } else { 2.0 * self.tangential_stiffness() };
+        let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
+        let along = if opening < self.truncation_length() { -2.0 * self.stiffness * opening } else { 0.0 };
+        let across =
+            if norm(&sliding) > self.truncation_length() { 0.0 } else { 2.0 * self.tangential_stiffness() };
         add_scaled(&normal.map(|n| along * n), across, &sliding)
     }
 
@@ -251,8 +252,8 @@ mod tests {
         #[test]
         fn tangent_and_gradient_of_the_drive_are_derivatives(u in proptest::array::uniform3(-0.5f64..0.5)) {
             let normal = [0.6, 0.0, -0.8];
-            let (opening, sliding) = Adhesion::stretch(&u, &normal);
-            let corners = [opening, opening - GLUE.limit(), norm(&sliding) - GLUE.limit()];
+            let (opening, sliding) = Adhesion::opening_and_sliding(&u, &normal);
+            let corners = [opening, opening - GLUE.truncation_length(), norm(&sliding) - GLUE.truncation_length()];
             prop_assume!(corners.iter().all(|corner| corner.abs() > 1e-4) || opening == 0.0 && corners[2].abs() > 1e-4);
             prop_assume!(dot(&u, &normal).abs() > 1e-4);
             let (tangent, gradient) = (GLUE.tangent(&u, &normal), GLUE.drive_gradient(&u, &normal));

@@ -2,7 +2,7 @@
 //!
 //! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g`
 //! never rises with the velocity. Along the direction of sliding this is a scalar graph with a jump at rest and a fall of at
-//! most [`steepest_fall`](FrictionBound::steepest_fall) times the contact pressure: its relaxed monotonicity constant. For a `c`
+//! most [`steepest_decrease`](FrictionBound::steepest_decrease) times the contact pressure: its relaxed monotonicity constant. For a `c`
 //! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
 //! radial, so that `s` as a vector has the direction of both velocity and traction.
 
@@ -49,7 +49,7 @@ pub trait FrictionBound {
 
     /// The steepest fall of the coefficient with the sliding velocity, in s/m: times the contact pressure it is the relaxed
     /// monotonicity constant.
-    fn steepest_fall(&self) -> f64 {
+    fn steepest_decrease(&self) -> f64 {
         0.0
     }
 
@@ -69,8 +69,11 @@ pub trait FrictionBound {
         if at_rest > 0.0 && s <= at_rest {
             return Slip { speed: 0.0, traction: s, derivative: 0.0, slope: 0.0, coefficient: 0.0 };
         }
-        let speed =
-            if self.steepest_fall() == 0.0 { (s - at_rest) / c } else { sliding_speed(self, s, c, pressure) };
+        let speed = if self.steepest_decrease() == 0.0 {
+            (s - at_rest) / c
+        } else {
+            sliding_speed(self, s, c, pressure)
+        };
         let slope = self.slope(speed, pressure);
         Slip {
             speed,
@@ -128,7 +131,7 @@ macro_rules! friction_laws {
                 bound(speed: f64, pressure: f64) -> f64;
                 slope(speed: f64, pressure: f64) -> f64;
                 follows_pressure() -> bool;
-                steepest_fall() -> f64;
+                steepest_decrease() -> f64;
                 corner_velocity() -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;

@@ -190,9 +190,9 @@ mod tests {
         fn laws_conform(law in any_law(), pressure in -1.0f64..5.0, speed in 0.001f64..3.0, other in 0.0f64..3.0) {
             let h = 1e-6;
             let by_value = (law.bound(speed + h, pressure) - law.bound(speed - h, pressure)) / (2.0 * h);
-            prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_fall()));
+            prop_assert!((by_value - law.slope(speed, pressure)).abs() < 1e-4 * (1.0 + law.steepest_decrease()));
             let rise = (law.bound(speed, pressure) - law.bound(other, pressure)) * (speed - other);
-            let fall = law.steepest_fall() * pressure.max(0.0);
+            let fall = law.steepest_decrease() * pressure.max(0.0);
             prop_assert!(rise <= 1e-15 && rise >= -fall * (speed - other) * (speed - other) - 1e-12);
             if law.follows_pressure() && pressure.abs() > 1e-5 {
                 let by_pressure = (law.bound(speed, pressure + h) - law.bound(speed, pressure - h)) / (2.0 * h);
@@ -205,7 +205,7 @@ mod tests {
         fn the_resolvent_finds_every_point_of_the_graph(
             law in any_law(), pressure in -1.0f64..5.0, s in 0.0f64..20.0, more in 1.05f64..5.0,
         ) {
-            let c = more * law.steepest_fall() * pressure.max(0.0) + 0.1;
+            let c = more * law.steepest_decrease() * pressure.max(0.0) + 0.1;
             let found = law.resolve(s, c, pressure);
             prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
             if found.speed > 0.0 {

@@ -53,25 +53,25 @@ pub struct ObstacleMotion<const D: usize> {
     velocity: Vector<D>,
     centre: Vector<D>,
     /// Angular velocity in rad/s.
-    spin: Vector<3>,
+    angular_velocity: Vector<3>,
 }
 
 impl<const D: usize> ObstacleMotion<D> {
     /// Whether the motion is a translation.
     fn is_translation(&self) -> bool {
-        self.spin == [0.0; 3]
+        self.angular_velocity == [0.0; 3]
     }
 
     /// Velocity in m/s of the obstacle's material at a place.
-    fn at(&self, place: &Vector<D>) -> Vector<D> {
+    fn velocity_at(&self, place: &Vector<D>) -> Vector<D> {
         let arm = add_scaled(place, -1.0, &self.centre);
-        add_scaled(&self.velocity, 1.0, &in_plane(&cross(&self.spin, &in_space(&arm))))
+        add_scaled(&self.velocity, 1.0, &in_plane(&cross(&self.angular_velocity, &in_space(&arm))))
     }
 }
 
 impl Gap {
     /// Whether the obstacle's material may move; false for a distance, whose motion is part of the gap.
-    pub fn may_drag(&self) -> bool {
+    pub fn surface_may_move(&self) -> bool {
         let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
         let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());
         match self {
@@ -97,46 +97,53 @@ impl Gap {
         }
         let reach = self.at(time, place, normal)?;
         let reach = if reach.is_finite() { reach } else { 0.0 };
-        Ok(motion.at(&add_scaled(place, reach, normal)))
+        Ok(motion.velocity_at(&add_scaled(place, reach, normal)))
     }
 
     /// The motion of the obstacle at the end of a step; at rest without one.
     pub fn motion<const D: usize>(&self, rate: Rate) -> Result<ObstacleMotion<D>> {
         let time = rate.time;
-        let spinning = |rotation: &Option<Scalar>| rotation.as_ref().map_or(0.0, |r| r.evaluate(time, &[]));
+        let rotation_rate =
+            |rotation: &Option<Scalar>| rotation.as_ref().map_or(0.0, |r| r.evaluate(time, &[]));
         let motion = match self {
             Self::Distance(_) => {
-                return Ok(ObstacleMotion { velocity: [0.0; D], centre: [0.0; D], spin: [0.0; 3] });
+                return Ok(ObstacleMotion {
+                    velocity: [0.0; D],
+                    centre: [0.0; D],
+                    angular_velocity: [0.0; 3],
+                });
             }
             Self::Plane(Plane { point, normal, rotation }) => {
                 let unit = |time| {
                     let normal = in_space(&vector::<D>(normal, time));
                     normal.map(|x| x / norm(&normal))
                 };
-                let (facing, rotation) = (unit(time), spinning(rotation));
+                let (facing, rotation) = (unit(time), rotation_rate(rotation));
                 let tilt = cross(&facing, &rate.of(unit));
                 ObstacleMotion {
                     velocity: rate.of(|time| vector(point, time)),
                     centre: vector(point, time),
-                    spin: add_scaled(&tilt, rotation, &facing),
+                    angular_velocity: add_scaled(&tilt, rotation, &facing),
                 }
             }
             Self::Sphere(sphere) => {
-                let (centre, axis, rotation) = (&sphere.centre, sphere.axis(), spinning(&sphere.rotation));
-                let spin = if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
+                let (centre, axis, rotation) =
+                    (&sphere.centre, sphere.axis(), rotation_rate(&sphere.rotation));
+                let angular_velocity =
+                    if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
                 ObstacleMotion {
                     velocity: rate.of(|time| vector(centre, time)),
                     centre: vector(centre, time),
-                    spin,
+                    angular_velocity,
                 }
             }
         };
-        if motion.velocity.iter().chain(&motion.spin).all(|x| x.is_finite()) {
+        if motion.velocity.iter().chain(&motion.angular_velocity).all(|x| x.is_finite()) {
             return Ok(motion);
         }
         Err(Error::Failed(format!(
             "contact: the obstacle moves at {:?} m/s and turns at {:?} rad/s at t = {time} s; correct [contact.obstacle]",
-            motion.velocity, motion.spin
+            motion.velocity, motion.angular_velocity
         )))
     }
 }
@@ -174,8 +181,8 @@ mod tests {
         let point = vec![expression("2*t"), Scalar::Number(-1.0)];
         let belt = Gap::Plane(Plane { point, normal: numbers(&[0.0, 3.0]), rotation: None });
         let motion = belt.motion::<2>(STEP).unwrap();
-        assert!(belt.may_drag() && motion.is_translation());
-        assert_eq!([motion.at(&[0.0, -1.0]), motion.at(&[9.0, -1.0])], [[2.0, 0.0]; 2]);
+        assert!(belt.surface_may_move() && motion.is_translation());
+        assert_eq!([motion.velocity_at(&[0.0, -1.0]), motion.velocity_at(&[9.0, -1.0])], [[2.0, 0.0]; 2]);
     }
 
     #[test]
@@ -188,7 +195,8 @@ mod tests {
         });
         let fine = Rate::euler(0.5, 1e-6);
         let along = [0.5f64.cos(), 0.5f64.sin()];
-        let found = tilting.motion::<2>(fine).unwrap().at(&[1.0 + 3.0 * along[0], 2.0 + 3.0 * along[1]]);
+        let found =
+            tilting.motion::<2>(fine).unwrap().velocity_at(&[1.0 + 3.0 * along[0], 2.0 + 3.0 * along[1]]);
         assert!(
             (found[0] + 3.0 * along[1]).abs() < 1e-5 && (found[1] - 3.0 * along[0]).abs() < 1e-5,
             "{found:?}"
@@ -203,9 +211,9 @@ mod tests {
             rotation: Some(expression("6*t")),
         });
         let motion = disc.motion::<3>(STEP).unwrap();
-        assert!(disc.may_drag() && !motion.is_translation());
-        assert_eq!(motion.at(&[1.5, 1.0, 0.0]), [0.0, 1.5, 0.0]);
-        assert_eq!(motion.at(&[1.0, 1.5, 0.0]), [-1.5, 0.0, 0.0]);
+        assert!(disc.surface_may_move() && !motion.is_translation());
+        assert_eq!(motion.velocity_at(&[1.5, 1.0, 0.0]), [0.0, 1.5, 0.0]);
+        assert_eq!(motion.velocity_at(&[1.0, 1.5, 0.0]), [-1.5, 0.0, 0.0]);
     }
 
     #[test]
@@ -221,20 +229,26 @@ mod tests {
             })
         };
         let flat = roller(&[], vec![expression("2*t"), Scalar::Number(0.5)]).motion::<2>(STEP).unwrap();
-        assert_eq!([flat.at(&[1.0, 0.0]), flat.at(&[1.0, 1.0])], [[0.0, 0.0], [4.0, 0.0]]);
+        assert_eq!([flat.velocity_at(&[1.0, 0.0]), flat.velocity_at(&[1.0, 1.0])], [[0.0, 0.0], [4.0, 0.0]]);
         let ball =
             roller(&[0.0, -2.0, 0.0], vec![expression("2*t"), Scalar::Number(7.0), Scalar::Number(0.5)]);
         let ball = ball.motion::<3>(STEP).unwrap();
-        assert_eq!([ball.at(&[1.0, 7.0, 0.0]), ball.at(&[1.0, 7.0, 1.0])], [[0.0; 3], [4.0, 0.0, 0.0]]);
+        assert_eq!(
+            [ball.velocity_at(&[1.0, 7.0, 0.0]), ball.velocity_at(&[1.0, 7.0, 1.0])],
+            [[0.0; 3], [4.0, 0.0, 0.0]]
+        );
     }
 
     #[test]
     fn what_rests_drags_nothing_and_what_has_no_velocity_is_refused() {
         let floor =
             Gap::Plane(Plane { point: numbers(&[0.0, 0.0]), normal: numbers(&[0.0, 1.0]), rotation: None });
-        assert!(!floor.may_drag() && !Gap::Distance(expression("0.1*t")).may_drag());
-        assert_eq!(floor.motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
-        assert_eq!(Gap::Distance(expression("0.1*t")).motion::<2>(STEP).unwrap().at(&[3.0, 0.0]), [0.0, 0.0]);
+        assert!(!floor.surface_may_move() && !Gap::Distance(expression("0.1*t")).surface_may_move());
+        assert_eq!(floor.motion::<2>(STEP).unwrap().velocity_at(&[3.0, 0.0]), [0.0, 0.0]);
+        assert_eq!(
+            Gap::Distance(expression("0.1*t")).motion::<2>(STEP).unwrap().velocity_at(&[3.0, 0.0]),
+            [0.0, 0.0]
+        );
         let bad = Gap::Sphere(Sphere {
             centre: numbers(&[0.0, 0.0]),
             radius: 1.0,

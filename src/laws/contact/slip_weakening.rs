@@ -30,10 +30,10 @@ impl FrictionBound for SlipWeakening {
     }
 
     fn slope(&self, speed: f64, pressure: f64) -> f64 {
-        -self.steepest_fall() * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
+        -self.steepest_decrease() * (-speed / self.decay_velocity).exp() * pressure.max(0.0)
     }
 
-    fn steepest_fall(&self) -> f64 {
+    fn steepest_decrease(&self) -> f64 {
         (self.at_rest - self.dynamic) / self.decay_velocity
     }
 
@@ -59,6 +59,6 @@ mod tests {
         let law = SlipWeakening { at_rest: 0.6, dynamic: 0.2, decay_velocity: 0.5 };
         assert!((law.bound(0.0, 10.0) - 6.0).abs() < 1e-15);
         assert!((law.bound(0.5, 10.0) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
-        assert!((law.steepest_fall() - 0.8).abs() < 1e-15);
+        assert!((law.steepest_decrease() - 0.8).abs() < 1e-15);
     }
 }

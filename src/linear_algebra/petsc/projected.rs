@@ -142,7 +142,11 @@ impl ProjectedKsp {
 
     /// Reads the current subspace; returns whether the preconditioner belongs to another subspace, and whether it was rebuilt for
     /// this one. Collective.
-    fn look(&mut self, operator: &mut dyn ProjectedOperator, like: &DistributedVector) -> Result<[bool; 2]> {
+    fn update_subspace(
+        &mut self,
+        operator: &mut dyn ProjectedOperator,
+        like: &DistributedVector,
+    ) -> Result<[bool; 2]> {
         let Some(constant) = &self.constant else { return Ok([false; 2]) };
         if self.refresh_threshold == usize::MAX || !operator.may_project() {
             return Ok([false; 2]);
@@ -151,7 +155,7 @@ impl ProjectedKsp {
             Some(reduced) => reduced,
             none => none.insert(ReducedMatrix::new(constant, like, self.block)?),
         };
-        let stale = reduced.look(|column| operator.project(column))?;
+        let stale = reduced.update_projection(|column| operator.project(column))?;
         if !std::mem::take(&mut self.first) {
             return Ok([stale && self.reducing, false]);
         }
@@ -179,7 +183,7 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        self.looking_at(operator, right_hand_side, |solver, stale| {
+        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
             solver.solve_attached(right_hand_side, solution, stale)
         })
     }
@@ -191,7 +195,7 @@ impl ProjectedKsp {
         right_hand_side: &DistributedVector,
         solution: &mut DistributedVector,
     ) -> Result<ProjectedOutcome> {
-        self.looking_at(operator, right_hand_side, |solver, stale| {
+        self.solve_on_subspace(operator, right_hand_side, |solver, stale| {
             solver.solve_by_gmres(right_hand_side, solution, stale)
         })
     }
@@ -212,13 +216,13 @@ impl ProjectedKsp {
     }
 
     /// Reads the subspace, then runs a solve; its argument is whether the preconditioner belongs to another subspace.
-    fn looking_at(
+    fn solve_on_subspace(
         &mut self,
         operator: &mut dyn ProjectedOperator,
         like: &DistributedVector,
         solve: impl FnOnce(&mut Self, bool) -> Result<ProjectedOutcome>,
     ) -> Result<ProjectedOutcome> {
-        let [stale, refreshed] = self.look(operator, like)?;
+        let [stale, refreshed] = self.update_subspace(operator, like)?;
         let outcome = self.attached(operator, |solver| solve(solver, stale))?;
         Ok(ProjectedOutcome { refreshed: refreshed || outcome.refreshed, ..outcome })
     }

@@ -60,7 +60,7 @@ impl ReducedMatrix {
     }
 
     /// Reads the current projection; returns whether the matrix was computed for another one. Collective.
-    pub(super) fn look(
+    pub(super) fn update_projection(
         &mut self,
         mut project: impl FnMut(&mut DistributedVector) -> Result<()>,
     ) -> Result<bool> {

@@ -81,7 +81,7 @@ impl Rectangle {
         self.diagonal == Diagonal::Crossed
     }
 
-    fn leans_right(&self, [i, j]: [usize; 2]) -> bool {
+    fn has_right_diagonal(&self, [i, j]: [usize; 2]) -> bool {
         match self.diagonal {
             Diagonal::Right => true,
             Diagonal::Left => false,
@@ -90,14 +90,14 @@ impl Rectangle {
     }
 
     /// The triangle of a quadrilateral that holds its left, right, bottom or top edge.
-    fn behind(&self, side: usize, at: [usize; 2]) -> usize {
+    fn triangle_at_side(&self, side: usize, at: [usize; 2]) -> usize {
         match (self.crossed(), side) {
             (true, LEFT) => 3,
             (true, RIGHT) => 1,
             (true, BOTTOM) | (false, BOTTOM) => 0,
             (true, _) => 2,
-            (false, LEFT) => self.leans_right(at) as usize,
-            (false, RIGHT) => !self.leans_right(at) as usize,
+            (false, LEFT) => self.has_right_diagonal(at) as usize,
+            (false, RIGHT) => !self.has_right_diagonal(at) as usize,
             (false, _) => 1,
         }
     }
@@ -121,7 +121,7 @@ impl Rectangle {
                 piece.named.push([side as u32, piece.facets.len() as u32]);
                 piece.facet_ids.push((first + k) as u32);
                 piece.facets.push([local.corner(a), local.corner(b)]);
-                piece.facet_cells.push(local.triangle([i, j], self.behind(side, at)));
+                piece.facet_cells.push(local.triangle([i, j], self.triangle_at_side(side, at)));
             }
             first += whole[along];
         }
@@ -188,7 +188,7 @@ impl Grid<2> for Rectangle {
                     piece.cells.extend_from_slice(&[a, b, m, b, c, m, c, d, m, d, a, m]);
                 } else {
                     piece.cell_ids.extend(first..first + 2);
-                    let right = self.leans_right([i, j]);
+                    let right = self.has_right_diagonal([i, j]);
                     piece.cells.extend(if right { [a, b, c, a, c, d] } else { [a, b, d, b, c, d] });
                 }
             }

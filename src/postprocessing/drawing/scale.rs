@@ -35,7 +35,7 @@ impl Scale {
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let first = (low / step - 1e-9).ceil() as i64;
         let last = (high / step + 1e-9).floor() as i64;
-        let tick = |n: i64| (n as f64 * step, with_minus(format!("{:.decimals$}", n as f64 * step)));
+        let tick = |n: i64| (n as f64 * step, with_minus_sign(format!("{:.decimals$}", n as f64 * step)));
         let power = (exponent != 0).then(|| power_of_ten(exponent));
         Self { low, high, ticks: (first..=last).map(tick).collect(), factor, logarithmic: false, power }
     }
@@ -112,12 +112,12 @@ pub fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 || (1e-3..1e6).contains(&size) {
         let decimals = if size == 0.0 { 0 } else { (4 - size.log10().floor() as i32).max(0) as usize };
-        return with_minus(trimmed(&format!("{value:.decimals$}")).to_owned());
+        return with_minus_sign(without_trailing_zeros(&format!("{value:.decimals$}")).to_owned());
     }
     let text = format!("{value:.3e}");
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let power = power_of_ten(exponent.parse().unwrap_or(0));
-    with_minus(format!("{} × {power}", trimmed(digits)))
+    with_minus_sign(format!("{} × {power}", without_trailing_zeros(digits)))
 }
 
 /// A rounded number as text: three significant digits.
@@ -127,11 +127,11 @@ pub fn size(value: f64) -> String {
 }
 
 /// Without trailing zeros.
-fn trimmed(digits: &str) -> &str {
+fn without_trailing_zeros(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
 
-fn with_minus(digits: String) -> String {
+fn with_minus_sign(digits: String) -> String {
     if digits.starts_with('-') && digits.contains(|c: char| ('1'..='9').contains(&c)) {
         digits.replacen('-', "−", 1)
     } else {

@@ -49,7 +49,7 @@ pub(super) struct Found {
 impl Found {
     /// Reads the available files. A folder that does not belong to a run is refused.
     pub(super) fn read(folder: &Path) -> Result<Self> {
-        refuse_what_is_no_run(folder)?;
+        refuse_other_paths(folder)?;
         let mut found = Self { folder: folder.to_owned(), ..Self::default() };
         found.text = found.take("job.toml", "the job, its contact laws and tolerances", |path| {
             std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))
@@ -106,7 +106,7 @@ impl Found {
     }
 }
 
-fn refuse_what_is_no_run(folder: &Path) -> Result<()> {
+fn refuse_other_paths(folder: &Path) -> Result<()> {
     let shown = folder.display();
     let refuse = |words: String| Err(Error::Refused(words));
     if !folder.exists() {

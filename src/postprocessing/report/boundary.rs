@@ -81,7 +81,7 @@ impl<'a> Boundary<'a> {
         if dimension == 2 {
             let (order, arc) = along_curve(&boundary.points);
             boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
-            (boundary.table, boundary.arc) = (boundary.table.picked(&order), arc);
+            (boundary.table, boundary.arc) = (boundary.table.select_rows(&order), arc);
         }
         if let Some(snapshot) = snapshot.filter(|snapshot| snapshot.time == time) {
             boundary.behind = boundary.nodes_of(snapshot).map(|nodes| {

@@ -49,7 +49,7 @@ impl Law {
         length: f64,
         (point, normal): (&[f64; 3], &[f64; 3]),
     ) -> [f64; 3] {
-        let moving = self.gap.as_ref().filter(|gap| gap.may_drag());
+        let moving = self.gap.as_ref().filter(|gap| gap.surface_may_move());
         let velocity = moving.and_then(|gap| {
             let motion = gap.motion(Rate::euler(time, length)).ok()?;
             gap.velocity_along(&motion, time, point, normal).ok()

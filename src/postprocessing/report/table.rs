@@ -108,11 +108,11 @@ impl Table {
     }
 
     fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
-        self.picked(&(0..self.rows.len()).filter(|at| keep(*at)).collect::<Vec<_>>())
+        self.select_rows(&(0..self.rows.len()).filter(|at| keep(*at)).collect::<Vec<_>>())
     }
 
     /// The rows with these numbers, in this order.
-    pub(super) fn picked(&self, rows: &[usize]) -> Self {
+    pub(super) fn select_rows(&self, rows: &[usize]) -> Self {
         Self {
             header: self.header.clone(),
             rows: rows.iter().map(|at| self.rows[*at].clone()).collect(),

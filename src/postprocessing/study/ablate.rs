@@ -7,7 +7,7 @@ use super::{
     document::{Norm, Over, Quantity, Space},
     execute::{Outcome, execute},
     measure::Target,
-    plan::{Plan, Planned, trim},
+    plan::{Plan, Planned, remove_unused_output},
     record::Record,
     results::{Ablation, EffectResult},
     seconds_of,
@@ -189,7 +189,7 @@ fn run(
     mut loaded: Loaded,
     say: &dyn Fn(&str),
 ) -> Result<Option<Record>> {
-    trim(&mut loaded.job, &folder(plan).join(name));
+    remove_unused_output(&mut loaded.job, &folder(plan).join(name));
     loaded.job.output.fields = None;
     let job = &loaded.job;
     let planned = Planned {

@@ -228,7 +228,7 @@ impl Source<'_> {
             }
             taken.push(name.clone());
         }
-        trim(job, &output.join("runs").join(&name));
+        remove_unused_output(job, &output.join("runs").join(&name));
         Ok(Planned {
             cells,
             step: job.time.step,
@@ -268,7 +268,7 @@ impl Source<'_> {
             if cells == own || found.iter().any(|other| other.cells == *cells) {
                 continue;
             }
-            let name = format!("reference-{}", by(cells));
+            let name = format!("reference-{}", cells_name(cells));
             let run = Run { cells: Some(cells.clone()), ..reference.clone() };
             found.push(self.planned(&run, Some(&name), output, &mut Vec::new())?);
         }
@@ -277,12 +277,12 @@ impl Source<'_> {
 }
 
 /// Numbers of cells as names have them.
-fn by(cells: &[u32]) -> String {
+fn cells_name(cells: &[u32]) -> String {
     cells.iter().map(u32::to_string).collect::<Vec<_>>().join("x")
 }
 
 /// Removes what a study does not use, and directs the files of the run to its own folder.
-pub(super) fn trim(job: &mut Job, folder: &Path) {
+pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
     job.output.profile.clear();
     job.checkpoint = None;
@@ -298,7 +298,7 @@ fn called(run: &Run, fixed_name: Option<&str>) -> String {
 
 fn default_name(job: &Job, cells: &[u32], run: &Run) -> String {
     let mut parts = vec![job.time.scheme.name().to_owned()];
-    parts.extend((!cells.is_empty()).then(|| by(cells)));
+    parts.extend((!cells.is_empty()).then(|| cells_name(cells)));
     parts.push(run.adaptive.map_or(job.time.step.to_string(), |tolerance| format!("adaptive-{tolerance}")));
     parts.extend(run.tolerance.map(|tolerance| format!("{tolerance:e}")));
     parts.join("-")

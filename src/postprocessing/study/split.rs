@@ -25,7 +25,7 @@ pub(super) fn add_parts(
         Ok(compared.errors(session, &plan.study.norm)?.measured)
     };
     for (at, run) in plan.runs.iter().enumerate().filter(|(_, run)| run.cells == reference.cells) {
-        if plan.study.compare.split && is_like_base(run) {
+        if plan.study.compare.split && keeps_physics(run) {
             for error in results.runs[at].errors.iter_mut().take(plan.study.norm.len()).flatten() {
                 (error.of_steps, error.of_mesh) = (Some(error.error), Some(0.0));
             }
@@ -34,7 +34,7 @@ pub(super) fn add_parts(
     for (planned, made) in plan.split.iter().zip(on_meshes).filter(|(_, made)| made.record.is_complete()) {
         let of_mesh = distance(planned, reference, made.record.dimension)?;
         for (at, run) in plan.runs.iter().enumerate() {
-            if run.cells != planned.cells || results.runs[at].error.is_some() || !is_like_base(run) {
+            if run.cells != planned.cells || results.runs[at].error.is_some() || !keeps_physics(run) {
                 continue;
             }
             let of_steps = distance(run, planned, ran[at].record.dimension)?;
@@ -49,7 +49,7 @@ pub(super) fn add_parts(
 }
 
 /// Whether a run differs from the base job by mesh, steps and solver only.
-fn is_like_base(run: &Planned) -> bool {
+fn keeps_physics(run: &Planned) -> bool {
     let concerns = |set: &String, table: &str| set.trim_start().starts_with(table);
     run.set.iter().all(|set| ["time.", "solver."].iter().any(|table| concerns(set, table)))
 }

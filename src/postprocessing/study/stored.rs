@@ -149,7 +149,7 @@ impl<const D: usize> StoredFields<D> {
         })
     }
 
-    /// The values at a time: of the step at that time, or between two steps the straight line between them.
+    /// The values at a time: of the step at that time, or between two steps, interpolated linearly.
     pub(super) fn values_at(&self, of: Quantity, time: f64) -> Result<Values<D>> {
         let behind = self.times.partition_point(|t| *t < time * (1.0 - SAME_TIME));
         let Some(&next) = self.times.get(behind) else {
@@ -161,7 +161,7 @@ impl<const D: usize> StoredFields<D> {
             return Ok(later);
         }
         let share = (time - self.times[behind - 1]) / (next - self.times[behind - 1]);
-        Ok(between(&self.values(of, behind - 1)?, &later, share))
+        Ok(interpolate(&self.values(of, behind - 1)?, &later, share))
     }
 
     /// Whether there is a step at this time.
@@ -170,7 +170,7 @@ impl<const D: usize> StoredFields<D> {
     }
 }
 
-fn between<const D: usize>(one: &Values<D>, other: &Values<D>, share: f64) -> Values<D> {
+fn interpolate<const D: usize>(one: &Values<D>, other: &Values<D>, share: f64) -> Values<D> {
     fn mix<const N: usize>(a: &[[f64; N]], b: &[[f64; N]], share: f64) -> Vec<[f64; N]> {
         let line =
             |(a, b): (&[f64; N], &[f64; N])| std::array::from_fn(|i| (1.0 - share) * a[i] + share * b[i]);

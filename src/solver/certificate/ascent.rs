@@ -22,11 +22,11 @@ pub(super) trait Quotient {
     fn value(&self, values: &[f64]) -> f64;
 }
 
-/// What an ascent found.
-pub(super) struct Peak {
+/// The result of an iteration.
+pub(super) struct Maximum {
     /// The result, approached from below.
     pub value: f64,
-    /// Where it was found.
+    /// The maximiser.
     pub vector: DistributedVector,
 }
 
@@ -63,7 +63,7 @@ impl Direction {
     }
 }
 
-/// When an ascent ends.
+/// Convergence limits.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     /// Relative change of the result that ends an ascent when two successive iterations stay below it.
@@ -72,19 +72,19 @@ pub(super) struct Limits {
     pub iterations: usize,
 }
 
-/// Climbs from `start`; the first iteration also searches along `beside`. Collective.
-pub(super) fn climb(
+/// Maximises the quotient from `start`; the first iteration also searches along `beside`. Collective.
+pub(super) fn maximise(
     session: &Session,
     quotient: &mut dyn Quotient,
     start: DistributedVector,
     beside: Option<DistributedVector>,
     limits: Limits,
-) -> Result<Peak> {
+) -> Result<Maximum> {
     let mut current = Direction::new(quotient, start)?;
     let mut previous = beside.map(|vector| Direction::new(quotient, vector)).transpose()?;
-    let mut values = diagonal(&grams(session, &[&current])?, 0);
+    let mut values = diagonal(&gram_matrices(session, &[&current])?, 0);
     let mut peak = quotient.value(&values);
-    let mut calm = 0;
+    let mut settled = 0;
     for _ in 0..limits.iterations {
         let (numerator, denominator) = quotient.weights(&values);
         let ratio = weighted(&numerator, &values) / weighted(&denominator, &values);
@@ -100,10 +100,10 @@ pub(super) fn climb(
         let step = Direction::new(quotient, step)?;
         let mut basis = vec![&current, &step];
         basis.extend(previous.as_ref());
-        let grams = grams(session, &basis)?;
+        let grams = gram_matrices(session, &basis)?;
         let best = (2..=basis.len()).rev().find_map(|n| {
-            let (b, c) = (mix(&grams, &numerator), mix(&grams, &denominator));
-            best_of(&b, &c, n)
+            let (b, c) = (weighted_sum(&grams, &numerator), weighted_sum(&grams, &denominator));
+            best_combination(&b, &c, n)
         });
         let Some(factors) = best else { break };
         let count = basis.len().min(factors.len());
@@ -114,16 +114,17 @@ pub(super) fn climb(
         let value = quotient.value(&values);
         let change = ((value - peak) / value).abs();
         peak = value;
-        calm = if change < limits.tolerance { calm + 1 } else { 0 };
-        if calm == 2 {
+        settled = if change < limits.tolerance { settled + 1 } else { 0 };
+        if settled == 2 {
             break;
         }
     }
-    Ok(Peak { value: peak, vector: current.vector })
+    Ok(Maximum { value: peak, vector: current.vector })
 }
 
-/// The best combination of the first `n` directions, each brought to length 1 in the denominator first.
-fn best_of(b: &Small, c: &Small, n: usize) -> Option<[f64; 3]> {
+/// The combination of the first `n` directions with the largest quotient. The directions are scaled to unit norm in the denominator
+/// first.
+fn best_combination(b: &Small, c: &Small, n: usize) -> Option<[f64; 3]> {
     let scale: [f64; 3] = std::array::from_fn(|i| if i < n { 1.0 / c[i][i].sqrt() } else { 0.0 });
     if !scale.iter().all(|s| s.is_finite()) {
         return None;
@@ -135,7 +136,7 @@ fn best_of(b: &Small, c: &Small, n: usize) -> Option<[f64; 3]> {
     Some(std::array::from_fn(|i| y[i] * scale[i]))
 }
 
-fn mix(grams: &[Small], weights: &[f64]) -> Small {
+fn weighted_sum(grams: &[Small], weights: &[f64]) -> Small {
     std::array::from_fn(|i| {
         std::array::from_fn(|j| grams.iter().zip(weights).map(|(gram, weight)| weight * gram[i][j]).sum())
     })
@@ -153,8 +154,8 @@ fn diagonal(grams: &[Small], at: usize) -> Vec<f64> {
     grams.iter().map(|gram| gram[at][at]).collect()
 }
 
-/// All products of the directions in each form, by one reduction. Collective.
-fn grams(session: &Session, basis: &[&Direction]) -> Result<Vec<Small>> {
+/// The Gram matrix of the directions for each form, by one reduction. Collective.
+fn gram_matrices(session: &Session, basis: &[&Direction]) -> Result<Vec<Small>> {
     let forms = basis[0].images.len();
     let mut mine = vec![0.0; forms * 9];
     for form in 0..forms {

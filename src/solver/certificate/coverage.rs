@@ -17,7 +17,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
                 .into(),
         );
     }
-    for fall in contacts.iter().filter_map(Contact::unknown_fall) {
+    for fall in contacts.iter().filter_map(Contact::decrease_per_pressure) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
             // Where nothing else falls, theta is proportional to the pressure.
             let each = match theta_step {

@@ -53,11 +53,11 @@ pub(super) fn apply<const D: usize, const S: usize>(
         add(&x, &mut y);
     }
     y.add_ghosts_to_owners()?;
-    hold(body, y)
+    clear_fixed_components(body, y)
 }
 
 /// Zeroes the held components.
-pub(super) fn hold<const D: usize, const S: usize>(
+pub(super) fn clear_fixed_components<const D: usize, const S: usize>(
     body: &Body<D, S>,
     y: &mut DistributedVector,
 ) -> Result<()> {

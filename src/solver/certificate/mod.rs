@@ -4,30 +4,31 @@
 //! |---|---|---|
 //! | `theta` | sup of `sum (m_j int w_nu^2 + m_t int w_tau^2)` over `(A e(w), e(w))` | below 1 the continuous problem has one solution; a sharper form of (13) of Wang and Cheng (2022) |
 //! | `theta_step` | sup of `sum (m_j S_nu(w) + m_t S_tau(w))` over `(K w, w)`, `K` the matrix of a step | below 1 each step has one solution; tends to 0 with the step |
-//! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) asks for `m_A > m_j \|gamma\|^2` |
-//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less; of power laws at an overstress of the yield stress, and in each step at the largest one | steps beyond it grow without bound |
-//! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; there if something flows | below it errors don't grow, however much flows: elastic and viscoplastic stress of the step before add up (exact without inertia, where all flows) |
+//! | `trace_norm_squared` | sup of `int w_nu^2` over `int e(w):e(w)` | `\|gamma\|^2` of the normal trace; (13) requires `m_A > m_j \|gamma\|^2` |
+//! | `explicit_step_bound` | least `k` with `k^2 (E e(w), e(w)) >= 4 (M w, w) + 2 k (A e(w), e(w))` for some `w`, or twice the inverse of the fastest viscoplastic relaxation (in the paper `4 lambda` over the largest eigenvalue of `E`) if that is less; for power laws at an overstress equal to the yield stress, and in each step at its largest overstress | errors of longer steps grow without bound |
+//! | `flowing_step_bound` | inverse of `1/k_E + 1/k_G`, of the two bounds in the row above; with viscoplastic flow only | for shorter steps errors do not grow, however much of the body flows: the elastic and viscoplastic stresses of the previous step add up (exact without inertia if the whole body flows) |
 //!
 //! `S_nu(w)` and `S_tau(w)` are the integrals of `w_nu^2` and `w_tau^2` as the step sums them: over its quadrature points, with the
 //! weights and the directions with which contact and friction act there. At Gauss points `S_nu` is the integral. At nodes it is
 //! more, up to three times in the plane and four times in space where the velocity changes its sign from node to node.
 //!
-//! Implicit schemes have no explicit bound; their `K` holds the elastic stiffness, too: `theta_step` below 1 speaks of steps in
-//! which nothing flows.
+//! Implicit schemes have no explicit bound. Their `K` contains the elastic stiffness, too: `theta_step` below 1 is a statement on
+//! steps without viscoplastic flow.
 //!
-//! `growth_constants` are the `c0` and `c1` of the growth condition `|dj(r)| <= c0 + c1 |r|` that existence rests on: valid for all
-//! contact laws, the least `c1` first. A rigid obstacle has none, its graph ends in a vertical ray: there existence rests on its
-//! graph being monotone. Nor has a law of the displacement.
+//! `growth_constants` are the `c0` and `c1` of the growth condition `|dj(r)| <= c0 + c1 |r|`, on which existence is based: the
+//! smallest `c1`, then the smallest `c0`, that hold for all contact laws. A rigid obstacle has no growth constants, because its
+//! graph ends in a vertical ray; there, existence follows from the monotonicity of the graph. Laws that depend on the displacement
+//! have none either.
 //!
-//! `m_j` is the steepest fall of a contact graph, `m_t` that of a friction graph (slip weakening: the fall of the coefficient
-//! times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. Where the normal law has no
-//! largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1 with that fall,
-//! `1 / sup of sum fall S_tau(w)` over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))`; a run is held against it. Suprema
-//! run over velocities that the supports allow. Numerically they are approached from below, to about 1e-6 of their size: what is
-//! said of one solution keeps a margin of 1e-3 ([`Certificates::MARGIN`]). On meshes of more than 10,000 velocity
-//! components `explicit_step_bound` is the least of the bounds of single cells, which is never too large, unless a step of the
-//! run is longer than that. Where a region of the body has no
-//! viscosity, `m_A` is 0 and `theta` has no meaning.
+//! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the
+//! coefficient times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. If the normal law has
+//! no largest pressure, `slip_pressure_bound` is the pressure up to which `theta_step` stays below 1, `1 / sup of sum d S_tau(w)`
+//! over `(K w, w) - sum (m_j S_nu(w) + m_t S_tau(w))` with the decrease `d` of the coefficient; the run compares its pressures with
+//! this bound. Suprema are taken over the velocities that the supports allow. The numerical values approach them from below, with a
+//! relative error of about 1e-6; statements on the uniqueness of solutions keep a margin of 1e-3 ([`Certificates::MARGIN`]). On
+//! meshes with more than 10,000 velocity components `explicit_step_bound` is the smallest of the bounds of single cells, which is
+//! never too large, unless a step of the run is longer than that. If a region of the body has no viscosity, `m_A` is 0 and `theta`
+//! has no meaning.
 
 mod ascent;
 mod cells;
@@ -54,9 +55,9 @@ use crate::{
 use coverage::not_covered;
 use suprema::{Suprema, Supremum};
 
-/// Velocity components up to which the sharp bound of explicit steps costs next to nothing.
+/// Number of velocity components up to which the cost of the sharp bound of explicit steps is negligible.
 const SMALL: usize = 10_000;
-/// A trace norm |gamma|^2 beyond this many times the length of the body comes from a rigid motion, blurred by rounding.
+/// A trace norm |gamma|^2 of more than this multiple of the length of the body is caused by a rigid motion and rounding errors.
 const RIGID: f64 = 1e10;
 
 impl Certificates {
@@ -69,7 +70,7 @@ impl Certificates {
         scheme: &mut Stepper,
         longest: f64,
     ) -> Result<Self> {
-        let falls = body.contacts.iter().map(|c| c.known_falls().into_iter().fold(0.0, f64::max));
+        let falls = body.contacts.iter().map(|c| c.monotonicity_constants().into_iter().fold(0.0, f64::max));
         let growth = growth(&body.contacts);
         let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
@@ -91,7 +92,7 @@ impl Certificates {
             known.trace_norm_squared = Some(find(Supremum::TraceNorm)?)
                 .filter(|norm| *norm < RIGID * length(session, &body.mesh.nodes));
         }
-        if body.contacts.iter().any(|contact| contact.unknown_fall().is_some()) {
+        if body.contacts.iter().any(|contact| contact.decrease_per_pressure().is_some()) {
             let bound = if known.steps_are_unique() {
                 (1.0 - Self::MARGIN) / find(Supremum::SlipPressure)?
             } else {

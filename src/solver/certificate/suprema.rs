@@ -2,7 +2,7 @@
 
 use super::{
     Certificates,
-    ascent::{Limits, Quotient, climb},
+    ascent::{Limits, Quotient, maximise},
     cells::stable_step,
     forms,
 };
@@ -14,14 +14,14 @@ use crate::{
     solver::stepping::Stepper,
 };
 
-/// When the supremum of the explicit step counts as found.
-const OF_EXPLICIT_STEPS: Limits = Limits { tolerance: 1e-5, iterations: 60 };
-/// When a supremum over the motion of the contact boundary counts as found.
-const OF_CONTACT: Limits = Limits { tolerance: 1e-8, iterations: 200 };
-/// `theta_step` of the largest step that is suggested: its digits are rounded.
-const FAR_BELOW: f64 = 1.0 - 2.0 * Certificates::MARGIN;
+/// Convergence limits for the supremum of the explicit step.
+const EXPLICIT_STEP_LIMITS: Limits = Limits { tolerance: 1e-5, iterations: 60 };
+/// Convergence limits for suprema over the motion of the contact boundary.
+const CONTACT_LIMITS: Limits = Limits { tolerance: 1e-8, iterations: 200 };
+/// `theta_step` of the suggested largest step; the distance from 1 allows for the rounding of its digits.
+const SUGGESTED_THETA_STEP: f64 = 1.0 - 2.0 * Certificates::MARGIN;
 
-/// Which supremum is sought.
+/// The supremum to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Supremum {
     Theta,
@@ -34,16 +34,16 @@ pub(super) enum Supremum {
     SlipPressure,
 }
 
-/// Finds suprema for a body and a scheme that is prepared for its step. Suprema over the motion of the contact boundary lie
-/// near each other: each ascent starts where the last one ended.
+/// Computes suprema for a body and a scheme that is prepared for its step. Suprema over the motion of the contact boundary have
+/// similar maximisers: each iteration starts from the last one.
 pub(super) struct Suprema<'a, const D: usize, const S: usize> {
     session: &'a Session,
     body: &'a Body<D, S>,
     state: &'a State,
     scheme: &'a mut Stepper,
-    /// The response to a unit pull at the whole contact boundary.
-    pulled: Option<DistributedVector>,
-    /// Where the last supremum was found.
+    /// The response to a unit load on the whole contact boundary.
+    contact_response: Option<DistributedVector>,
+    /// The maximiser of the last supremum.
     peak: Option<DistributedVector>,
 }
 
@@ -54,7 +54,7 @@ impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
         state: &'a State,
         scheme: &'a mut Stepper,
     ) -> Self {
-        Self { session, body, state, scheme, pulled: None, peak: None }
+        Self { session, body, state, scheme, contact_response: None, peak: None }
     }
 
     /// Approaches the supremum from below. Collective.
@@ -62,24 +62,24 @@ impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
         let (session, body, state) = (self.session, self.body, self.state);
         let mut pencil = Pencil { body, scheme: &mut *self.scheme, supremum };
         if supremum == Supremum::ExplicitStep {
-            let start = rough(body, state)?;
-            return Ok(climb(session, &mut pencil, start, None, OF_EXPLICIT_STEPS)?.value);
+            let start = pseudorandom_vector(body, state)?;
+            return Ok(maximise(session, &mut pencil, start, None, EXPLICIT_STEP_LIMITS)?.value);
         }
-        let pulled = match &self.pulled {
-            Some(pulled) => copy(pulled)?,
+        let contact_response = match &self.contact_response {
+            Some(contact_response) => copy(contact_response)?,
             None => {
-                let pull = pull(body, state)?;
-                let mut pulled = pull.like()?;
-                pencil.precondition(&pull, &mut pulled)?;
-                self.pulled = Some(copy(&pulled)?);
-                pulled
+                let load = contact_load(body, state)?;
+                let mut contact_response = load.like()?;
+                pencil.precondition(&load, &mut contact_response)?;
+                self.contact_response = Some(copy(&contact_response)?);
+                contact_response
             }
         };
         let (start, beside) = match self.peak.take() {
-            Some(peak) => (peak, Some(pulled)),
-            None => (pulled, None),
+            Some(peak) => (peak, Some(contact_response)),
+            None => (contact_response, None),
         };
-        let peak = climb(session, &mut pencil, start, beside, OF_CONTACT)?;
+        let peak = maximise(session, &mut pencil, start, beside, CONTACT_LIMITS)?;
         self.peak = Some(peak.vector);
         Ok(peak.value)
     }
@@ -117,14 +117,18 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (supremum, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let falls = contact.known_falls();
+                        let falls = contact.monotonicity_constants();
                         match (supremum, form) {
                             (Supremum::TraceNorm, _) => {
                                 forms::add_trace(&body.mesh, contact, [1.0, 0.0], x, y)
                             }
                             (Supremum::Theta, _) => forms::add_trace(&body.mesh, contact, falls, x, y),
                             (Supremum::SlipPressure, 0) => {
-                                contact.add_squares([0.0, contact.unknown_fall().unwrap_or(0.0)], x, y);
+                                contact.add_squares(
+                                    [0.0, contact.decrease_per_pressure().unwrap_or(0.0)],
+                                    x,
+                                    y,
+                                );
                             }
                             _ => contact.add_squares(falls, x, y),
                         }
@@ -137,7 +141,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
         self.scheme.precondition(r, z)?;
-        forms::hold(self.body, z)
+        forms::clear_fixed_components(self.body, z)
     }
 
     fn weights(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
@@ -146,7 +150,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
                 let k = stable_step(values[0], values[1], values[2]);
                 (vec![k * k, 0.0, 0.0], vec![0.0, 4.0, 2.0 * k])
             }
-            Supremum::UniqueStep => (vec![1.0 / FAR_BELOW, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
+            Supremum::UniqueStep => (vec![1.0 / SUGGESTED_THETA_STEP, -1.0, 0.0], vec![0.0, 0.0, 1.0]),
             Supremum::SlipPressure => (vec![1.0, 0.0, 0.0], vec![0.0, 1.0, -1.0]),
             Supremum::Theta | Supremum::ThetaStep | Supremum::TraceNorm => (vec![1.0, 0.0], vec![0.0, 1.0]),
         }
@@ -155,16 +159,19 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
     fn value(&self, values: &[f64]) -> f64 {
         match self.supremum {
             Supremum::ExplicitStep => 1.0 / stable_step(values[0], values[1], values[2]),
-            Supremum::UniqueStep => (values[0] / FAR_BELOW - values[1]) / values[2],
+            Supremum::UniqueStep => (values[0] / SUGGESTED_THETA_STEP - values[1]) / values[2],
             Supremum::SlipPressure => values[0] / (values[1] - values[2]),
             Supremum::Theta | Supremum::ThetaStep | Supremum::TraceNorm => values[0] / values[1],
         }
     }
 }
 
-/// A start that pulls the whole contact boundary outward, and along where there is friction.
-fn pull<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
-    let mut out = rough(body, state)?;
+/// A load on the whole contact boundary in the normal direction, and in a tangential direction where there is friction.
+fn contact_load<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<DistributedVector> {
+    let mut out = pseudorandom_vector(body, state)?;
     let mut values = out.owned_mut()?;
     values.iter_mut().for_each(|value| *value *= 1e-2);
     for contact in &body.contacts {
@@ -176,8 +183,11 @@ fn pull<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Res
     Ok(out)
 }
 
-/// A start with a share of every mode: numbers between -1 and 1 that depend on the node's id alone.
-fn rough<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Result<DistributedVector> {
+/// A start vector with a component of every mode: pseudorandom numbers between -1 and 1, computed from the ids of the nodes.
+fn pseudorandom_vector<const D: usize, const S: usize>(
+    body: &Body<D, S>,
+    state: &State,
+) -> Result<DistributedVector> {
     let mut out = state.velocity.like()?;
     {
         let mut values = out.owned_mut()?;
@@ -189,6 +199,6 @@ fn rough<const D: usize, const S: usize>(body: &Body<D, S>, state: &State) -> Re
             }
         }
     }
-    forms::hold(body, &mut out)?;
+    forms::clear_fixed_components(body, &mut out)?;
     Ok(out)
 }

@@ -316,7 +316,9 @@ fn explain(outcome: &NonlinearOutcome, effort: &Effort) -> String {
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
 fn write_largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
     let falls = |contact: &Contact<D>| match contact.friction() {
-        Some(law) if law.steepest_fall() > 0.0 => session.largest([contact.steepest_friction_fall()])[0],
+        Some(law) if law.steepest_decrease() > 0.0 => {
+            session.largest([contact.steepest_friction_decrease()])[0]
+        }
         _ => 0.0,
     };
     out.clear();

@@ -345,8 +345,8 @@ impl StepSolver {
         // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
         // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;
-        if body.contacts.iter().any(Contact::may_drift) {
-            let mine = body.contacts.iter().map(Contact::drift_square).sum();
+        if body.contacts.iter().any(Contact::has_moving_obstacle) {
+            let mine = body.contacts.iter().map(Contact::obstacle_velocity_square).sum();
             motion += session.sum([mine])[0].sqrt();
         }
         let product = f64::EPSILON * self.matrix_norm * motion;

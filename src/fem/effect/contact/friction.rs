@@ -38,7 +38,7 @@ pub(super) struct Friction<const D: usize> {
     pub follows: bool,
     pub points: Vec<TangentialPoint<D>>,
     /// Velocity in m/s of the obstacle along the tangents of each point; empty where the obstacle does not move.
-    pub drift: Vec<Vector<D>>,
+    pub obstacle_velocities: Vec<Vector<D>>,
     /// Tangents that supports fix beside free ones, with the points of the contact; empty where the obstacle does not move.
     pub held: Vec<(usize, Vector<D>)>,
 }
@@ -98,7 +98,14 @@ impl<const D: usize> Friction<D> {
             });
         }
         let follows = law.follows_pressure();
-        Ok(Self { law, scale: 1.0, follows, points: out, drift: Vec::new(), held: held_tangents })
+        Ok(Self {
+            law,
+            scale: 1.0,
+            follows,
+            points: out,
+            obstacle_velocities: Vec::new(),
+            held: held_tangents,
+        })
     }
 
     /// Removes points that have no tangent.
@@ -122,7 +129,7 @@ impl<const D: usize> Friction<D> {
     /// Converts velocities into unknowns.
     pub(super) fn unmap(&self, values: &mut [f64]) {
         self.points.iter().for_each(|point| point.add(Newton, 1.0 / self.scale, &point.traction, values));
-        self.add_drift(-1.0, values);
+        self.add_obstacle_velocities(-1.0, values);
     }
 
     /// Converts unknowns into velocities, after `points` have computed their pressures.
@@ -146,13 +153,13 @@ impl<const D: usize> Friction<D> {
             let back = unknown.map(|x| shares[0] * x);
             point.set(&back, values);
         }
-        self.add_drift(1.0, values);
+        self.add_obstacle_velocities(1.0, values);
     }
 
     /// Adds to nodal values a multiple of the obstacle's velocity along the tangents.
-    fn add_drift(&self, factor: f64, values: &mut [f64]) {
-        let pairs = self.points.iter().zip(&self.drift);
-        pairs.for_each(|(point, drift)| point.add(Newton, factor, drift, values));
+    fn add_obstacle_velocities(&self, factor: f64, values: &mut [f64]) {
+        let pairs = self.points.iter().zip(&self.obstacle_velocities);
+        pairs.for_each(|(point, obstacle)| point.add(Newton, factor, obstacle, values));
     }
 
     /// The points with their sliding velocities.
@@ -163,8 +170,8 @@ impl<const D: usize> Friction<D> {
     ) -> impl Iterator<Item = (&TangentialPoint<D>, Vector<D>)> {
         self.points.iter().enumerate().map(move |(at, point)| {
             let along = point.along(vectors, velocity);
-            let drift = self.drift.get(at);
-            (point, drift.map_or(along, |drift| std::array::from_fn(|i| along[i] - drift[i])))
+            let obstacle = self.obstacle_velocities.get(at);
+            (point, obstacle.map_or(along, |obstacle| std::array::from_fn(|i| along[i] - obstacle[i])))
         })
     }
 
@@ -290,9 +297,9 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
-    pub(super) fn steepest_fall(&self) -> f64 {
+    pub(super) fn steepest_decrease(&self) -> f64 {
         let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
-        self.law.steepest_fall() * most
+        self.law.steepest_decrease() * most
     }
 
     /// The state of each point, at velocities in a vector of Newton's method.
@@ -322,15 +329,20 @@ impl<const D: usize> Friction<D> {
 
     /// Power in W of the obstacle's friction on the body.
     pub(super) fn driving_power(&self) -> f64 {
-        let given = self.points.iter().zip(&self.drift).map(|(p, drift)| p.weight * dot(&p.traction, drift));
+        let given = self
+            .points
+            .iter()
+            .zip(&self.obstacle_velocities)
+            .map(|(p, obstacle)| p.weight * dot(&p.traction, obstacle));
         -given.sum::<f64>()
     }
 
     /// Largest sliding velocity and largest traction or bound at points on this rank, at velocities in a vector of Newton's method.
     pub(super) fn range(&self, points: &[Point<D>], velocity: &[f64]) -> [f64; 2] {
         // Sliding that is slower than the rounding of the obstacle's velocity is a rounding error.
-        let drift = self.drift.iter().fold(0.0, |most, drift| larger(most, norm(drift)));
-        self.sliding(Newton, velocity).fold([ROUNDING * drift, 0.0], |[v, q], (point, sliding)| {
+        let obstacle =
+            self.obstacle_velocities.iter().fold(0.0, |most, obstacle| larger(most, norm(obstacle)));
+        self.sliding(Newton, velocity).fold([ROUNDING * obstacle, 0.0], |[v, q], (point, sliding)| {
             let bound = self.law.bound(0.0, points[point.at].pressure);
             [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })

@@ -29,7 +29,7 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
-        self.set_drift(Rate::euler(time, length))
+        self.set_obstacle_velocities(Rate::euler(time, length))
     }
 
     /// To be called after [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of
@@ -47,7 +47,7 @@ impl<const D: usize> Contact<D> {
         let before = step.time - step.length;
         let recent = [before, blend.recent / blend.length];
         let earlier = [before - step.previous_length, blend.earlier / blend.length];
-        self.set_drift(Rate { time: step.time, before: [recent, earlier] })
+        self.set_obstacle_velocities(Rate { time: step.time, before: [recent, earlier] })
     }
 
     /// Sets the pressures to those of the converged state, given its nodal tractions at the owned nodes of the body.
@@ -61,26 +61,28 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
-    pub fn may_drift(&self) -> bool {
-        self.friction.is_some() && self.gap.may_drag()
+    pub fn has_moving_obstacle(&self) -> bool {
+        self.friction.is_some() && self.gap.surface_may_move()
     }
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
-    pub fn drift_square(&self) -> f64 {
-        let drift = self.friction.iter().flat_map(|friction| &friction.drift);
-        drift.map(|drift| dot(drift, drift)).sum()
+    pub fn obstacle_velocity_square(&self) -> f64 {
+        let obstacle = self.friction.iter().flat_map(|friction| &friction.obstacle_velocities);
+        obstacle.map(|obstacle| dot(obstacle, obstacle)).sum()
     }
 
     /// Evaluates the velocity of the obstacle along the boundary in a step, for friction. Refuses supports that fix one tangent
     /// of a point along this motion and leave another free: the direction of sliding depends on both, but only the free one is an
     /// unknown. Where supports fix all tangents, friction has no effect.
-    fn set_drift(&mut self, rate: Rate) -> Result<()> {
-        let Some(friction) = self.friction.as_mut().filter(|_| self.gap.may_drag()) else { return Ok(()) };
+    fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
+        let Some(friction) = self.friction.as_mut().filter(|_| self.gap.surface_may_move()) else {
+            return Ok(());
+        };
         let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
         let velocity = |point: &Point<D>| gap.velocity_along(&motion, rate.time, &point.place, &point.normal);
-        friction.drift.clear();
+        friction.obstacle_velocities.clear();
         for point in &friction.points {
-            friction.drift.push(point.part(&velocity(&points[point.at])?));
+            friction.obstacle_velocities.push(point.part(&velocity(&points[point.at])?));
         }
         for (at, tangent) in &friction.held {
             let (point, velocity) = (&points[*at], velocity(&points[*at])?);

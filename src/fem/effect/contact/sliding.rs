@@ -18,7 +18,7 @@ impl<const D: usize> Contact<D> {
                 "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.points, self.gap.may_drag(), mesh, fixed)?);
+        self.friction = Some(Friction::new(law, &self.points, self.gap.surface_may_move(), mesh, fixed)?);
         Ok(())
     }
 
@@ -54,22 +54,22 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
-    pub fn steepest_friction_fall(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, Friction::steepest_fall)
+    pub fn steepest_friction_decrease(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
     }
 
     /// The steepest descents in Pa s/m of the normal and of the friction graph, as far as they are known before a step. Friction
-    /// that depends on an unbounded pressure counts as not descending; see [`unknown_fall`](Self::unknown_fall).
-    pub fn known_falls(&self) -> [f64; 2] {
-        let friction = self.friction().map_or(0.0, |friction| friction.steepest_fall());
+    /// that depends on an unbounded pressure counts as not descending; see [`decrease_per_pressure`](Self::decrease_per_pressure).
+    pub fn monotonicity_constants(&self) -> [f64; 2] {
+        let friction = self.friction().map_or(0.0, |friction| friction.steepest_decrease());
         let most = self.law.greatest_pressure();
         let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
         [self.law.monotonicity_constant(), tangential]
     }
 
     /// The steepest descent of the friction coefficient in s/m, where the pressure that multiplies it is unbounded.
-    pub fn unknown_fall(&self) -> Option<f64> {
-        let fall = self.friction()?.steepest_fall();
+    pub fn decrease_per_pressure(&self) -> Option<f64> {
+        let fall = self.friction()?.steepest_decrease();
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 

@@ -67,7 +67,7 @@ impl Elastic<DruckerPrager> {
     pub fn strain_rate<const S: usize>(&self, s: &Mandel<S>) -> Mandel<S> {
         let mut out = [0.0; S];
         let (mean, size) = mean_and_deviator(s);
-        let beyond = self.beyond(mean, size);
+        let beyond = self.yield_function(mean, size);
         if beyond <= 0.0 {
             return out;
         }
@@ -88,7 +88,7 @@ impl Elastic<DruckerPrager> {
     }
 
     /// `sqrt(J2) + alpha p - c`.
-    fn beyond(&self, mean: f64, size: f64) -> f64 {
+    fn yield_function(&self, mean: f64, size: f64) -> f64 {
         size * FRAC_1_SQRT_2 + self.parameters.friction_coefficient * mean - self.parameters.cohesion
     }
 
@@ -259,7 +259,7 @@ mod tests {
         let scale = 1.0 + dot(s, s) + dot(other, other);
         let (near, inside) = (law.project(s), law.project(other));
         let (mean, size) = mean_and_deviator(&near);
-        assert!(law.beyond(mean, size) <= 1e-12 * scale, "in the cone");
+        assert!(law.yield_function(mean, size) <= 1e-12 * scale, "in the cone");
         let away = add_scaled(s, -1.0, &near);
         assert!(dot(&away, &add_scaled(&inside, -1.0, &near)) <= 1e-12 * scale, "nearest");
         assert!(dot(s, &law.strain_rate(s)) >= -1e-14 * scale, "dissipation");

@@ -123,7 +123,7 @@ impl Flow for Elastic<Perzyna> {
         } else {
             self.elasticity.shear * n
         };
-        self.pace(overstress) * modulus + self.hardening_rate::<S>(overstress)
+        self.rate_factor(overstress) * modulus + self.hardening_rate::<S>(overstress)
     }
 
     fn is_power_law(&self) -> bool {

@@ -28,7 +28,7 @@ impl Elastic<Perzyna> {
         };
         let share = if S == 3 { 2.0 * (self.skewness() / 9.0).cbrt().max(1.0) } else { 2.0 / 3.0 };
         let power = if n == 1.0 { 1.0 } else { n + (n - 1.0) * overstress };
-        self.pace(overstress) * share * power * modulus
+        self.rate_factor(overstress) * share * power * modulus
     }
 }
 

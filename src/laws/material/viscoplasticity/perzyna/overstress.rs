@@ -70,7 +70,7 @@ impl Elastic<Perzyna> {
         if norm <= yield_stress {
             return out;
         }
-        let factor = self.pace(norm / yield_stress - 1.0);
+        let factor = self.rate_factor(norm / yield_stress - 1.0);
         let projected = self.project_outside(s, norm);
         for c in 0..S {
             out[c] = factor * (s[c] - projected[c]);
@@ -79,10 +79,10 @@ impl Elastic<Perzyna> {
     }
 
     /// `r^(n - 1) / (2 lambda)` at an overstress of `r` times the yield stress.
-    pub(super) fn pace(&self, overstress: f64) -> f64 {
+    pub(super) fn rate_factor(&self, overstress: f64) -> f64 {
         let Perzyna { relaxation, exponent, .. } = self.parameters;
-        let pace = 0.5 / relaxation;
-        if exponent == 1.0 { pace } else { pace * overstress.powf(exponent - 1.0) }
+        let rate_factor = 0.5 / relaxation;
+        if exponent == 1.0 { rate_factor } else { rate_factor * overstress.powf(exponent - 1.0) }
     }
 
     /// How far the metric is from that in which the projection is radial, in plane stress: the ratio of its eigenvalues, at
