@@ -1,4 +1,4 @@
-//! The reference of every key, from the structs.
+//! The reference of all keys, generated from the structs.
 
 use serde_json::Value;
 
@@ -12,15 +12,15 @@ const WIDTH: usize = 100;
 struct Table {
     /// Keys joined by dots.
     path: String,
-    /// Written with two brackets, any number of times.
+    /// Whether the table is written with two brackets and may occur several times.
     several: bool,
-    /// Each key's own text: its name and its lines.
+    /// The name and the text of each key.
     keys: Vec<(&'static str, String)>,
     meaning: String,
 }
 
-/// Every key of the tables at or below `table` (of all if `None`), or the one key it names: meaning, unit, range, default,
-/// example.
+/// Meaning, unit, range, default and example of all keys of `table` and the tables below it (of all tables if `None`), or of the
+/// single key that `table` names.
 pub fn describe(table: Option<&str>) -> Result<String> {
     describe_kind(Kind::job(), table)
 }
@@ -177,7 +177,7 @@ fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -
     text
 }
 
-/// What may stand here, in words.
+/// The accepted kind of value, in words.
 pub(super) fn kind(schema: Schema) -> String {
     let alternatives = schema.alternatives();
     if !alternatives.is_empty() {

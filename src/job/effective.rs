@@ -1,4 +1,4 @@
-//! The job as it was run: every default spelled out, and what of it changes the answer.
+//! The effective job, with all defaults, and the part of it that affects the results.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::{Job, Mesh};
 use crate::error::{Error, Result};
 
-/// Keys that don't change the answer, and all below them. The same mesh may stand in several files: its content is compared
-/// by whoever read it.
+/// Keys that, like all keys below them, do not affect the results. A mesh file is among them, because several files may contain the
+/// same mesh: the code that reads the mesh compares its contents.
 const NO_PHYSICS: &[&str] = &[
     "about",
     "check",
@@ -28,7 +28,7 @@ const NO_PHYSICS: &[&str] = &[
 ];
 
 impl Job {
-    /// 2 or 3; `None` for a mesh file, which has to be read first.
+    /// The dimension, 2 or 3; `None` for a mesh file, which has to be read first.
     pub fn dimension(&self) -> Option<usize> {
         match self.mesh {
             Mesh::Rectangle(_) => Some(2),
@@ -37,7 +37,7 @@ impl Job {
         }
     }
 
-    /// The mesh's file, if it has one.
+    /// The mesh file, if there is one.
     pub fn mesh_file(&self) -> Option<&Path> {
         match &self.mesh {
             Mesh::File(path) => Some(path),
@@ -45,19 +45,19 @@ impl Job {
         }
     }
 
-    /// Where the run leaves its files.
+    /// The output folder.
     pub fn output_folder(&self) -> &Path {
         self.output.folder.as_deref().unwrap_or(Path::new("out"))
     }
 
-    /// The effective job: every default spelled out. Loaded from a file in the output folder it equals this job.
+    /// The effective job as TOML, with all defaults. Loaded from a file in the output folder, it equals this job.
     pub fn to_toml(&self) -> Result<String> {
         let mut job = self.clone();
         job.output.folder = Some(PathBuf::from("."));
         toml::to_string(&job).map_err(|error| Error::Internal(format!("the job can't be written: {error}")))
     }
 
-    /// Everything that changes the answer: keys joined by dots, and their values as TOML.
+    /// All keys that affect the results, joined by dots, with their values as TOML.
     pub fn physics(&self) -> Result<BTreeMap<String, String>> {
         let mut job = self.clone();
         job.output.folder = None;
@@ -90,7 +90,7 @@ fn flatten(path: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>)
     }
 }
 
-/// Keys that differ, or that only one of the two has.
+/// The keys whose values differ or that only one of the two maps contains.
 pub fn differing_keys(one: &BTreeMap<String, String>, other: &BTreeMap<String, String>) -> Vec<String> {
     let mut keys: Vec<String> =
         one.keys().chain(other.keys()).filter(|key| one.get(*key) != other.get(*key)).cloned().collect();

@@ -1,4 +1,4 @@
-//! From a file or a text to a job without faults.
+//! Loads a job from a file or a text, and refuses it if it has faults.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,22 +13,22 @@ use super::source::{Node, parse};
 use super::{Job, Mesh, set, validate};
 use crate::error::{Error, Result};
 
-/// Longest file in bytes.
+/// Largest size of a file in bytes.
 const LARGEST: usize = 1 << 20;
 
-/// A job without faults, with the places of its keys for faults that only the mesh shows.
+/// A job without faults, with the positions of its keys for faults that only the mesh reveals.
 #[derive(Debug, Clone)]
 pub struct Loaded {
-    /// The job, all defaults filled, all paths absolute.
+    /// The job with all defaults and with absolute paths.
     pub job: Job,
-    /// What the user should know before the run.
+    /// Warnings.
     pub warnings: Vec<String>,
     root: Node,
     texts: Texts,
 }
 
 impl Job {
-    /// The job in the file `path` with `overrides` (`a.b.c=value`) written over it.
+    /// Loads the job in the file `path` and applies `overrides` (`a.b.c=value`).
     pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded> {
         Self::load_coloured(path, overrides, false)
     }
@@ -46,18 +46,18 @@ impl Job {
     }
 }
 
-/// A document with what is wrong with it so far.
+/// A document and the faults found so far.
 pub(crate) struct Document {
     /// Its keys.
     pub root: Node,
-    /// What faults point into.
+    /// The texts to which faults refer.
     pub texts: Texts,
     /// Faults so far.
     pub faults: Vec<Fault>,
 }
 
 impl Document {
-    /// Parses `text`, writes `overrides` over it and holds every key against the schema.
+    /// Parses `text`, applies `overrides` and checks every key against the schema.
     pub(crate) fn new(
         kind: Kind,
         text: &str,
@@ -76,12 +76,12 @@ impl Document {
         Ok(Self { root, texts, faults })
     }
 
-    /// A fault at the value under `path`, or at the deepest table on the way there.
+    /// Adds a fault at the value of `path`, or at the innermost existing table on this path.
     pub(crate) fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
     }
 
-    /// The document's struct, or all its faults.
+    /// The struct of the document, or an error with all faults.
     pub(crate) fn fill<T: DeserializeOwned>(self) -> Result<(T, Node, Texts)> {
         if !self.faults.is_empty() {
             return Err(self.texts.refuse(self.faults));
@@ -105,19 +105,19 @@ impl Loaded {
         Ok(Self { job, warnings, root, texts })
     }
 
-    /// A refusal that points at `key_path` (`contact.0.on`), or at the deepest table on the way there that the job has.
+    /// A refusal at the position of `key_path` (`contact.0.on`), or of the innermost existing table on this path.
     pub fn fault(&self, key_path: &str, message: impl Into<String>, help: impl AsRef<str>) -> Error {
         let place = self.root.deepest(key_path).at.clone();
         self.texts.refuse(vec![Fault::new(place, message, "").help(help)])
     }
 
-    /// Holds the job against a mesh that was read from a file; more warnings are added to [`Loaded::warnings`].
+    /// Checks the job against a mesh that was read from a file; adds warnings to [`Loaded::warnings`].
     pub fn check_mesh(&mut self, mesh: MeshNames<'_>) -> Result<()> {
         let findings = semantic::check_names(&self.root, mesh);
         if !findings.faults.is_empty() {
             return Err(self.texts.refuse(findings.faults));
         }
-        // The names of a generated mesh were known before.
+        // For a generated mesh these warnings exist already.
         for warning in findings.warnings {
             if !self.warnings.contains(&warning) {
                 self.warnings.push(warning);
@@ -138,7 +138,7 @@ impl Job {
     }
 }
 
-/// The path without `.` and, as far as they follow a name, without `..`.
+/// The path without `.` and without each `..` that follows a name.
 pub(crate) fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {

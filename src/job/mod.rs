@@ -1,8 +1,8 @@
-//! The job: a TOML document that says everything about a run.
+//! The job: a TOML document that defines a run.
 //!
-//! A document is parsed with the place of every key (`source`), changed by overrides (`set`), held against
-//! the schema of the structs (`validate`) and against itself (`semantic`). All faults come in one report
-//! (`report`); only a document without any becomes a [`Job`].
+//! A document is parsed with the position of every key (`source`), changed by overrides (`set`), checked against the schema of the
+//! structs (`validate`) and for consistency (`semantic`). All faults are reported at once (`report`); only a document without
+//! faults becomes a [`Job`].
 
 mod describe;
 mod document;

@@ -1,4 +1,4 @@
-//! Faults with their places, rendered for the user.
+//! Faults with their positions, rendered for the user.
 
 use codespan_reporting::diagnostic::{Diagnostic, Label};
 use codespan_reporting::files::SimpleFiles;
@@ -8,13 +8,13 @@ use std::ops::Range;
 
 use crate::error::Error;
 
-/// Faults shown of one job; the rest is only counted.
+/// Largest number of faults that are shown; the others are counted only.
 const SHOWN: usize = 60;
 
-/// A stretch of the job file or of an override.
+/// A range of bytes of the job file or of an override.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Place {
-    /// 0 for the job file, then one for each override.
+    /// 0 for the job file, 1, 2, ... for the overrides.
     pub file: usize,
     /// First byte.
     pub start: usize,
@@ -29,7 +29,7 @@ impl Place {
     }
 }
 
-/// One thing that is wrong with a job.
+/// A fault of a job.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Fault {
     at: Place,
@@ -39,19 +39,19 @@ pub(crate) struct Fault {
 }
 
 impl Fault {
-    /// A fault that says `message`, with `label` under the place where it is.
+    /// A fault with this `message`, and with `label` under its position.
     pub(crate) fn new(at: Place, message: impl Into<String>, label: impl Into<String>) -> Self {
         Self { at, message: message.into(), label: label.into(), notes: Vec::new() }
     }
 
-    /// What to do about it.
+    /// Adds advice.
     pub(crate) fn help(mut self, help: impl AsRef<str>) -> Self {
         self.notes.push(format!("help: {}", help.as_ref()));
         self
     }
 }
 
-/// The texts that faults point into.
+/// The texts to which faults refer.
 #[derive(Debug, Clone)]
 pub(crate) struct Texts {
     kind: &'static str,
@@ -60,7 +60,7 @@ pub(crate) struct Texts {
 }
 
 impl Texts {
-    /// The file of this kind of document and, after it, the overrides.
+    /// The file of a document, followed by the overrides.
     pub(crate) fn new(
         kind: &'static str,
         name: &str,
@@ -76,7 +76,7 @@ impl Texts {
         Self { kind, files, colour }
     }
 
-    /// All `faults` as one refusal, in the order of their places.
+    /// All `faults` as one refusal, in the order of their positions.
     pub(crate) fn refuse(&self, mut faults: Vec<Fault>) -> Error {
         faults.sort();
         faults.dedup();
@@ -107,13 +107,12 @@ impl Texts {
     }
 }
 
-/// A message that can't look like several.
+/// The message in one line, so that it cannot be mistaken for several messages.
 fn one_line(text: &str) -> String {
     printable(text).replace(['\n', '\t'], " ")
 }
 
-/// The text with control characters replaced by as many bytes of plain ones, so that a job can't
-/// drive the user's terminal.
+/// The text with control characters replaced by the same number of printable bytes, so that a job cannot control the terminal.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

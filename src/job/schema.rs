@@ -1,4 +1,4 @@
-//! The JSON Schema of a kind of document, from the structs, without what TOML does not have.
+//! The JSON Schema of a kind of document, generated from the structs, without null, which TOML does not have.
 
 use std::sync::LazyLock;
 
@@ -12,11 +12,11 @@ static JOB: LazyLock<Value> = LazyLock::new(schema_of::<Job>);
 /// A kind of document.
 #[derive(Clone, Copy)]
 pub(crate) struct Kind {
-    /// What messages call it.
+    /// Its name in messages.
     pub name: &'static str,
-    /// What stands before the name of a table on the command line.
+    /// The prefix of table names on the command line.
     pub prefix: &'static str,
-    /// What the reference of its keys begins with.
+    /// The introduction of the reference of its keys.
     pub opening: &'static str,
     /// Its schema (draft 2020-12).
     pub schema: &'static Value,
@@ -47,13 +47,13 @@ pub(crate) fn schema_of<T: JsonSchema>() -> Value {
     schema
 }
 
-/// A schema with its reference followed; the part that refers has the last word on description and default.
+/// A schema with its reference resolved; description and default of the referring part have priority.
 fn resolve(root: &'static Value, schema: &'static Value) -> Schema {
     let target = schema["$ref"].as_str().and_then(|name| root.pointer(name.trim_start_matches('#')));
     Schema { root, own: schema, target: target.unwrap_or(schema) }
 }
 
-/// A schema and the place where it is used.
+/// A schema, and the schema that refers to it.
 #[derive(Clone, Copy)]
 pub(crate) struct Schema {
     root: &'static Value,
@@ -62,7 +62,7 @@ pub(crate) struct Schema {
 }
 
 impl Schema {
-    /// The keyword's value.
+    /// The value of a keyword.
     pub(crate) fn get(&self, keyword: &str) -> &'static Value {
         match &self.own[keyword] {
             Value::Null => &self.target[keyword],
@@ -70,17 +70,17 @@ impl Schema {
         }
     }
 
-    /// The keyword's text.
+    /// The text of a keyword.
     pub(crate) fn text(&self, keyword: &str) -> Option<&'static str> {
         self.get(keyword).as_str()
     }
 
-    /// The keyword's number.
+    /// The number of a keyword.
     pub(crate) fn number(&self, keyword: &str) -> Option<f64> {
         self.get(keyword).as_f64()
     }
 
-    /// Whether a value of this JSON type may stand here.
+    /// Whether a value of this JSON type is allowed.
     pub(crate) fn accepts(&self, kind: &str) -> bool {
         match self.get("type") {
             Value::String(only) => only == kind,
@@ -89,7 +89,7 @@ impl Schema {
         }
     }
 
-    /// The schemas of which one must hold, nested ones flattened; empty if there is no choice.
+    /// The alternatives of a choice, with nested choices flattened; empty if there is no choice.
     pub(crate) fn alternatives(&self) -> Vec<Schema> {
         let branches = self.get("oneOf").as_array().or_else(|| self.get("anyOf").as_array());
         let mut all = Vec::new();
@@ -103,12 +103,12 @@ impl Schema {
         all
     }
 
-    /// The words of which one may stand here.
+    /// The allowed words.
     pub(crate) fn words(&self) -> Vec<&'static str> {
         self.alternatives().iter().filter_map(|branch| branch.text("const")).collect()
     }
 
-    /// The tables of which exactly one may stand here: name and the branch's schema.
+    /// The tables of which exactly one is allowed, each with its name and the schema of the alternative.
     pub(crate) fn tagged(&self) -> Vec<(&'static str, Schema)> {
         let branches = self.alternatives().into_iter();
         branches.filter_map(|branch| Some((branch.get("required")[0].as_str()?, branch))).collect()
@@ -129,12 +129,12 @@ impl Schema {
         self.get("properties").get(key).map(|inner| resolve(self.root, inner))
     }
 
-    /// Keys that a table must have.
+    /// The required keys of a table.
     pub(crate) fn required(&self) -> impl Iterator<Item = &'static str> {
         self.get("required").as_array().into_iter().flatten().filter_map(Value::as_str)
     }
 
-    /// The schema of a list's items, or of the values of a table with free keys.
+    /// The schema of the items of a list, or of the values of a table with free keys.
     pub(crate) fn items(&self) -> Option<Schema> {
         [self.get("items"), self.get("additionalProperties")]
             .into_iter()

@@ -6,7 +6,7 @@ use super::report::{Fault, Place};
 use super::source::{Node, Value, parse_value};
 use crate::laws::expression::Expression;
 
-/// Writes the override `text`, which is file `file`, over the document.
+/// Applies the override `text`, which has the file number `file`, to the document.
 pub(super) fn apply(root: &mut Node, text: &str, file: usize) -> Result<(), Fault> {
     let fault =
         |message: &str, help: &str| Err(Fault::new(Place::new(file, 0..text.len()), message, "").help(help));
@@ -38,7 +38,7 @@ fn equals_sign(text: &str) -> Option<usize> {
     None
 }
 
-/// A TOML value, or bare words as a string.
+/// A TOML value, or a word without quotes as a string.
 fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
     let start = start + text[start..].len() - text[start..].trim_start().len();
     let end = start + text[start..].trim_end().len();
@@ -56,7 +56,7 @@ fn read_value(text: &str, start: usize, file: usize) -> Result<Node, Fault> {
     }
 }
 
-/// Words, paths and expressions need no quotes.
+/// Whether the text is a word, a path or an expression, which need no quotes.
 fn is_bare(first: char, text: &str) -> bool {
     first.is_alphabetic() || matches!(first, '/' | '.' | '_' | '~') || Expression::parse(text).is_ok()
 }
@@ -66,7 +66,7 @@ fn insert(node: &mut Node, parts: &[&str], value: Node, key: &Place) -> Result<(
         *node = value;
         return Ok(());
     };
-    // A list that does not exist yet may be begun with its entry 0.
+    // A list that does not exist yet may be created by its entry 0.
     let child = if rest.first() == Some(&"0") {
         Node { value: Value::Array(Vec::new()), at: key.clone(), key: key.clone() }
     } else {

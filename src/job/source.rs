@@ -1,4 +1,4 @@
-//! The TOML document with the place of every key and value.
+//! The TOML document with the positions of all keys and values.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -9,14 +9,14 @@ use toml::de::{DeTable, DeValue};
 
 use super::report::{Fault, Place};
 
-/// A value and where it stands.
+/// A value and its position.
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
-    /// What stands there.
+    /// The value.
     pub value: Value,
-    /// Where it stands; of a table its header.
+    /// The position of the value; for a table, that of its header.
     pub at: Place,
-    /// Where its key stands; of the root and of array items where the value stands.
+    /// The position of the key; for the root and for items of lists, that of the value.
     pub key: Place,
 }
 
@@ -31,7 +31,7 @@ pub(crate) enum Value {
     Float(f64),
     /// true or false.
     Boolean(bool),
-    /// A date, a time or both: no key of a job takes one.
+    /// A date, a time or both; no key of a job accepts one.
     Date,
     /// A list.
     Array(Vec<Node>),
@@ -40,7 +40,7 @@ pub(crate) enum Value {
 }
 
 impl Value {
-    /// What a user calls this kind of value.
+    /// The kind of value, in words.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Text(_) => "a string",
@@ -55,7 +55,7 @@ impl Value {
 }
 
 impl Node {
-    /// The node under `path`, whose parts are keys and list positions, joined by dots.
+    /// The node at `path`, whose parts are keys and list positions, joined by dots.
     pub(crate) fn find(&self, path: &str) -> Option<&Node> {
         if path.is_empty() {
             return Some(self);
@@ -72,7 +72,7 @@ impl Node {
         }
     }
 
-    /// The deepest node on the way to `path` that exists.
+    /// The innermost existing node on `path`.
     pub(crate) fn deepest(&self, path: &str) -> &Node {
         let mut node = self;
         for part in path.split('.') {
@@ -84,7 +84,7 @@ impl Node {
         node
     }
 
-    /// Number of items of the list under `path`; 0 if there is none.
+    /// Number of items of the list at `path`; 0 if there is no list.
     pub(crate) fn count(&self, path: &str) -> usize {
         match self.find(path).map(|node| &node.value) {
             Some(Value::Array(items)) => items.len(),
@@ -92,18 +92,18 @@ impl Node {
         }
     }
 
-    /// What stands under `path` as a `T`; `None` if nothing does, or something else.
+    /// The value at `path` as a `T`; `None` if it does not exist or has another type.
     pub(crate) fn read<T: DeserializeOwned>(&self, path: &str) -> Option<T> {
         T::deserialize(self.find(path)?.plain()).ok()
     }
 
-    /// The choice of this name under `path` as a `T`, whatever stands beside it.
+    /// The choice `name` at `path` as a `T`; other keys beside it are ignored.
     pub(crate) fn read_choice<T: DeserializeOwned>(&self, path: &str, name: &str) -> Option<T> {
         let chosen = self.find(path)?.child(name)?.plain();
         T::deserialize(toml::Value::Table([(name.to_owned(), chosen)].into_iter().collect())).ok()
     }
 
-    /// The value without its places.
+    /// The value without positions.
     pub(crate) fn plain(&self) -> toml::Value {
         match &self.value {
             Value::Text(text) => toml::Value::String(text.clone()),
@@ -119,7 +119,7 @@ impl Node {
     }
 }
 
-/// Reads the text of file 0.
+/// Parses the text of file 0.
 pub(super) fn parse(text: &str) -> Result<Node, Fault> {
     match DeTable::parse(text) {
         Ok(table) => Ok(table_node(table.into_inner(), 0, 0, Place::new(0, 0..0))),
@@ -127,7 +127,7 @@ pub(super) fn parse(text: &str) -> Result<Node, Fault> {
     }
 }
 
-/// Reads one value that stands at the bytes `range` of an override.
+/// Parses the value in the bytes `range` of an override.
 pub(super) fn parse_value(text: &str, file: usize, range: Range<usize>) -> Result<Node, Fault> {
     match DeValue::parse(&text[range.clone()]) {
         Ok(value) => Ok(node(value, file, range.start)),

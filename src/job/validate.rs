@@ -1,4 +1,4 @@
-//! Every key against the schema: names, types, ranges, choices. All faults are collected, none ends the walk.
+//! Checks every key against the schema: names, types, ranges and choices. All faults are collected.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::schema::{Kind, Schema};
 use super::source::{Node, Value};
 use crate::laws::{expression::Expression, nearest::nearest};
 
-/// What is wrong with the document by itself, before keys are held against each other.
+/// The faults of single keys.
 pub(super) fn faults(kind: Kind, root: &Node, text: &str) -> Vec<Fault> {
     let mut walk = Walk { kind, text, faults: Vec::new() };
     walk.value(root, kind.root(), "");
@@ -74,7 +74,7 @@ impl Walk<'_> {
         }
     }
 
-    /// A key whose name the user chooses.
+    /// Checks a key whose name is free.
     fn free_key(&mut self, child: &Node, free: Schema, schema: Schema, path: &str) {
         let split = matches!(&child.value, Value::Table(inner) if inner.values().any(|node| matches!(node.value, Value::Table(_))));
         match schema.text("key_help").filter(|_| split) {
@@ -223,7 +223,7 @@ impl Walk<'_> {
 
     fn expression(&mut self, node: &Node, text: &str, path: &str) {
         if let Err(fault) = Expression::parse(text) {
-            // Inside of a string without escapes the fault can be pointed at.
+            // Within a string without escape sequences the exact position of the fault is known.
             let (start, end) = (node.at.start + 1, node.at.end.saturating_sub(1));
             let at = if node.at.file == 0 && self.text.get(start..end) == Some(text) {
                 Place::new(node.at.file, start + fault.at.start..start + fault.at.end)
@@ -275,7 +275,7 @@ impl Walk<'_> {
 }
 
 impl Schema {
-    /// The table's name if this is a branch of a choice between tables.
+    /// The name of the table if this schema is an alternative in a choice between tables.
     fn tagged_name(&self) -> Option<&'static str> {
         self.get("required").get(0).and_then(|name| name.as_str()).filter(|_| self.alternatives().is_empty())
     }

@@ -1,4 +1,4 @@
-//! Boundaries: their names, and what several tables may say about the same one. Vectors: their components.
+//! Checks of the names of boundaries, of tables that refer to the same boundary, and of the components of vectors.
 
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::{Axis, Fix, Named};
@@ -9,13 +9,13 @@ use crate::laws::nearest::nearest;
 /// Tables with a list `on`.
 const TABLES: [&str; 3] = ["support", "traction", "contact"];
 
-/// Each name in the lists `on` of all tables called `table`: path of the name, and the name.
+/// All names in the lists `on` of the tables `table`, each with its path.
 fn names_in(root: &Node, table: &str) -> Vec<(String, String)> {
     let lists = items(root, table).into_iter().flat_map(|entry| items(root, &format!("{entry}.on")));
     lists.filter_map(|path| Some((path.clone(), root.read::<String>(&path)?))).collect()
 }
 
-/// Whatever the mesh.
+/// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     for table in TABLES {
@@ -36,7 +36,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     }
 }
 
-/// No string twice in the list under `path`.
+/// Each string may occur only once in the list `path`.
 pub(super) fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str) {
     let mut seen = Vec::new();
     for key in items(findings.root, path) {
@@ -48,7 +48,7 @@ pub(super) fn check_repeats(findings: &mut Findings<'_>, path: &str, what: &str)
     }
 }
 
-/// A boundary that is held can't touch anything, and only one table may say how it touches.
+/// A boundary without free components cannot have a contact, and a boundary may occur in one contact table only.
 fn check_claims(findings: &mut Findings<'_>) {
     let root = findings.root;
     let held: Vec<(String, String)> = names_in(root, "support")
@@ -93,7 +93,7 @@ fn holds_all(fix: Option<Fix>, root: &Node) -> bool {
     }
 }
 
-/// What depends on dimension and names of the mesh.
+/// Checks that depend on the dimension and the names of the mesh.
 pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     for table in TABLES {
@@ -131,7 +131,7 @@ pub(super) fn check_name(findings: &mut Findings<'_>, path: &str, name: &str, kn
     findings.fault(path, format!("the mesh has no {what} \"{name}\""), help);
 }
 
-/// One component an axis, and no z in 2D.
+/// A vector has one component per axis, and no z in 2D.
 pub(super) fn check_vector(findings: &mut Findings<'_>, path: &str, dimension: usize) {
     let root = findings.root;
     let Some(Value::Array(components)) = root.find(path).map(|node| &node.value) else { return };

@@ -1,4 +1,4 @@
-//! Contact: what laws say of their parameters and of each other, and obstacles.
+//! Checks of contact laws, of their combinations, and of obstacles.
 
 use super::boundary::{check_flat, check_vector};
 use super::findings::{Findings, MeshNames, items};
@@ -7,7 +7,7 @@ use crate::job::source::Node;
 use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
 use crate::laws::expression::Scalar;
 
-/// Whatever the mesh.
+/// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     let tables: Vec<ContactTable> =
@@ -30,7 +30,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     }
 }
 
-/// What can be read of the table at this path.
+/// The readable contents of the table at this path.
 fn table(root: &Node, path: String) -> ContactTable {
     let key = |key: &str| format!("{path}.{key}");
     let obstacle: Option<Gap> = root.read(&key("obstacle"));
@@ -48,7 +48,7 @@ fn table(root: &Node, path: String) -> ContactTable {
     }
 }
 
-/// PETSc's solver for variational inequalities knows bounds only.
+/// PETSc's solver for variational inequalities supports bounds only.
 fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
     if findings.root.read("solver.method") != Some(Method::Vinewtonrsls) {
         return;
@@ -64,10 +64,10 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
 
 /// Vectors of an obstacle.
 const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.centre"];
-/// How an obstacle turns.
+/// Rotations of an obstacle.
 const OBSTACLE_ROTATIONS: [&str; 2] = ["plane.rotation", "sphere.rotation"];
 
-/// An obstacle is rigid, moves as one, and has a direction.
+/// An obstacle is rigid, and its normal and axis must not be zero.
 fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     let root = findings.root;
     let obstacle = format!("{contact}.obstacle");
@@ -100,7 +100,7 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     }
 }
 
-/// What depends on the dimension.
+/// Checks that depend on the dimension.
 pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     for contact in items(findings.root, "contact") {
         let normal: Option<NormalLaw> = findings.root.read(&format!("{contact}.normal"));
@@ -114,7 +114,7 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     }
 }
 
-/// In the plane a disc turns about its centre and a line about nothing; in space a sphere needs an axis.
+/// In 2D a disc rotates about its centre, and a line does not rotate; in 3D a sphere needs an axis.
 fn check_rotation(findings: &mut Findings<'_>, obstacle: &str, dimension: usize) {
     let root = findings.root;
     let [plane, sphere] = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));

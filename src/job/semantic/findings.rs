@@ -1,12 +1,12 @@
-//! What the checks of a job found, and the names that they check against.
+//! The faults and warnings that the checks of a job find, and the names in the mesh.
 
 use crate::job::report::Fault;
 use crate::job::source::Node;
 
-/// What a mesh says about itself: known at once for generated ones, after reading for files.
+/// The dimension and the names of a mesh. For a mesh file they are known after reading only.
 #[derive(Debug, Clone, Copy)]
 pub struct MeshNames<'a> {
-    /// 2 or 3.
+    /// The dimension, 2 or 3.
     pub dimension: usize,
     /// Names of the boundaries.
     pub boundaries: &'a [&'a str],
@@ -17,9 +17,9 @@ pub struct MeshNames<'a> {
 /// Faults and warnings found so far.
 pub(crate) struct Findings<'a> {
     pub(super) root: &'a Node,
-    /// What the job is refused for.
+    /// The faults for which the job is refused.
     pub faults: Vec<Fault>,
-    /// What the user should know.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -28,18 +28,18 @@ impl<'a> Findings<'a> {
         Self { root, faults: Vec::new(), warnings: Vec::new() }
     }
 
-    /// A fault at the key under `path`.
+    /// Adds a fault at the key of `path`.
     pub(super) fn fault_at_key(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).key.clone(), message, "").help(help));
     }
 
-    /// A fault at the value under `path`.
+    /// Adds a fault at the value of `path`.
     pub(super) fn fault(&mut self, path: &str, message: impl Into<String>, help: impl AsRef<str>) {
         self.faults.push(Fault::new(self.root.deepest(path).at.clone(), message, "").help(help));
     }
 }
 
-/// `name.0`, `name.1`, ... for every item of the list under `name`.
+/// `name.0`, `name.1`, ... for the items of the list `name`.
 pub(super) fn items(root: &Node, name: &str) -> Vec<String> {
     (0..root.count(name)).map(|index| format!("{name}.{index}")).collect()
 }

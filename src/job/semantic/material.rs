@@ -1,10 +1,10 @@
-//! Materials: effects that need each other, and what depends on the dimension.
+//! Checks of materials: effects that require other effects, and the dimension.
 
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::laws::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
 
-/// Poisson's ratio above which P1 elements lock.
+/// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.45;
 
 fn materials(findings: &Findings<'_>) -> Vec<String> {
@@ -12,7 +12,7 @@ fn materials(findings: &Findings<'_>) -> Vec<String> {
     std::iter::once("material".to_owned()).chain(regions).collect()
 }
 
-/// Whatever the dimension.
+/// Checks that do not depend on the dimension.
 pub(super) fn check(findings: &mut Findings<'_>) {
     let root = findings.root;
     for path in materials(findings) {
@@ -57,7 +57,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     }
 }
 
-/// Cells that no region names are of the main material, which may be empty where there are none.
+/// Cells that belong to no region have the main material, which may be empty only if there are no such cells.
 pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     let names: Vec<String> =
@@ -73,7 +73,7 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     }
 }
 
-/// What depends on the dimension.
+/// Checks that depend on the dimension.
 pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
     let root = findings.root;
     let hypothesis: Option<Hypothesis> = root.read("material.hypothesis");

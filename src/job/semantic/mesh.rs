@@ -1,4 +1,4 @@
-//! Generated meshes: what they are called, and how large they may be.
+//! Checks of generated meshes: names, grading and size.
 
 use super::boundary::{check_name, check_repeats};
 use super::findings::{Findings, MeshNames, items};
@@ -13,7 +13,7 @@ const CUBOID: MeshNames<'static> = MeshNames {
     regions: &["body"],
 };
 
-/// The names of a generated mesh; `None` for a file, or if the job leaves it open which it is.
+/// The names of a generated mesh; `None` for a file, or if the job does not define exactly one mesh.
 pub(super) fn generated(root: &Node) -> Option<MeshNames<'static>> {
     let present = |key: &str| root.find(key).is_some();
     match (present("mesh.rectangle"), present("mesh.box"), present("mesh.file")) {
@@ -23,14 +23,14 @@ pub(super) fn generated(root: &Node) -> Option<MeshNames<'static>> {
     }
 }
 
-/// Whatever is said about a generated mesh.
+/// All checks of a generated mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
     check_count(findings);
     check_grading(findings, "mesh.rectangle.grading", RECTANGLE, &["x", "y"]);
     check_grading(findings, "mesh.box.grading", CUBOID, &["x", "y", "z"]);
 }
 
-/// The sides that cells crowd toward must be sides, each of an axis that is graded, and each graded axis needs one.
+/// Each side in `toward` must be a side of the mesh at an end of a graded axis, and each graded axis needs a side.
 fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, axes: &[&str]) {
     let root = findings.root;
     let toward = format!("{path}.toward");
@@ -66,13 +66,13 @@ fn check_grading(findings: &mut Findings<'_>, path: &str, names: MeshNames<'_>, 
     }
 }
 
-/// Most unknowns in so many dimensions: PETSc must count them, and ids of nodes have 31 bits.
+/// Largest number of unknowns in this dimension, limited by the indices of PETSc and by node ids of 31 bits.
 fn most_unknowns(dimension: u64) -> u64 {
     let nodes = i32::MAX as u64;
     if cfg!(petsc_64bit) { dimension * nodes } else { nodes }
 }
 
-/// The unknowns of a generated mesh must be countable.
+/// The number of unknowns of a generated mesh must not exceed the limit.
 fn check_count(findings: &mut Findings<'_>) {
     for path in ["mesh.rectangle", "mesh.box"] {
         let key = format!("{path}.cells");

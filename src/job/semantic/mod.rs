@@ -1,4 +1,4 @@
-//! Keys held against each other. Each check reads only what it needs, so that one fault hides no other.
+//! Checks of the consistency of keys. Each check reads only the keys that it needs, so that a fault does not hide others.
 
 mod boundary;
 mod contact;
@@ -13,7 +13,7 @@ pub use findings::MeshNames;
 
 use super::source::Node;
 
-/// What can be said without the mesh, and with it if it is a generated one.
+/// All checks that are possible before a mesh file is read.
 pub(super) fn check(root: &Node) -> Findings<'_> {
     let mut findings = Findings::new(root);
     material::check(&mut findings);
@@ -28,7 +28,7 @@ pub(super) fn check(root: &Node) -> Findings<'_> {
     findings
 }
 
-/// What can be said only once dimension and names of the mesh are known.
+/// The checks that need the dimension and the names of the mesh.
 pub(super) fn check_names<'a>(root: &'a Node, names: MeshNames<'_>) -> Findings<'a> {
     let mut findings = Findings::new(root);
     check_with_mesh(&mut findings, names);

@@ -1,11 +1,11 @@
-//! Probes, profiles and expected numbers.
+//! Checks of probes, profiles and expected results.
 
 use super::boundary::check_name;
 use super::findings::{Findings, MeshNames, items};
 use crate::job::report::Fault;
 use crate::job::source::Value;
 
-/// Whatever the mesh.
+/// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
     check_unique(findings, "output.probe", "name", "probes are called");
     check_unique(findings, "output.profile", "on", "profiles are along");
@@ -13,7 +13,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     check_indicator(findings);
 }
 
-/// The error indicator measures stress by the elastic energy it stands for.
+/// The error indicator uses the elastic energy norm, so that every material needs elasticity.
 fn check_indicator(findings: &mut Findings<'_>) {
     let root = findings.root;
     if root.read("output.error_indicator") != Some(true) {
@@ -71,7 +71,7 @@ fn check_expected(findings: &mut Findings<'_>) {
     }
 }
 
-/// What depends on dimension and names of the mesh.
+/// Checks that depend on the dimension and the names of the mesh.
 pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     let size: Option<Vec<f64>> = root.read("mesh.rectangle.size").or_else(|| root.read("mesh.box.size"));

@@ -1,12 +1,12 @@
-//! Time, solver and checkpoints.
+//! Checks of time, solver and checkpoints.
 
 use super::findings::Findings;
 use crate::job::{report::Fault, source::Value};
 
-/// More fixed steps than any machine will do.
+/// Largest accepted number of fixed steps.
 const MOST_STEPS: f64 = 1e12;
 
-/// Steps that fit into the time, checkpoints that have an occasion, PETSc options as PETSc spells them.
+/// Checks the lengths of steps, the times of `land_on`, the intervals of checkpoints and the names of PETSc options.
 pub(super) fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
     check_landings(findings);
@@ -59,7 +59,7 @@ fn check_steps(findings: &mut Findings<'_>) {
     }
 }
 
-/// Times to land on rise and lie within the run.
+/// The times in `land_on` must ascend and lie within the run.
 fn check_landings(findings: &mut Findings<'_>) {
     let end = findings.root.read::<f64>("time.end").filter(|end| end.is_finite());
     let mut before = 0.0;

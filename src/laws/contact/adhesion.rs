@@ -1,19 +1,19 @@
 //! Adhesion: elastic bonds between body and obstacle that break.
 //!
-//! With the bonding `b` between 0 (broken) and 1 (whole), stiffnesses `c_n`, `c_t` and the truncation `R` of lengths at the
-//! bond's length, the traction on the body is
+//! With the bonding `b` between 0 (broken) and 1 (intact), stiffnesses `c_n`, `c_t` and the truncation `R` of displacements at
+//! `length`, the traction on the body is
 //!
 //! ```text
 //! b^2 (c_n R(-u_nu) nu - c_t R(u_tau)),    R(-u_nu) = 0 where u_nu >= 0
 //! viscosity b' = -<b (c_n R(-u_nu)^2 + c_t |R(u_tau)|^2) - energy>_+
 //! ```
 //!
-//! with the normal `nu` out of the body and the displacement `u` since the bonds were made, at `u = 0`. Broken bonds are
-//! not restored. Bonds store `b^2 F(u)`, `F` the potential of the truncated springs; in slow separation they take up `energy` in all,
-//! and the largest traction is `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational and
-//! numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003),
-//! 431-465; M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput.
-//! Methods Appl. Mech. Engrg. 177 (1999), 383-399.)
+//! with the outward normal `nu` of the body and the displacement `u`; the bonds form at `u = 0`. Broken bonds are not restored.
+//! Bonds store the energy `b^2 F(u)` with the potential `F` of the truncated springs. Slow separation takes the work `energy` in
+//! total, and the largest traction is then `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational
+//! and numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003), 431-465;
+//! M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput. Methods Appl.
+//! Mech. Engrg. 177 (1999), 383-399.)
 
 use super::{interface::Interface, laws::NormalLaw};
 use crate::{
@@ -49,22 +49,23 @@ pub struct Adhesion {
 }
 
 impl Adhesion {
-    /// Traction of whole bonds per sliding, in Pa/m.
+    /// Tangential stiffness of intact bonds, in Pa/m.
     pub fn tangential_stiffness(&self) -> f64 {
         self.tangential_stiffness.unwrap_or(0.0)
     }
 
-    /// The length in m beyond which the traction grows no more; infinite if it always grows.
+    /// The displacement in m beyond which the traction no longer grows; infinite without a limit.
     pub fn truncation_length(&self) -> f64 {
         self.length.unwrap_or(f64::INFINITY)
     }
 
-    /// A length in m, cut where the traction grows no more.
+    /// A displacement in m, truncated at this length.
     fn truncate(&self, length: f64) -> f64 {
         length.min(self.truncation_length())
     }
 
-    /// What can't stand beside bonds, which hold what touches at first to an obstacle at rest; keys are those of the contact's table.
+    /// The faults of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
+    /// obstacle at rest. Keys are those of the table of the contact.
     pub fn faults(beside: &Interface) -> Vec<LawFault> {
         let help = format!("delete it, or [{}.adhesion]", beside.path);
         let gap = beside.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
@@ -96,7 +97,7 @@ impl Adhesion {
         ((-along).max(0.0), add_scaled(displacement, -along, normal))
     }
 
-    /// Traction in Pa of whole bonds on the body.
+    /// Traction in Pa of intact bonds on the body.
     pub fn traction<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> Vector<D> {
         let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let size = norm(&sliding);
@@ -105,7 +106,7 @@ impl Adhesion {
         add_scaled(&pull, -self.tangential_stiffness() * cut, &sliding)
     }
 
-    /// Energy in J/m² that whole bonds store: the traction is minus its derivative.
+    /// Stored energy of intact bonds in J/m²: the traction is minus its derivative.
     pub fn potential<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
         let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let of = |length: f64| {
@@ -115,19 +116,19 @@ impl Adhesion {
         self.stiffness * of(opening) + self.tangential_stiffness() * of(norm(&sliding))
     }
 
-    /// What drives debonding, in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
+    /// The driving force of debonding in J/m²: `c_n R(-u_nu)^2 + c_t |R(u_tau)|^2`.
     pub fn drive<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> f64 {
         let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let square = |length: f64| self.truncate(length).powi(2);
         self.stiffness * square(opening) + self.tangential_stiffness() * square(norm(&sliding))
     }
 
-    /// Minus the derivative of the traction of whole bonds by the displacement, in Pa/m.
+    /// Minus the derivative of the traction of intact bonds with respect to the displacement, in Pa/m.
     pub fn tangent<const D: usize>(&self, displacement: &Vector<D>, normal: &Vector<D>) -> [Vector<D>; D] {
         let (opening, sliding) = Self::opening_and_sliding(displacement, normal);
         let along = if opening > 0.0 && opening < self.truncation_length() { self.stiffness } else { 0.0 };
         let size = norm(&sliding);
-        // Beyond the bond's length only the direction of the traction changes.
+        // Beyond the truncation length only the direction of the traction changes.
         let (across, radial) = if size > self.truncation_length() {
             let across = self.tangential_stiffness() * self.truncation_length() / size;
             (across, across / (size * size))
@@ -151,8 +152,9 @@ impl Adhesion {
         add_scaled(&normal.map(|n| along * n), across, &sliding)
     }
 
-    /// The bonding after a step of implicit Euler of this length in s from `start`, which is not below the value at which debonding
-    /// ends, and its derivative by the drive. Drive, energy and viscosity may be per area or of a node.
+    /// The bonding after a step of implicit Euler of this length in s from `start`, which must not be below the value at which
+    /// debonding ends, and its derivative with respect to the driving force. Driving force, energy and viscosity may be per area or
+    /// totals of a node.
     pub fn relax(start: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> [f64; 2] {
         if start * drive <= energy {
             return [start, 0.0];
