@@ -24,14 +24,14 @@ impl LawFault {
         Self { is_at_key: true, ..Self::at_value(key, message, help) }
     }
 
-    /// The same fault, with its key relative to the table around this one.
+    /// The same fault, with its key relative to the table that contains `table`.
     pub fn within(self, table: &str) -> Self {
         Self { key: format!("{table}.{}", self.key), ..self }
     }
 }
 
-/// The root of an increasing function that is negative at `low` and not at `high`, by Newton's method kept inside a bracket.
-/// `function` gives value and derivative.
+/// The root of an increasing function that is negative at `low` and not negative at `high`, by Newton's method within a bracket.
+/// `function` returns value and derivative.
 pub(crate) fn increasing_root(
     mut low: f64,
     mut high: f64,

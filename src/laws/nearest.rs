@@ -1,6 +1,6 @@
-//! The known name that a misspelt one probably meant.
+//! Suggestions for misspelt names.
 
-/// The closest of `known` to `name`, if it is close enough to be what was meant.
+/// The name in `known` that is closest to `name`, if it is close enough.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = name.to_lowercase().replace(['-', ' '], "_");
     let shortest = lower.chars().count();
@@ -13,7 +13,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Edit distance; a name that is the start of the other, or its plural, counts as one edit.
+/// Edit distance; if a name is the start of the other or its plural, the distance is 1.
 fn distance(name: &str, candidate: &str) -> usize {
     let other = candidate.to_lowercase();
     let edits = strsim::damerau_levenshtein(name, &other);

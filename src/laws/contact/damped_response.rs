@@ -28,7 +28,7 @@ pub struct DampedResponse {
     pub symmetry: Symmetry,
 }
 
-/// How a function of velocities above zero goes on below.
+/// The continuation of the function to negative velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
@@ -106,7 +106,7 @@ mod tests {
         law.response().unwrap()
     }
 
-    /// Eq. (72) as it is printed.
+    /// Eq. (72) as printed.
     fn printed(v: f64) -> f64 {
         let (r1, r2, c1, c2, c3) = (0.003, 0.005, 10.0, -10.0, 10.0);
         let m = v.abs();

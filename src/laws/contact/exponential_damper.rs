@@ -1,16 +1,16 @@
 //! Exponential damper: a pressure that rises with the normal velocity toward a limit.
 //!
-//! `-sigma_nu = limit (1 - exp(-v_nu / velocity))` for `v_nu > 0`, and 0 for a body that leaves: a damper of `limit / velocity`
-//! in slow motion whose pressure has a bound in fast motion. The exponential is that of Papanastasiou's regularised yield stress
-//! (Flows of materials with yield, J. Rheol. 31 (1987), 385-404). The law never falls and stores nothing: all that it takes is
-//! dissipated.
+//! `-sigma_nu = limit (1 - exp(-v_nu / velocity))` for `v_nu > 0`, and 0 for `v_nu <= 0`: a damper with the coefficient `limit /
+//! velocity` in slow motion, with bounded pressure in fast motion. The exponential is that of Papanastasiou's regularised yield
+//! stress (Flows of materials with yield, J. Rheol. 31 (1987), 385-404). The pressure never decreases with the velocity. The law
+//! stores no energy: all its work is dissipated.
 
 use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{error::Result, laws::law::increasing_root};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Pressure `limit * (1 - exp(-normal velocity / velocity))` on what approaches, none on what leaves.
+/// Pressure `limit * (1 - exp(-normal velocity / velocity))` in approach, zero in separation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExponentialDamper {
@@ -31,8 +31,8 @@ impl ExponentialDamper {
         if velocity <= 0.0 { 0.0 } else { self.limit / self.velocity * (-velocity / self.velocity).exp() }
     }
 
-    /// The root of `c v + p(v) = s` for a positive `s`. The left side rises and is concave, so that Newton's method comes from
-    /// below, where it starts: the pressure is neither above its limit nor above its tangent at rest.
+    /// The root of `c v + p(v) = s` for a positive `s`. The left side is increasing and concave, so that Newton's method converges
+    /// from below. It starts below the root, because the pressure is below its limit and below its tangent at rest.
     fn approach(&self, s: f64, c: f64) -> f64 {
         let low = f64::max((s - self.limit) / c, s / (c + self.limit / self.velocity));
         increasing_root(low, s / c, low, |v| [c * v + self.pressure_at(v) - s, c + self.slope_at(v)])
@@ -66,7 +66,7 @@ impl Response for ExponentialDamper {
         self.slope_at(velocity)
     }
 
-    /// The smaller of those along the pressure and along the velocity: the graph may be steep at rest.
+    /// The smaller of the distances at constant velocity and at constant pressure, because the graph may be steep at rest.
     fn distance(&self, velocity: f64, pressure: f64, _node: NodeContext, range: [f64; 2]) -> f64 {
         let (width, height) = (range[0].max(self.velocity), range[1].max(self.limit));
         let off = (self.pressure_at(velocity) - pressure).abs() / height;

@@ -1,10 +1,10 @@
 //! Friction laws: the friction traction as a function of the sliding velocity, at a given contact pressure.
 //!
-//! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g`
-//! never rises with the velocity. Along the direction of sliding this is a scalar graph with a jump at rest and a fall of at
-//! most [`steepest_decrease`](FrictionBound::steepest_decrease) times the contact pressure: its relaxed monotonicity constant. For a `c`
-//! above it, `s = c v + q` is a parameter of the graph ([`FrictionBound::resolve`]), and of the vector graph too: the law is
-//! radial, so that `s` as a vector has the direction of both velocity and traction.
+//! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g` does
+//! not increase with the velocity. In the direction of sliding this is a scalar graph with a jump at rest. Its relaxed monotonicity
+//! constant is [`steepest_decrease`](FrictionBound::steepest_decrease) times the contact pressure. For a larger `c`, `s = c v + q`
+//! is a parameter of the graph ([`FrictionBound::resolve`]), and also of the vector graph: the law is radial, so that the vectors
+//! `s`, velocity and traction have the same direction.
 
 use crate::laws::law::LawFault;
 
@@ -23,7 +23,7 @@ pub struct Slip {
     pub coefficient: f64,
 }
 
-/// Bisection halves the bracket, so that more iterations than bits bring nothing.
+/// Bisection halves the bracket, so that more iterations than bits are useless.
 const ITERATIONS: usize = 100;
 
 /// The evaluation of a friction law at a point. The defaults are those of a bound that is proportional to the contact pressure and
@@ -42,28 +42,29 @@ pub trait FrictionBound {
         0.0
     }
 
-    /// Whether the bound follows the contact pressure.
+    /// Whether the bound depends on the contact pressure.
     fn follows_pressure(&self) -> bool {
         true
     }
 
-    /// The steepest fall of the coefficient with the sliding velocity, in s/m: times the contact pressure it is the relaxed
-    /// monotonicity constant.
+    /// The steepest decrease of the coefficient with the sliding velocity, in s/m. Multiplied by the contact pressure, it is the
+    /// relaxed monotonicity constant.
     fn steepest_decrease(&self) -> f64 {
         0.0
     }
 
-    /// The velocity in m/s by which the coefficient has changed, 0 where it does not.
+    /// The characteristic velocity in m/s of the change of the coefficient; 0 for a constant coefficient.
     fn corner_velocity(&self) -> f64 {
         0.0
     }
 
-    /// What is wrong with the parameters; keys are those of the law's table.
+    /// The faults of the parameters; keys are those of the table of the law.
     fn own_faults(&self) -> Vec<LawFault> {
         Vec::new()
     }
 
-    /// Velocity and traction where `c v + q = s`, for an `s` that is not negative and a `c` above the fall at this pressure.
+    /// The point of the graph with `c v + q = s`, for an `s` that is not negative and a `c` above the steepest decrease at this
+    /// pressure.
     fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
         let at_rest = self.bound(0.0, pressure);
         if at_rest > 0.0 && s <= at_rest {
@@ -77,7 +78,7 @@ pub trait FrictionBound {
         let slope = self.slope(speed, pressure);
         Slip {
             speed,
-            // Without a bound exactly nothing.
+            // Without a bound the traction is exactly zero.
             traction: if at_rest > 0.0 { s - c * speed } else { 0.0 },
             derivative: 1.0 / (c + slope),
             slope,
@@ -86,7 +87,8 @@ pub trait FrictionBound {
     }
 }
 
-/// The root of `c v + g(v) = s`, which rises and is convex: Newton's method with bisection where it leaves the bracket.
+/// The root of `c v + g(v) = s`, whose left side is increasing and convex, by Newton's method with bisection where it leaves the
+/// bracket.
 fn sliding_speed<L: FrictionBound + ?Sized>(law: &L, s: f64, c: f64, pressure: f64) -> f64 {
     let (mut low, mut high) = (0.0, s / c);
     let mut at = high;
@@ -137,7 +139,7 @@ macro_rules! friction_laws {
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
             }
 
-            /// Its table in the job, from that of the contact.
+            /// Its table in the job, relative to that of the contact.
             pub fn table(&self) -> &'static str {
                 match self {
                     $(Self::$law(_) => concat!("friction.", $name),)*

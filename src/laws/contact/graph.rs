@@ -1,11 +1,11 @@
-//! Any polyline of pressure over normal velocity.
+//! Contact pressure as a polyline over the normal velocity.
 
 use super::{normal_law::NormalParameters, polyline::Polyline};
 use crate::{error::Result, laws::law::LawFault};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Pressure over normal velocity as a polyline.
+/// Contact pressure as a polyline over the normal velocity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Graph {

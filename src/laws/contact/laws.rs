@@ -49,12 +49,12 @@ impl NormalLaw {
         format!("normal.{}", self.name())
     }
 
-    /// The key of its gap, if that is given, relative to the table of the contact.
+    /// The key of its gap relative to the table of the contact, if the gap is given.
     pub fn gap_key(&self) -> Option<String> {
         self.gap().map(|_| format!("{}.gap", self.table()))
     }
 
-    /// Whether it does nothing but bound the displacement or the velocity.
+    /// Whether the law is a bound on the displacement or the velocity only.
     pub fn is_bound(&self) -> bool {
         self.response().is_ok_and(|law| law.velocity_bound(NodeContext::AT_THE_GAP).is_some())
     }
@@ -64,7 +64,7 @@ impl NormalLaw {
         self.response().is_ok_and(|law| law.has_vertical_parts() || law.depends_on_displacement())
     }
 
-    /// Faults of the law beside an obstacle; keys are those of the contact's table.
+    /// Faults of the law in combination with an obstacle; keys are those of the table of the contact.
     pub(super) fn faults_beside_obstacle(&self) -> Vec<LawFault> {
         let against =
             self.against_obstacle(self.name()).map(|[why, help]| LawFault::at_key("obstacle", why, help));

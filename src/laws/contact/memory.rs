@@ -1,6 +1,6 @@
 //! Contact memory: a foundation whose pressure depends on the history of the penetration.
 //!
-//! Beside the normal law's pressure, `-sigma_nu` has the part
+//! In addition to the pressure of the normal law, `-sigma_nu` contains the pressure
 //!
 //! ```text
 //! m(t) = integral from 0 to t of b(t - s) max(u_nu(s), 0) ds,    b(t) = stiffness_rate exp(-t / decay_time)
@@ -57,14 +57,14 @@ impl Memory {
         faults
     }
 
-    /// The pressure in Pa after a step of this length in s, during which the point is held at this normal displacement in m.
+    /// The pressure in Pa after a step of this length in s at a constant normal displacement in m.
     pub fn advance(&self, pressure: f64, displacement: f64, length: f64) -> f64 {
         let past = -length / self.decay_time;
         past.exp() * pressure - past.exp_m1() * self.stiffness() * displacement.max(0.0)
     }
 
-    /// The pressure in Pa after a step of this length in s, during which the displacement pressed in moves steadily between these two in
-    /// m, and its derivative by the second in Pa/m. Exact for such displacements.
+    /// The pressure in Pa after a step of this length in s, in which the indentation changes linearly between these two normal
+    /// displacements in m, and its derivative with respect to the second one in Pa/m. Exact for such displacements.
     pub fn follow(&self, pressure: f64, [before, after]: [f64; 2], length: f64) -> [f64; 2] {
         let past = length / self.decay_time;
         let kept = (-past).exp();
@@ -75,7 +75,7 @@ impl Memory {
         [kept * pressure + first * before.max(0.0) + last * after.max(0.0), slope]
     }
 
-    /// The stiffness in Pa/m against a displacement held for long.
+    /// The stiffness in Pa/m against a displacement held for a long time.
     pub fn stiffness(&self) -> f64 {
         self.stiffness_rate * self.decay_time
     }
@@ -126,8 +126,9 @@ mod tests {
     }
 
     proptest! {
-        /// A mode `mass u'' + damping u' + stiffness u + m = 0` by `lagged_euler`, with steps below the bound that counts memory
-        /// as a spring: stable wherever the differential equation is (Routh), by the criterion of Jury for cubic polynomials.
+        /// A mode `mass u'' + damping u' + stiffness u + m = 0` computed by `lagged_euler`, with steps below the bound in which
+        /// memory is a spring. By the criterion of Jury for cubic polynomials it is stable whenever the differential equation is
+        /// stable (Routh).
         #[test]
         fn below_the_explicit_bound_no_mode_grows_that_would_not_grow_by_itself(
             powers in proptest::array::uniform5(-2.0f64..2.0), share in 0.01f64..0.999,

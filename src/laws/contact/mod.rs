@@ -1,7 +1,7 @@
 //! Contact laws: pure functions at a point of the contact boundary, with their keys in the job file.
 //!
-//! A normal or friction law is a file here, and an entry in one of the lists in `laws.rs`: its parameters, as the job file has them,
-//! its formula and derivative, and what it can't be combined with.
+//! Each normal or friction law has a file in this folder and an entry in one of the lists in `laws.rs`. The file defines its
+//! parameters, as in the job file, its formula and derivative, and the combinations that are refused.
 
 mod adhesion;
 mod compliance;

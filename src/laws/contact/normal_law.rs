@@ -1,4 +1,4 @@
-//! The contract of normal laws: within a step the contact pressure is a graph over the normal velocity.
+//! The trait of normal laws: within a step the contact pressure is a graph over the normal velocity.
 //!
 //! A law has parameters ([`NormalParameters`]) and a type that evaluates it at a point ([`Response`]), often the same type.
 
@@ -10,15 +10,15 @@ use crate::{
 /// The data of a step at a point of the contact boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeContext {
-    /// `u_nu - gap` in m, with the displacement at the start of the step and the gap at its end; minus infinity where
-    /// there is nothing to touch.
+    /// `u_nu - gap` in m, with the displacement at the start of the step and the gap at its end; minus infinity if there is no
+    /// obstacle.
     pub penetration: f64,
     /// Length of the step in s.
     pub step_length: f64,
 }
 
 impl NodeContext {
-    /// A point at its gap at the start of a step of 1 s: its velocity is its penetration, in other units.
+    /// A point with closed gap at the start of a step of 1 s, in which velocity in m/s and penetration in m are equal.
     pub const AT_THE_GAP: Self = Self { penetration: 0.0, step_length: 1.0 };
 
     /// The penetration in m at the end of the step, at a normal velocity in m/s.
@@ -26,7 +26,7 @@ impl NodeContext {
         self.penetration + self.step_length * velocity
     }
 
-    /// The normal velocity in m/s that just closes the gap by the end of the step.
+    /// The normal velocity in m/s with which the gap closes exactly at the end of the step.
     pub(super) fn closing_velocity(&self) -> f64 {
         -self.penetration / self.step_length
     }
@@ -39,9 +39,9 @@ pub struct Resolved {
     pub velocity: f64,
     /// Pressure in Pa.
     pub pressure: f64,
-    /// Derivative of the velocity by the parameter, in m/(Pa s): 0 where the graph is vertical.
+    /// Derivative of the velocity with respect to the parameter, in m/(Pa s): 0 where the graph is vertical.
     pub derivative: f64,
-    /// Which branch of the graph it lies on.
+    /// The branch of the graph.
     pub branch: usize,
 }
 
@@ -52,33 +52,33 @@ impl Resolved {
     }
 }
 
-/// A branch of a law, in words.
+/// The description of a branch of a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Branch {
-    /// S1, S2 and so on; or what the branch means.
+    /// S1, S2 and so on, or the meaning of the branch.
     pub name: String,
-    /// Where it lies.
+    /// Its range.
     pub range: String,
-    /// How steep it is.
+    /// Its slope.
     pub slope: String,
 }
 
 impl Branch {
-    /// A branch with these words.
+    /// A branch with this description.
     pub fn new(name: impl Into<String>, range: impl Into<String>, slope: impl Into<String>) -> Self {
         Self { name: name.into(), range: range.into(), slope: slope.into() }
     }
 }
 
-/// Points of a curved law that are joined by straight lines.
+/// Number of points by which the curve of a law is drawn.
 const SAMPLES: usize = 120;
 
 /// A normal law that a job may choose.
 pub trait NormalParameters {
-    /// The type that evaluates it.
+    /// The type that evaluates the law.
     type Response: Response;
 
-    /// What evaluates the law; refuses parameters that make no law.
+    /// The evaluation of the law; refuses invalid parameters.
     fn response(&self) -> Result<Self::Response>;
 
     /// The key `gap`, if it is given.
@@ -86,89 +86,89 @@ pub trait NormalParameters {
         None
     }
 
-    /// What is wrong with the parameters; keys are those of the law's table.
+    /// The faults of the parameters; keys are those of the table of the law.
     fn own_faults(&self) -> Vec<LawFault> {
         Vec::new()
     }
 
-    /// Why no obstacle can stand beside the law of this name, and what to do.
+    /// Message and advice if the law with this name cannot be combined with an obstacle.
     fn against_obstacle(&self, name: &str) -> Option<[String; 2]> {
         let help = "delete the obstacle, or use `compliance` or `unilateral`";
         Some([format!("`{name}` does not depend on the distance to an obstacle"), help.into()])
     }
 }
 
-/// The evaluation of a normal law. The defaults are those of a continuous law of the velocity that never falls, whose
-/// pressure begins at its only kink and has no bound.
+/// The evaluation of a normal law. The defaults are those of a continuous nondecreasing law of the velocity whose pressure starts
+/// at its only kink and is unbounded.
 pub trait Response {
-    /// Velocity and pressure where `c v + p = s`, for a `c` above the steepest fall.
+    /// The point of the graph with `c v + p = s`, for a `c` above the steepest decrease.
     fn resolve(&self, s: f64, c: f64, node: NodeContext) -> Resolved;
 
     /// Pressure `-sigma_nu` in Pa at a normal velocity in m/s; for laws without vertical parts.
     fn pressure(&self, velocity: f64, node: NodeContext) -> f64;
 
-    /// An element of its generalised derivative in Pa s/m.
+    /// An element of the generalised derivative in Pa s/m.
     fn slope(&self, velocity: f64, node: NodeContext) -> f64;
 
-    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the least
-    /// `c1` and the least `c0` that goes with it; why there are none, otherwise.
+    /// Growth constants `c0` in Pa and `c1` in Pa s/m of hypothesis H(j): `|p| <= c0 + c1 |v|` at all points, with the smallest
+    /// `c1` and the smallest `c0` for this `c1`; otherwise the reason why there are none.
     fn growth_constants(&self) -> Result<[f64; 2], &'static str>;
 
-    /// Its branches in words, with numbers written by `number`.
+    /// Descriptions of the branches, with numbers formatted by `number`.
     fn branches(&self, number: fn(f64) -> String) -> Vec<Branch>;
 
-    /// Which branch holds a velocity; for laws without vertical parts.
+    /// The branch that contains a velocity; for laws without vertical parts.
     fn branch(&self, velocity: f64, node: NodeContext) -> usize {
         usize::from(self.pressure(velocity, node) > 0.0)
     }
 
-    /// Distance of a pair (velocity, pressure) to the graph, scaled by this range, or by that of the graph's corners where
-    /// it has any and they are larger.
+    /// Distance of a pair (velocity, pressure) from the graph, divided by this range, or by the range of the corners of the graph
+    /// if that is larger.
     fn distance(&self, velocity: f64, pressure: f64, node: NodeContext, range: [f64; 2]) -> f64 {
         (self.pressure(velocity, node) - pressure).abs() / range[1]
     }
 
-    /// Whether it is vertical somewhere, so that the pressure is no function of the velocity.
+    /// Whether the graph has vertical parts, so that the pressure is not a function of the velocity.
     fn has_vertical_parts(&self) -> bool {
         false
     }
 
-    /// Whether it depends on the displacement, so that it has no scale of velocity and pressure of its own.
+    /// Whether the law depends on the displacement, so that the graph has no range of its own.
     fn depends_on_displacement(&self) -> bool {
         false
     }
 
-    /// Whether there is no pressure at any velocity.
+    /// Whether the pressure is zero at every velocity.
     fn is_zero(&self) -> bool {
         self.growth_constants() == Ok([0.0; 2])
     }
 
-    /// The largest normal velocity in m/s that it allows, if to bound the velocity is all it does.
+    /// The largest normal velocity in m/s, if the law is a bound on the velocity only.
     fn velocity_bound(&self, _node: NodeContext) -> Option<f64> {
         None
     }
 
-    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v): the steepest fall, 0 if the graph never falls.
+    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v): the steepest decrease, 0 for a nondecreasing graph.
     fn monotonicity_constant(&self) -> f64 {
         0.0
     }
 
-    /// The largest pressure in Pa that it ever gives; infinite where there is none.
+    /// The largest pressure in Pa; infinite if the pressure is unbounded.
     fn greatest_pressure(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Energy in J/m² that it stores at a penetration in m; nothing where it stores none at any.
+    /// Stored energy in J/m² at a penetration in m; `None` for laws that store no energy.
     fn energy(&self, _penetration: f64) -> Option<f64> {
         None
     }
 
-    /// The corners of its graph: velocity or penetration, and pressure.
+    /// The corners of the graph: velocity or penetration, and pressure.
     fn corners(&self) -> &[[f64; 2]] {
         &[[0.0; 2]]
     }
 
-    /// The graph between these two velocities, or penetrations, and these two pressures, as a line through these points.
+    /// Points of the graph between these two velocities, or penetrations, and these two pressures.
     fn outline(&self, [left, right]: [f64; 2], _pressures: [f64; 2]) -> Vec<[f64; 2]> {
         let at = |n: usize| left + (right - left) * n as f64 / SAMPLES as f64;
         (0..=SAMPLES).map(|n| [at(n), self.pressure(at(n), NodeContext::AT_THE_GAP)]).collect()
@@ -227,7 +227,7 @@ macro_rules! normal_laws {
                 own_faults() -> Vec<crate::laws::law::LawFault>;
             }
 
-            /// What evaluates the law; refuses parameters that make no law.
+            /// The evaluation of the law; refuses invalid parameters.
             pub fn response(&self) -> Result<NormalResponse> {
                 Ok(match self {
                     $(Self::$law(law) => NormalResponse::$law(law.response()?),)*

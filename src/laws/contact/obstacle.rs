@@ -1,8 +1,8 @@
 //! The distance of a point of the contact boundary from its obstacle.
 //!
-//! Deformations are small: the gap is measured from the place `x` where the point was at first along its outward normal
-//! `n` there, and compared with the normal displacement. The obstacle itself may move any distance. With `d = x - centre`
-//! and the obstacle's own unit normal `m`,
+//! Deformations are small: the gap is the distance from the undeformed position `x` of a point along the outward normal `n`, and is
+//! compared with the normal displacement. The obstacle itself may move arbitrarily far. With `d = x - centre` and the unit normal
+//! `m` of the obstacle,
 //!
 //! ```text
 //! plane    (point - x) . m / (n . m)           if n . m < 0
@@ -10,8 +10,8 @@
 //! hollow   -d . n + sqrt((d . n)^2 - |d|^2 + radius^2)
 //! ```
 //!
-//! negative where the point is inside the obstacle, infinite where the ray along the normal does not meet it: there is no
-//! contact then.
+//! The gap is negative where the point is inside the obstacle, and infinite where the ray along the normal does not meet the
+//! obstacle, so that there is no contact.
 
 use crate::{
     error::{Error, Result},
@@ -24,9 +24,9 @@ use serde::{Deserialize, Serialize};
 /// Cosine between boundary and plane below which the ray counts as parallel to the plane.
 const PARALLEL: f64 = 1e-6;
 
-/// A rigid obstacle that may move; friction acts on the velocity relative to it, over a step the mean one. The gap is measured from the
-/// place where a point of the boundary was at first along its normal there (deformations are small); where that ray does not meet the
-/// obstacle there is no contact.
+/// A rigid obstacle that may move. Friction acts on the velocity relative to the obstacle, averaged over a step. The gap is the
+/// distance from the undeformed position of a boundary point to the obstacle along the outward normal of the undeformed boundary;
+/// if this ray does not meet the obstacle, there is no contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Obstacle")]

@@ -1,16 +1,17 @@
 //! The velocity of the material of an obstacle, relative to which friction acts.
 //!
-//! An obstacle is a rigid body. With `x` the plane's point or the sphere's centre and `y` a place on its surface, its material
-//! there has the velocity
+//! An obstacle is a rigid body. With the point `x` of a plane or the centre `x` of a sphere, and a point `y` of its surface, the
+//! velocity of its material at `y` is
 //!
 //! ```text
 //! w = x' + omega x (y - x),    omega = rotation axis          of a sphere; in 2D the axis is z
 //!                              omega = rotation m + m x m'    of a plane with the unit normal m
 //! ```
 //!
-//! A plane's rotation leaves it where it is, as that of a brake disc; a normal that changes tilts it, with the least rotation
-//! that does. `x'` and `m'` are the rates by which a step changes displacements: what sticks in a step of implicit Euler moves
-//! as far as the obstacle does, `x' = (x_n - x_{n-1}) / k`. Everything else is taken at the end of the step, as the gap is.
+//! The rotation of a plane about its normal does not move its surface, as that of a brake disc. A change of its normal tilts the
+//! plane, with the smallest rotation that has this effect. `x'` and `m'` are computed by the formula with which the scheme computes
+//! velocities from displacements: in a step of implicit Euler, `x' = (x_n - x_{n-1}) / k`, so that a sticking point moves exactly
+//! as far as the obstacle. All other quantities are those at the end of the step, as is the gap.
 
 use super::obstacle::{Gap, Plane, Sphere, vector};
 use crate::{
@@ -19,18 +20,18 @@ use crate::{
     linear_algebra::tensor::{Vector, add_scaled, cross, norm},
 };
 
-/// How a scheme makes a rate at the end of a step from values at this time and at times before.
+/// The formula of a scheme for the rate at the end of a step in terms of values at this time and at earlier times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rate {
     /// End of the step in s.
     pub time: f64,
-    /// Times in s and weights in 1/s: the rate of `x` is the sum of `weight (x(time) - x(before))`. Those without weight
-    /// don't count.
+    /// Earlier times in s and weights in 1/s: the rate of `x` is the sum of `weight (x(time) - x(before))`. Times with zero weight
+    /// are not used.
     pub before: [[f64; 2]; 2],
 }
 
 impl Rate {
-    /// That of implicit Euler, for a step of this length in s.
+    /// The formula of implicit Euler for a step of this length in s.
     pub fn euler(time: f64, length: f64) -> Self {
         Self { time, before: [[time - length, 1.0 / length], [0.0; 2]] }
     }
@@ -62,7 +63,7 @@ impl<const D: usize> ObstacleMotion<D> {
         self.angular_velocity == [0.0; 3]
     }
 
-    /// Velocity in m/s of the obstacle's material at a place.
+    /// Velocity in m/s of the material of the obstacle at a position.
     fn velocity_at(&self, place: &Vector<D>) -> Vector<D> {
         let arm = add_scaled(place, -1.0, &self.centre);
         add_scaled(&self.velocity, 1.0, &in_plane(&cross(&self.angular_velocity, &in_space(&arm))))
@@ -70,7 +71,7 @@ impl<const D: usize> ObstacleMotion<D> {
 }
 
 impl Gap {
-    /// Whether the obstacle's material may move; false for a distance, whose motion is part of the gap.
+    /// Whether the surface of the obstacle may have a velocity; false for a given gap, whose change is not a motion of a surface.
     pub fn surface_may_move(&self) -> bool {
         let moves = |components: &[Scalar]| components.iter().any(Scalar::depends_on_time);
         let turns = |rotation: &Option<Scalar>| rotation.as_ref().is_some_and(|r| *r != Scalar::default());
@@ -83,8 +84,8 @@ impl Gap {
         }
     }
 
-    /// Velocity in m/s, in a `motion` of the obstacle at `time`, of its material where the ray from `place` along the unit `normal`
-    /// meets it; where that misses it, as if it were at the place.
+    /// Velocity in m/s of the material of the obstacle at `time`, in this `motion`, at the point where the ray from `place` along
+    /// the unit `normal` meets the obstacle; if the ray does not meet it, at `place`.
     pub fn velocity_along<const D: usize>(
         &self,
         motion: &ObstacleMotion<D>,
@@ -100,7 +101,7 @@ impl Gap {
         Ok(motion.velocity_at(&add_scaled(place, reach, normal)))
     }
 
-    /// The motion of the obstacle at the end of a step; at rest without one.
+    /// The motion of the obstacle at the end of a step; zero without an obstacle.
     pub fn motion<const D: usize>(&self, rate: Rate) -> Result<ObstacleMotion<D>> {
         let time = rate.time;
         let rotation_rate =

@@ -1,17 +1,17 @@
 //! A graph of the pressure over the normal velocity: a polyline with two half-lines at its ends.
 //!
-//! `-sigma_nu in g(v_nu)` with `g` piecewise linear; it may fall, and it may jump upwards: two points with the same
-//! velocity, or a vertical ray at an end (an infinite slope there). It is the Clarke subdifferential of the potential
-//! `j(v) = integral of g from 0 to v`, relation (8) of Wang and Cheng (2022). A graph that jumps downwards has no
-//! relaxed monotonicity and is refused.
+//! `-sigma_nu in g(v_nu)` with a piecewise linear `g`, which may decrease and may have upward jumps (two points with the same
+//! velocity) and a vertical ray at either end (an infinite slope). The graph is the Clarke subdifferential of the potential `j(v) =
+//! integral of g from 0 to v`, relation (8) of Wang and Cheng (2022). A graph with a downward jump has no relaxed monotonicity
+//! constant and is refused.
 //!
-//! For any `c` above the steepest fall, `s = c v + p` grows along the graph: it is a parameter of the graph, and velocity
-//! and pressure are functions of it, Lipschitz continuous also where the graph is vertical ([`Polyline::resolve`]).
+//! For any `c` above the steepest decrease, `s = c v + p` increases along the graph. It is therefore a parameter of the graph:
+//! velocity and pressure are Lipschitz continuous functions of `s`, also where the graph is vertical ([`Polyline::resolve`]).
 
 use super::normal_law::{Branch, NodeContext, Resolved, Response};
 use crate::error::{Error, Result};
 
-/// A piecewise linear law that may fall, and jump upwards.
+/// A piecewise linear law that may decrease and have upward jumps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
     points: Vec<[f64; 2]>,
@@ -50,7 +50,7 @@ impl Polyline {
         Ok(Self { points, slopes, reach })
     }
 
-    /// Which linear branch holds the parameter `s = c v + p`, counted as in [`branch`](Response::branch).
+    /// The linear branch that contains the parameter `s = c v + p`, numbered as in [`branch`](Response::branch).
     fn branch_of(&self, s: f64, c: f64) -> usize {
         self.points.iter().take_while(|[v, p]| c * v + p <= s).count()
     }
@@ -85,7 +85,7 @@ impl Response for Polyline {
             return Resolved { velocity: v, pressure: s - c * v, derivative: 0.0, branch };
         }
         let derivative = 1.0 / (c + slope);
-        // From the corner or from rest, whichever is nearer: a corner far off would cost digits.
+        // Computed from the corner or from rest, whichever is nearer, because a distant corner would cause cancellation.
         let from_corner = s - (c * v + p);
         if s.abs() < from_corner.abs() {
             let at_rest = p - slope * v;

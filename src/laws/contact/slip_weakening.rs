@@ -1,14 +1,14 @@
-//! Slip weakening: a friction coefficient that falls with the sliding velocity, as in the friction of rocks.
+//! Slip weakening: a friction coefficient that decreases with the sliding velocity, as in the friction of rocks.
 //!
-//! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact
-//! pressure; it falls by at most `(static - dynamic) / decay_velocity p`.
+//! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact pressure. Its
+//! steepest decrease is `(static - dynamic) / decay_velocity p`.
 
 use super::friction_law::FrictionBound;
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Friction whose coefficient falls from static to dynamic with the sliding velocity.
+/// Friction whose coefficient decreases from static to dynamic with the sliding velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SlipWeakening {

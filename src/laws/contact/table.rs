@@ -1,4 +1,4 @@
-//! Faults of the laws of one `[[contact]]` table, each alone and in combination.
+//! Faults of the laws of a `[[contact]]` table, of each law and of their combinations.
 
 use super::{adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory};
 use crate::laws::law::LawFault;
@@ -31,7 +31,7 @@ pub struct ContactTable {
 }
 
 impl ContactTable {
-    /// The faults of its laws, each alone and in combination; keys are those of the table.
+    /// The faults of the laws and of their combinations; keys are those of the table.
     pub fn faults(&self) -> Vec<LawFault> {
         let Interface { normal, friction, has_obstacle, .. } = &self.interface;
         let mut faults = Vec::new();

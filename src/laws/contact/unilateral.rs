@@ -1,7 +1,7 @@
 //! A rigid obstacle: `u_nu <= gap`, or `v_nu <= 0`.
 //!
-//! Within a step both are the graph of a wall over the normal velocity, zero and then vertical: at the velocity that closes the
-//! gap by the end of the step, or at rest.
+//! Within a step both are graphs over the normal velocity that are zero up to a velocity and vertical there: the velocity that
+//! closes the gap at the end of the step, or zero.
 
 use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{
@@ -27,7 +27,7 @@ pub struct Unilateral {
     pub gap: Option<Scalar>,
 }
 
-/// What a rigid obstacle bounds.
+/// The quantity that a rigid obstacle bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
@@ -65,7 +65,7 @@ impl NormalParameters for Unilateral {
 }
 
 impl Unilateral {
-    /// The normal velocity in m/s at which the wall stands.
+    /// The normal velocity in m/s at which the graph is vertical.
     fn wall(&self, node: NodeContext) -> f64 {
         match self.bound {
             Bound::Displacement => node.closing_velocity(),
@@ -80,7 +80,7 @@ impl Response for Unilateral {
         if s >= c * wall {
             Resolved { velocity: wall, pressure: s - c * wall, derivative: 0.0, branch: 1 }
         } else {
-            // Not by way of the velocity of the wall, which may be infinite.
+            // Not computed from the velocity of the vertical part, which may be infinite.
             Resolved::free(s, c)
         }
     }

@@ -1,11 +1,11 @@
-//! Which material has which law.
+//! The laws of the materials of a body.
 
-/// A law for each of the body's materials, or none where the material lacks it.
+/// A law for each material of the body; `None` for materials without it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ByMaterial<T>(Vec<Option<T>>);
 
 impl<T> ByMaterial<T> {
-    /// One entry a material; nothing where no material has the law.
+    /// One entry per material; empty if no material has the law.
     pub fn new(laws: Vec<Option<T>>) -> Option<Self> {
         laws.iter().any(Option::is_some).then_some(Self(laws))
     }
@@ -21,12 +21,12 @@ impl<T> ByMaterial<T> {
         self.0[material].as_ref()
     }
 
-    /// Whether every material has one.
+    /// Whether every material has the law.
     pub fn is_everywhere(&self) -> bool {
         self.0.iter().all(Option::is_some)
     }
 
-    /// All laws there are.
+    /// All existing laws.
     pub fn laws(&self) -> impl Iterator<Item = &T> {
         self.0.iter().flatten()
     }

@@ -1,7 +1,7 @@
 //! Isotropic damage with a rate.
 //!
-//! A cell of damage `d` bears the share `1 - d` of its elastic stress `s`; its energy is `(1 - d) Y` with
-//! `Y = 1/2 s : E^-1 s`, which is the energy released by a unit of damage. Damage grows where `Y` exceeds the threshold,
+//! The stress of a cell with damage `d` is `1 - d` times the elastic stress `s` of undamaged material; its energy is `(1 - d) Y`
+//! with `Y = 1/2 s : E^-1 s`, the energy released per unit of damage. Damage grows where `Y` exceeds the threshold,
 //!
 //! ```text
 //! viscosity d' = (1 - d)^exponent <Y - threshold>_+,   d <= largest,
@@ -45,7 +45,7 @@ fn nearly_all() -> f64 {
 }
 
 impl Damage {
-    /// The message where elasticity is missing.
+    /// The message if elasticity is missing.
     pub const WITHOUT_ELASTICITY: &'static str = "damage requires elasticity: it reduces the elastic stress";
 
     /// The law in a material of this elasticity.
@@ -73,8 +73,8 @@ impl Elastic<Damage> {
         (damage + length * left * excess / viscosity).min(largest).max(damage)
     }
 
-    /// Damage after a step of implicit Euler of this length in s from `start`, with `Y` in Pa at its end, and its derivative by `Y`
-    /// in 1/Pa.
+    /// Damage after a step of implicit Euler of this length in s from `start`, with `Y` in Pa at its end, and its derivative with
+    /// respect to `Y` in 1/Pa.
     pub fn relax(&self, start: f64, release_rate: f64, length: f64) -> [f64; 2] {
         let Damage { threshold, viscosity, exponent, largest } = self.parameters;
         let growth = length * (release_rate - threshold) / viscosity;
@@ -82,7 +82,7 @@ impl Elastic<Damage> {
             return [start.min(largest), 0.0];
         }
         let left = |damage: f64| if exponent == 0.0 { 1.0 } else { (1.0 - damage).powf(exponent) };
-        // What is left falls with damage.
+        // The remaining stiffness decreases with damage.
         let high = (start + growth * left(start)).min(largest);
         if high - start <= growth * left(high) {
             return if high < largest { [high, length / viscosity * left(high)] } else { [largest, 0.0] };

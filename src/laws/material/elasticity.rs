@@ -18,7 +18,7 @@ pub enum Hypothesis {
 }
 
 impl Hypothesis {
-    /// What stresses of so many components stand for.
+    /// The hypothesis that corresponds to this number of stress components.
     pub fn of(components: usize) -> Self {
         match components {
             3 => Self::PlaneStress,

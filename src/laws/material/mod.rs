@@ -1,7 +1,7 @@
 //! Material laws: pure functions at a point, with their keys in the job file.
 //!
-//! A law is a file here: its parameters, as the job file has them, with units and ranges; its formula and source; what it can't be
-//! combined with. Viscoplastic laws are listed in `viscoplasticity/law.rs`.
+//! Each law has a file in this folder, with its parameters as in the job file, their units and ranges, its formula and source, and
+//! the combinations that are refused. Viscoplastic laws are listed in `viscoplasticity/law.rs`.
 
 mod by_material;
 mod damage;

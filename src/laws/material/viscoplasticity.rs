@@ -1,7 +1,7 @@
-//! Viscoplastic laws `G(s) = -E X(s)`: stress that relaxes by flow.
+//! Viscoplastic laws `G(s) = -E X(s)`: relaxation of stress by flow.
 //!
-//! A law is a file below and an entry in the list of `viscoplasticity/law.rs`: its [`Parameters`], as the job file has them, and its [`Flow`], which
-//! evaluates it. No other module names a law.
+//! Each law has a file in the folder `viscoplasticity` and an entry in the list of `viscoplasticity/law.rs`. The file defines its
+//! [`Parameters`], as in the job file, and its [`Flow`], which evaluates it. No other module contains the name of a law.
 
 mod drucker_prager;
 #[cfg(test)]

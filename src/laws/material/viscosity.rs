@@ -23,7 +23,7 @@ impl Viscosity {
         Isotropic { volumetric: self.volumetric, shear: self.shear }
     }
 
-    /// What is wrong with the parameters in this dimension: the tensor must be positive, also in double precision.
+    /// The fault of the parameters in this dimension: the tensor must be positive definite, also in double precision.
     pub fn fault(&self, dimension: usize) -> Option<LawFault> {
         let Self { volumetric, shear } = *self;
         let modulus = dimension as f64 * volumetric + shear;
