@@ -1,4 +1,4 @@
-//! Jobs that load: defaults, the effective job, overrides, what counts as physics, and what is said about keys.
+//! Loading of jobs: defaults, the effective job, overrides, keys that affect the results, and descriptions of keys.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 const SQUARE: &str = include_str!("../jobs/papers/wang_cheng_2022.toml");
 
-/// Every key that the solver can do, on a mesh from a file.
+/// Keys of many effects, with a mesh file.
 const RICH: &str = r#"
 about = { title = "all keys", reference = "none", authors = ["A", "B"] }
 mesh.file = "../meshes/block.msh"
@@ -80,7 +80,7 @@ fn jobs_of_the_papers_load_and_flow_in_the_cube_is_warned_of() {
     for (file, dimension) in [("wang_cheng_2022.toml", 2), ("wang_cheng_cube.toml", 3)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(file);
         let loaded = Job::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        // Flow in the cube may lock.
+        // Cells of the cube may lock where they flow.
         assert_eq!(loaded.warnings.len(), dimension - 2, "{:?}", loaded.warnings);
         assert_eq!(loaded.job.dimension(), Some(dimension));
         let stem = path.file_stem().expect("stem");
@@ -311,7 +311,7 @@ fn the_schema_has_a_meaning_for_every_key() {
     assert!(!describe_json().contains("\"null\""));
 }
 
-/// A change that breaks a job in some way, or does not.
+/// A random change of a job, which may or may not be an error.
 #[derive(Debug, Clone)]
 enum Change {
     Delete(usize),

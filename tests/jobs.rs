@@ -1,4 +1,4 @@
-//! Every job under jobs/ gives the numbers of its `[check]` table, on one and on two ranks.
+//! Every job under jobs/ reproduces the numbers of its `[check]` table, on one and on two ranks.
 //!
 //! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
 //! end: `history.COLUMN` and `probe.NAME.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or `.min.` over the
@@ -12,7 +12,7 @@ use clarke::{
     linear_algebra::tensor::larger,
 };
 
-/// All jobs of the repository; studies are no jobs.
+/// All jobs of the repository, without studies.
 fn jobs() -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs")];
@@ -32,7 +32,7 @@ fn jobs() -> Vec<PathBuf> {
 }
 
 fn run(job: &Path, ranks: usize, output: &Path) -> Result<(), String> {
-    // Launchers that share this folder race to make and remove it.
+    // Launchers that share this folder compete in creating and removing it.
     let own = tempfile::tempdir().map_err(|error| format!("folder: {error}"))?;
     let run = Command::new("mpirun")
         .env("OMPI_MCA_orte_tmpdir_base", own.path())
@@ -55,7 +55,7 @@ fn run(job: &Path, ranks: usize, output: &Path) -> Result<(), String> {
     if run.status.success() { Ok(()) } else { Err(format!("{}\n{words}", run.status)) }
 }
 
-/// The numbers of a column in the rows whose other column holds this word (in all rows without a filter).
+/// The numbers of a column in the rows in which another column contains this word (in all rows without a filter).
 fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) -> Option<Vec<f64>> {
     let text = std::fs::read_to_string(folder.join(table)).ok()?;
     let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
@@ -77,7 +77,7 @@ fn extreme(side: &str, values: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// The quantity as the run in `folder` left it, if there is such a quantity.
+/// The quantity in the results of the run in `folder`, if it exists.
 fn measured(folder: &Path, quantity: &str) -> Option<f64> {
     let parts: Vec<&str> = quantity.split('.').collect();
     match parts[..] {
@@ -102,7 +102,7 @@ fn measured(folder: &Path, quantity: &str) -> Option<f64> {
     }
 }
 
-/// What is wrong with a number, if anything is.
+/// The error of a number, if there is one.
 fn difference(found: Option<f64>, expected: &Expected) -> Option<String> {
     let Some(found) = found else { return Some("the run left no such number".into()) };
     let off = (found - expected.value).abs();

@@ -1,5 +1,5 @@
-//! Rules of the source: modules use only modules above them, the files of a module import no names in circles, and `unsafe` stays
-//! in a few files.
+//! Rules of the source: modules use only modules above them, the files of a module have no circular imports, and `unsafe` occurs in
+//! few files only.
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::{
@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Where `unsafe` may stand; folders end with a slash.
+/// Files and folders in which `unsafe` is allowed; folders end with a slash.
 const UNSAFE: [&str; 6] = [
     "src/linear_algebra/sparse/",
     "src/linear_algebra/petsc/",
@@ -17,10 +17,10 @@ const UNSAFE: [&str; 6] = [
     "build.rs",
 ];
 
-/// Keywords before the name of what a file defines.
+/// Keywords before the name in a definition.
 const DEFINITIONS: [&str; 8] = ["fn", "struct", "enum", "trait", "type", "const", "static", "union"];
 
-/// Longest chain of imports that is followed to a definition.
+/// Longest chain of imports that is followed to find a definition.
 const LONGEST_CHAIN: usize = 8;
 
 fn root() -> PathBuf {
@@ -64,7 +64,7 @@ fn is_block(token: &TokenTree) -> bool {
     matches!(token, TokenTree::Group(group) if group.delimiter() == Delimiter::Brace)
 }
 
-/// Whether `::` stands at this position.
+/// Whether the tokens at this position are `::`.
 fn is_separator(tokens: &[TokenTree], at: usize) -> bool {
     let first = matches!(tokens.get(at), Some(TokenTree::Punct(p)) if p.as_char() == ':' && p.spacing() == Spacing::Joint);
     first && tokens.get(at + 1).is_some_and(|token| is(token, ':'))
@@ -74,7 +74,7 @@ fn line(token: &TokenTree) -> usize {
     token.span().start().line
 }
 
-/// The tokens of one level without attributes; without what is compiled for tests only, unless it is wanted.
+/// The tokens of one level without attributes, and without code for tests unless requested.
 fn plain(stream: TokenStream, with_tests: bool) -> Vec<TokenTree> {
     let mut plain = Vec::new();
     let mut tokens = stream.into_iter().peekable();
@@ -219,7 +219,7 @@ impl Module {
 /// The modules of the crate by their paths, without those for tests.
 struct Modules(BTreeMap<Vec<String>, Module>);
 
-/// For each module the modules from which it needs names, and these names.
+/// For each module, the modules whose names it uses, and these names.
 type Graph = BTreeMap<Vec<String>, BTreeMap<Vec<String>, BTreeSet<String>>>;
 
 impl Modules {
@@ -247,8 +247,8 @@ impl Modules {
         Self(found)
     }
 
-    /// The module to which a path that stands in `from` leads, and whether the path names something in it rather than the module
-    /// itself; `None` where the path begins with a name that no file of the crate defines.
+    /// The module to which a path in `from` refers, and whether the path refers to an item of the module rather than to the module
+    /// itself; `None` if the path begins with a name that no file of the crate defines.
     fn resolve(&self, from: &[String], path: &[String], chain: usize) -> Option<(Vec<String>, bool)> {
         let mut here = from.to_vec();
         let mut rest = path;
@@ -285,7 +285,7 @@ impl Modules {
         Some((here, false))
     }
 
-    /// Where a name leads that a module imports.
+    /// The definition to which an imported name of a module refers.
     fn imported(&self, module: &[String], name: &String, chain: usize) -> Option<(Vec<String>, bool)> {
         let chain = chain.checked_sub(1)?;
         let imports = &self.0[module].imports;
@@ -308,7 +308,7 @@ impl Modules {
         references.any(|found| found.path.len() > 1 && found.path[0] == "super" && found.path[1] == name)
     }
 
-    /// Who needs whose names, among the files of each top-level module. A name that a file only hands on does not count there.
+    /// The dependences among the files of each top-level module. A name that a file only re-exports is not counted there.
     fn graph(&self) -> Graph {
         let mut graph = Graph::new();
         for (from, module) in &self.0 {
@@ -333,7 +333,7 @@ impl Modules {
         graph
     }
 
-    /// Every import that lies on a circle, in words.
+    /// Descriptions of all imports that are part of a cycle.
     fn circles(&self) -> Vec<String> {
         let graph = self.graph();
         let mut circles = Vec::new();
@@ -457,7 +457,7 @@ fn a_circle_is_seen_whichever_way_names_are_reached() {
         "src/a/c.rs needs B of src/a/b.rs",
     ];
     assert_eq!(found, expected);
-    // Through a glob, an import that the parent hands down, and a file beside its folder.
+    // Through a glob, an import that the parent re-exports, and a file next to its folder.
     let parent = "mod b; mod c; use b::*; use c::C; fn f(_: B) {}";
     let found = circles_of(&[
         ("src/a.rs", parent),
@@ -477,7 +477,7 @@ fn names_handed_on_and_names_in_tests_make_no_circle() {
     assert_eq!(circles_of(&files), [""; 0]);
 }
 
-/// The lines of the word `unsafe`, and whether it begins a block.
+/// The lines with the word `unsafe`, and whether the word starts a block.
 fn unsafe_words(stream: TokenStream, found: &mut Vec<(usize, bool)>) {
     let tokens: Vec<TokenTree> = stream.into_iter().collect();
     for (at, token) in tokens.iter().enumerate() {
@@ -515,7 +515,7 @@ fn unsafe_code_stays_where_it_belongs_and_says_why_it_is_sound() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Whether the comment right above the statement that holds this line says SAFETY.
+/// Whether the comment directly above the statement with this line contains SAFETY.
 fn says_why(lines: &[&str], number: usize) -> bool {
     let mut above = number;
     while above > 0 && !lines[above - 1].trim_start().starts_with("//") {

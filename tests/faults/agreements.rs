@@ -1,4 +1,5 @@
-//! Each agreement and each file operation of runs fails on each rank in turn: all ranks end alike, with one message.
+//! Each agreement and each file operation of a run fails on each rank in turn. All ranks must end in the same way, with one
+//! message.
 
 use crate::{case::Case, mpirun, trials};
 use clarke::{
@@ -19,18 +20,19 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// The scenario under `mpirun`: followed by a kind of run and the number of a part.
+/// The name of the scenario under `mpirun`, which is followed by a kind of run and the number of a part.
 pub const SCENARIO: &str = "agreements ";
 
 const RANKS: usize = 3;
 
-/// Launches that share all points of a kind of run: each takes every 120th, on each rank in turn.
+/// Number of launches among which the operations of a kind of run are distributed: each launch lets every 120th operation fail, on
+/// each rank in turn.
 const PARTS: usize = 120;
 
 /// Kinds of runs by the names of their job files.
 const KINDS: [&str; 3] = ["fixed", "adaptive", "restart"];
 
-/// A small body in contact that writes all there is to write: history, probes, two profiles, fields, checkpoints.
+/// A small body in contact that writes all kinds of output: history, probes, two profiles, fields, checkpoints.
 fn small() -> Case {
     Case::square(3)
         .set("time.end", "0.25")
@@ -72,8 +74,8 @@ fn whatever_fails_on_whichever_rank_ends_all_ranks_alike() {
     }
 }
 
-/// The side that runs under `mpirun`. Files that could not be written stay open, as in a run; so the process ends without
-/// finishing MPI.
+/// The part that runs under `mpirun`. Files that could not be written stay open, as in a run; therefore the process ends without
+/// finalising MPI.
 pub fn scenario(words: &str, folder: &Path) {
     let (kind, part) = words.split_once(' ').expect("a kind and a part");
     let mpi = Mpi::start().expect("MPI");
@@ -90,7 +92,7 @@ pub fn scenario(words: &str, folder: &Path) {
     }
 }
 
-/// Lets operations of one kind of run fail, each on each rank: those of one part.
+/// Lets the operations of one part of a kind of run fail, each on each rank.
 fn disturb(session: &Session, folder: &Path, kind: &str, part: usize) {
     fail_at(None);
     taken(session, folder, kind, "undisturbed").expect("a run that nothing disturbs");
@@ -108,7 +110,7 @@ fn disturb(session: &Session, folder: &Path, kind: &str, part: usize) {
         points += 1;
         let Err(error) = ended else { continue };
         failed += 1;
-        // A checkpoint that can't be read is passed over, and none may be left.
+        // An unreadable checkpoint is skipped, and there may be no other one.
         assert!([Exit::Failed, Exit::Refused].contains(&error.exit()), "{error:?}");
         assert!(error.to_string().contains(&format!("operation {number} failed for a test")), "{error:?}");
         assert!([0, rank].contains(&error.rank()), "{error:?}");
@@ -120,7 +122,7 @@ fn disturb(session: &Session, folder: &Path, kind: &str, part: usize) {
     assert!(2 * failed > points, "most failures end a run");
 }
 
-/// Runs a job anew or, for a restart, goes on from a copy of what the undisturbed run saved after two steps.
+/// Runs a job from the start or, for a restart, from a copy of the checkpoint that the undisturbed run saved after two steps.
 fn taken(session: &Session, folder: &Path, kind: &str, results: &str) -> Result<Exit, Agreed> {
     let out = folder.join(results);
     if session.is_first() && kind == "restart" {
@@ -149,7 +151,7 @@ fn take(session: &Session, folder: &Path, kind: &str, results: &str) -> Result<E
     run::run(session, loaded, &start, clock)
 }
 
-/// All ranks must have ended in the same way, with the same words.
+/// All ranks must have ended in the same way, with the same message.
 fn assert_alike(session: &Session, ended: &Result<Exit, Agreed>) {
     let words = format!("{ended:?}").into_bytes();
     let all = gather(session.world(), &words).expect("words");
@@ -157,7 +159,7 @@ fn assert_alike(session: &Session, ended: &Result<Exit, Agreed>) {
     assert!(alike, "rank {}: {ended:?}", session.rank());
 }
 
-/// Tells at once, so that a run that hangs is known.
+/// Prints immediately, so that a run that hangs can be identified.
 fn say(session: &Session, words: &str) {
     if session.is_first() {
         println!("{words}");

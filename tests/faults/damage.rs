@@ -1,4 +1,4 @@
-//! Damaged and foreign checkpoints: passed over or refused, never gone on from.
+//! Damaged and foreign checkpoints are skipped or refused; no run continues from them.
 
 use crate::{
     Random, trials,

@@ -1,4 +1,4 @@
-//! Disks that are full or can't be written. Small disks need mount namespaces; limits of file sizes do without.
+//! Disks that are full or not writable. Small disks need mount namespaces; limits of file sizes do not.
 
 use crate::{
     case::Case,
@@ -8,7 +8,7 @@ use crate::{
 };
 use std::process::Command;
 
-/// Runs the solver whose files may have this many blocks of 512 bytes, on each rank or on one.
+/// Runs the solver with files limited to this number of blocks of 512 bytes, on all ranks or on one.
 fn limited(case: &Case, blocks: usize, only: Option<usize>) -> Outcome {
     let mut command = Command::new("mpirun");
     command.args(["--oversubscribe", "--bind-to", "none"]);
@@ -22,12 +22,12 @@ fn limited(case: &Case, blocks: usize, only: Option<usize>) -> Outcome {
         command.args(if rank == 0 { &["-n", "1"][..] } else { &[":", "-n", "1"] });
         command.args(["sh", "-c", &script, env!("CARGO_BIN_EXE_solver")]).arg(case.written());
     }
-    // Shared memory of the ranks is a file as well.
+    // The shared memory of the ranks is a file, too.
     command.env("OMPI_MCA_btl", "self,tcp");
     Running::spawn(command).wait()
 }
 
-/// Words of the systems' refusals to write.
+/// Messages of operating systems that refuse to write.
 #[track_caller]
 fn assert_says_why(outcome: &Outcome, what: &str) {
     let said = &outcome.stderr;
@@ -62,7 +62,7 @@ fn a_file_that_may_not_grow_ends_the_run_with_its_name_and_the_rest_goes_on_to_t
     assert!(ended > tried.len());
 }
 
-/// Runs a script in a mount namespace of its own, where a small disk lies on a folder; `None` where that is not allowed.
+/// Runs a script in a separate mount namespace, in which a small disk is mounted on a folder; `None` if that is not permitted.
 fn on_small_disk(case: &Case, size: &str, script: &str) -> Option<Outcome> {
     let namespace = ["-rm", "sh", "-c"];
     let allowed = Command::new("unshare").args(namespace).arg("mount -t tmpfs none /mnt").output();
@@ -90,7 +90,7 @@ fn a_full_disk_ends_the_run_and_with_more_room_it_goes_on_to_the_same_result() {
     let mut ended = 0;
     for size in tried {
         let case = saving();
-        // The run on the small disk; its exit code is said, and what it left is kept.
+        // The run on the small disk. It prints its exit code, and its files are kept.
         let script = format!("{LAUNCH} \"$0\" run \"$2\"; echo \"ended with $?\"; cp -r \"$1\" \"$3\"");
         let Some(outcome) = on_small_disk(&case, size, &script) else { return };
         let outcome = outcome.expect(0);
@@ -116,7 +116,7 @@ fn a_folder_that_may_only_be_read_is_named() {
 
 #[test]
 fn a_device_that_is_always_full_ends_the_run_in_words() {
-    // Of several profiles: rank 0 fails in the rows of the first one, where the others go on to the next.
+    // With several profiles: rank 0 fails in the rows of the first one, while the other ranks proceed to the next one.
     let profiles = "[{on = 'bottom'}, {on = 'top'}, {on = 'right'}]";
     for name in ["probes.csv", "profiles.csv"] {
         let case = saving().set("mesh.rectangle.cells", "[200, 4]").set("output.profile", profiles);

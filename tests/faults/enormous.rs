@@ -1,4 +1,4 @@
-//! Input that is enormous, or says it is: refused before memory is taken.
+//! Input that is enormous, or claims to be, is refused before memory is allocated.
 
 use crate::{
     case::Case,
@@ -6,10 +6,10 @@ use crate::{
 };
 use std::{fs::File, path::Path, process::Command};
 
-/// Far more than a refusal needs, in kB; memory beyond it is not given.
+/// Limit of the memory in kB, far more than a refusal needs.
 const MEMORY: usize = 4_000_000;
 
-/// Checks a job in one process of bounded memory.
+/// Checks a job in one process with limited memory.
 #[track_caller]
 fn refused(job: &Path) -> Outcome {
     let mut command = Command::new("sh");

@@ -1,4 +1,4 @@
-//! Output stays in its folder, and results of another job stay what they are.
+//! A run writes to its output folder only, and results of other jobs are not changed.
 
 use crate::{case::Case, launch::Target, results::names};
 use std::fs;
@@ -7,7 +7,7 @@ fn small() -> Case {
     Case::square(4).set("time.end", "0.25").set("checkpoint.every", "2")
 }
 
-/// Everything in a folder, by name.
+/// The contents of a folder by name.
 fn contents(case: &Case) -> Vec<(String, Vec<u8>)> {
     let folder = case.folder().join("out");
     names(&folder)
@@ -50,7 +50,7 @@ fn the_same_job_runs_again_in_its_folder_with_other_output_and_another_end() {
     case.run(2);
     case.run_with(1, &["--set", "time.end=0.5", "--set", "output.fields={every=1}"]).expect(0);
     case.run_with(1, &["--set", "solver.preconditioner=gamg"]).expect(0);
-    // The effective job that a run leaves is the same job.
+    // The effective job in the output folder is the same job.
     let effective = case.folder().join("out/job.toml");
     crate::launch::run(2, &["run", &effective.display().to_string()]).expect(0);
 }
@@ -67,7 +67,7 @@ fn a_run_that_was_stopped_is_not_lost_by_starting_it_again() {
         case.run_with(ranks, &["--restart", "--set", "checkpoint.wall_limit=1000"])
             .expect(0)
             .says("continuing from");
-        // It has come to its end, and may run again.
+        // The run is finished, and the job may run again.
         case.run_with(ranks, &["--set", "checkpoint.wall_limit=1000"]).expect(0);
     }
 }
@@ -76,7 +76,7 @@ fn a_run_that_was_stopped_is_not_lost_by_starting_it_again() {
 fn a_run_that_was_killed_or_failed_is_not_lost_by_starting_it_again() {
     let case = small();
     case.run(1);
-    // As one leaves it that was killed later: the summary of a run is removed when the next one begins.
+    // The state after a second run was killed: a new run removes the summary of the previous one at its start.
     fs::remove_file(case.folder().join("out/summary.json")).expect("removed");
     let before = contents(&case);
     case.run_with(2, &[]).expect(2).says("did not finish").says("checkpoint-4.h5");

@@ -13,16 +13,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What a kill is to hit.
+/// The phase of a run in which it is killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Moment {
-    /// Anything from the launch to the end.
+    /// At any time from the launch to the end.
     Any,
-    /// A checkpoint that is being written: its unfinished file is there.
+    /// While a checkpoint is written: its incomplete file exists.
     Saving,
 }
 
-/// Kills a process of the run at the moment, after some more random microseconds; whether it was still there.
+/// Kills a process of the run in this phase, after a random number of microseconds; returns whether the process still existed.
 fn kill(case: &Case, running: &mut Running, moment: Moment, whole: Duration, random: &mut Random) -> bool {
     let target = if random.below(3) == 0 { Target::Launcher } else { Target::OneRank };
     let began = Instant::now();
@@ -45,10 +45,10 @@ fn half_written(folder: &Path) -> bool {
     names.iter().any(|name| name.ends_with(".h5.part"))
 }
 
-/// What became of the kills.
+/// The outcomes of the kills.
 type Counts = BTreeMap<&'static str, usize>;
 
-/// Starts a run, or goes on, and kills it; whether it was still there.
+/// Starts or continues a run and kills it; returns whether it was still running.
 fn run_and_kill(case: &Case, whole: Duration, random: &mut Random, counts: &mut Counts) -> bool {
     let moment = if random.below(3) == 0 { Moment::Any } else { Moment::Saving };
     let out = case.folder().join("out");
@@ -77,7 +77,7 @@ fn a_run_killed_at_any_moment_goes_on_to_the_same_result() {
     let mut kills = 0;
     while kills < wanted {
         let case = saving();
-        // Kills in a row: the first run, then runs that go on.
+        // Successive kills: first of the initial run, then of runs that continue it.
         for _ in 0..=random.below(trials(3, 8) as u64) {
             kills += usize::from(run_and_kill(&case, whole, &mut random, &mut counts));
         }

@@ -1,4 +1,4 @@
-//! Ends of time: the run saves its state before, on all ranks, and goes on.
+//! Time limits: the run saves its state before the limit, on all ranks, and can be continued.
 
 use crate::{
     case::Case,
@@ -16,7 +16,7 @@ fn now() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).expect("a time").as_secs()
 }
 
-/// The step of the newest checkpoint and when it was written.
+/// The step of the newest checkpoint, and the time when it was written.
 fn newest_checkpoint(results: &Results) -> (u64, u64) {
     let found = clarke::io::output::checkpoint_folder::list(&results.path("")).expect("list");
     let (step, file) = &found[0];
@@ -24,7 +24,7 @@ fn newest_checkpoint(results: &Results) -> (u64, u64) {
     (*step, written.duration_since(UNIX_EPOCH).expect("a time").as_secs())
 }
 
-/// Far more steps than any test waits for.
+/// More steps than any test waits for.
 fn endless() -> Case {
     Case::square(6)
         .set("time.step", "0.0009765625")
@@ -32,7 +32,7 @@ fn endless() -> Case {
         .set("output.fields", "{every = 1000000}")
 }
 
-/// Runs the solver on three ranks; only one of them knows when its Slurm job ends.
+/// Runs the solver on three ranks, of which only one knows the end of its Slurm job.
 fn with_end(case: &Case, end: &str, knows: usize) -> Outcome {
     let mut command = Command::new("mpirun");
     command.args(["--oversubscribe", "--bind-to", "none"]);

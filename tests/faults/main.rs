@@ -1,4 +1,4 @@
-//! Faults lose nothing: killed processes, full disks, damaged files, time limits, foreign folders, hostile input.
+//! Faults cause no loss of results: killed processes, full disks, damaged files, time limits, foreign folders, hostile input.
 //!
 //! `make test` tries a sample of each, `make hard` many more (`CLARKE_HARD=1`); docs/stability.md has the counts.
 
@@ -28,7 +28,7 @@ mod one_rank;
 mod results;
 mod undisturbed;
 
-/// The side of the tests that runs under `mpirun`.
+/// The part of the tests that runs under `mpirun`.
 #[test]
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
@@ -45,12 +45,12 @@ fn scenario() {
     std::process::exit(i32::from(exit as u8));
 }
 
-/// How many of something to try: a sample, or many in `make hard`.
+/// Number of cases: a sample, or many in `make hard`.
 fn trials(sample: usize, many: usize) -> usize {
     if std::env::var_os("CLARKE_HARD").is_some() { many } else { sample }
 }
 
-/// Numbers that look random, the same in every run of the tests.
+/// Pseudorandom numbers, the same in every run of the tests.
 struct Random(u64);
 
 impl Random {

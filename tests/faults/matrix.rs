@@ -1,4 +1,4 @@
-//! Restarts from any number of ranks to any number, of each effect, under each scheme, with fixed and adaptive steps.
+//! Restarts between all numbers of ranks, for each effect and each scheme, with fixed and adaptive steps.
 
 use crate::{Random, case::Case, hdf5_file::NumberFile, mpirun, results::Results, trials};
 use clarke::{
@@ -20,7 +20,7 @@ const JOBS: &str = "jobs.txt";
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];
 
-/// An effect's name, the keys that give it to the paper's job, and whether it needs the explicit scheme.
+/// The name of an effect, the keys that add it to the paper's job, and whether it needs the explicit scheme.
 type Choice = (&'static str, &'static [(&'static str, &'static str)], bool);
 
 const EFFECTS: [Choice; 14] = [
@@ -78,7 +78,7 @@ const EFFECTS: [Choice; 14] = [
     ("memory", &[("contact.0.memory", "{ stiffness_rate = 200, decay_time = 0.3 }")], true),
 ];
 
-/// A place in the matrix: effect, scheme, whether steps adapt.
+/// An entry of the matrix: effect, scheme, and whether steps are adaptive.
 type Combination = (usize, usize, bool);
 
 fn combinations() -> Vec<Combination> {
@@ -101,7 +101,8 @@ fn job((effect, scheme, adaptive): Combination) -> Case {
         .set("time.step", "0.015625")
 }
 
-/// The side of the test that runs under `mpirun`: all jobs of a batch anew, or gone on with from what each number of ranks left.
+/// The part of the test that runs under `mpirun`: runs all jobs of a batch from the start, or continues them from the checkpoints
+/// of each number of ranks.
 pub fn scenario(name: &str, folder: &Path) {
     let mpi = Mpi::start().expect("MPI");
     let session = mpi.session().expect("PETSc");
@@ -139,7 +140,7 @@ fn beside(job: &Path, folder: &str) -> PathBuf {
     job.with_file_name(folder)
 }
 
-/// The same to the last bit on the same ranks, to solver tolerance on others.
+/// Results are bitwise equal on the same number of ranks, and equal up to the solver tolerance on others.
 #[track_caller]
 fn assert_same(straight: &[(String, Vec<f64>)], found: &[(String, Vec<f64>)], share: f64, what: &str) {
     assert_eq!(straight.len(), found.len(), "{what}");
@@ -153,7 +154,7 @@ fn assert_same(straight: &[(String, Vec<f64>)], found: &[(String, Vec<f64>)], sh
     }
 }
 
-/// Holds every restart of a job against the straight run on the ranks that it started on.
+/// Compares every restart of a job with the uninterrupted run on the number of ranks on which it started.
 fn compare(combination: Combination, job: &Path) {
     let (effect, scheme, adaptive) = combination;
     for writers in RANKS {

@@ -1,5 +1,5 @@
-//! A law or the assembly fails on one rank: all ranks end together, with one reason. Files that one rank can't write are
-//! in `disks`, callbacks of Newton's method in `tests/verification/callbacks.rs`.
+//! A law or the assembly fails on one rank: all ranks end together, with one message. `disks` tests files that one rank cannot
+//! write, `tests/verification/callbacks.rs` callbacks of Newton's method.
 
 use crate::mpirun;
 use clarke::{
@@ -19,7 +19,7 @@ use clarke::{
 };
 use std::path::Path;
 
-/// What goes wrong on the last rank, at the third step or at the last, shorter one.
+/// The fault on the last rank, in the third step or in the last step, which is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Law,
@@ -27,7 +27,7 @@ enum Fault {
     Assembly,
 }
 
-/// An effect without force, until it goes wrong.
+/// An effect without force that fails in one step.
 struct Faulty {
     fault: Fault,
     here: bool,
@@ -65,7 +65,7 @@ contact = [{ on = ["bottom"], normal.damped_response = { breakpoints = [0.003, 0
 time = { end = 0.33, step = 0.05 }
 "#;
 
-/// The side that runs under `mpirun`: says the error of this rank, and gives its exit code.
+/// The part that runs under `mpirun`: prints the error of this rank and returns its exit code.
 pub fn fail(name: &str) -> Exit {
     let mpi = Mpi::start().expect("MPI");
     let session: Session = mpi.session().expect("PETSc");

@@ -1,26 +1,27 @@
-//! What a run gives that nothing disturbed, and how a disturbed one is held against it.
+//! The results of an undisturbed run, and their comparison with those of a disturbed one.
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 
-/// Ranks of the runs that are disturbed.
+/// Number of ranks of disturbed runs.
 pub const RANKS: usize = 2;
 
-/// Steps of a case.
+/// Number of steps of a case.
 const STEPS: u64 = 16;
 
-/// A job that saves after each of its 16 steps and writes fields after each fourth; most of its time goes into files.
+/// A job that saves a checkpoint after each of its 16 steps and writes fields after every fourth; writing files takes most of its
+/// time.
 pub fn saving() -> Case {
     Case::square(16).set("checkpoint.every", "1").set("output.fields", "{every = 4}")
 }
 
-/// The same job where nothing happens.
+/// The same job without disturbance.
 pub fn undisturbed() -> (Results, Case) {
     let case = saving();
     (case.run(RANKS), case)
 }
 
-/// Goes on, or starts anew where no checkpoint was left; the results must then be those of the undisturbed run to the last
-/// bit. Gives whether the field file had to be put aside.
+/// Continues the run, or starts it again if there is no checkpoint; the results must then be bitwise equal to those of the
+/// undisturbed run. Returns whether the field file had to be replaced.
 #[track_caller]
 pub fn finish(case: &Case, straight: &Results, what: &str) -> bool {
     let left = case.folder().join("out");
@@ -45,7 +46,7 @@ fn assert_same(straight: &Results, results: &Results, what: &str) -> bool {
     assert_same_fields(straight, results, what)
 }
 
-/// Every step of the fields that are there must be the undisturbed one, the last one among them.
+/// All steps in the field file must be equal to those of the undisturbed run, and the last one must be among them.
 fn assert_same_fields(straight: &Results, results: &Results, what: &str) -> bool {
     let put_aside = results.path("fields.damaged.vtkhdf").exists();
     let [one, other] = [straight, results].map(|r| NumberFile::open(&r.path("fields.vtkhdf")));

@@ -1,11 +1,11 @@
-//! Steps around the bound of the explicit scheme, and far beyond it under the implicit ones.
+//! Steps near the bound of the explicit scheme, and far above it with implicit schemes.
 
 use crate::{case::Case, family};
 use clarke::linear_algebra::tensor::larger;
 
 const STEPS: f64 = 200.0;
 
-/// The shaken square, or a cube with the same material.
+/// The vibrating square, or a cube with the same material.
 fn shaken(dimension: usize) -> Case {
     let square = Case::of("hard/near_the_explicit_bound");
     if dimension == 2 {
@@ -21,7 +21,7 @@ fn shaken(dimension: usize) -> Case {
         )
 }
 
-/// The bound that the certificate gives, from a run of one tiny step.
+/// The bound of the certificate, from a run of one very short step.
 fn certified(dimension: usize) -> f64 {
     let tiny = shaken(dimension).set("time.step", "1e-3").set("time.end", "1e-3");
     tiny.run(1).summary()["certificates"]["explicit_step_bound"].as_f64().expect("a bound")
@@ -31,7 +31,7 @@ fn of_length(case: Case, step: f64) -> Case {
     case.set("time.step", &format!("{step:e}")).set("time.end", &format!("{:e}", STEPS * step))
 }
 
-/// Elastic energy after the steps over that after the first.
+/// Ratio of the elastic energy after all steps to that after the first one.
 fn growth(case: &Case) -> f64 {
     let energy = case.results().table("history.csv").numbers("elastic_energy");
     energy[energy.len() - 1] / energy[0]

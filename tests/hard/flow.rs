@@ -1,4 +1,4 @@
-//! Viscoplastic flow near its limits: no viscosity, no yield stress, one that is never reached, high powers.
+//! Viscoplastic flow near its limits: vanishing viscosity, zero yield stress, a yield stress that is never reached, high exponents.
 
 use crate::{assert_close, case::Case, family};
 use clarke::linear_algebra::tensor::larger;
@@ -7,8 +7,8 @@ const PLANE: &str = "hard/nearly_perfect_plasticity";
 const SPACE: &str = "hard/nearly_perfect_plasticity_in_space";
 const RELAXATION: &str = "material.viscoplasticity.perzyna.relaxation";
 
-/// Displacements of the end of a bar that hardens, by the backward differences of its one equation
-/// `p' = (s - yield - 100 p) / (3 relaxation)` under `s = 15 min(t, 1)`.
+/// Displacements of the end of a hardening bar, by backward differences of the scalar equation `p' = (s - yield - 100 p) / (3
+/// relaxation)` under `s = 15 min(t, 1)`.
 fn by_hand(relaxation: f64, yield_stress: f64) -> Vec<f64> {
     let mut flown = 0.0;
     let step = 0.05;
@@ -41,7 +41,7 @@ fn bars_flow_by_the_recursion_of_their_one_equation_at_any_relaxation() {
     }
 }
 
-/// In plane stress flow across the bar has a say in its rate, but not in where it ends.
+/// In plane stress, flow across the bar changes the rate of the flow, but not its final state.
 #[test]
 fn bars_in_plane_stress_end_where_flow_without_viscosity_does() {
     for relaxation in family(&[1e-2, 1e-8], &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7]) {
@@ -70,7 +70,7 @@ fn yield_stresses_may_vanish_and_may_be_out_of_reach() {
 #[test]
 fn creep_by_any_power_of_the_overstress_is_that_of_the_closed_form() {
     for exponent in family(&[2.0, 20.0], &[1.0, 1.5, 5.0, 10.0, 15.0]) {
-        // The same rate of creep for each.
+        // The same creep rate in each case.
         let relaxation = 1e-4 * 2.0f64.powf(20.0 - exponent);
         let case = Case::of("hard/twentieth_power_of_the_overstress")
             .set("material.viscoplasticity.perzyna.exponent", &format!("{exponent:?}"))

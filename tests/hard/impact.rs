@@ -1,9 +1,9 @@
-//! Impacts at any speed: thrown back as the equations scale, never through the wall, without energy out of nothing.
+//! Impacts at any speed: the rebound scales with the equations, no body passes through the wall, and no energy is generated.
 
 use crate::{case::Case, family, results::Results};
 use clarke::linear_algebra::tensor::larger;
 
-/// Energy less the work of loads, of every step.
+/// Energy minus the work of loads, for every step.
 fn energies(results: &Results) -> Vec<f64> {
     let history = results.table("history.csv");
     let columns = ["kinetic_energy", "elastic_energy", "external_work"].map(|name| history.numbers(name));
@@ -21,7 +21,7 @@ fn assert_never_grows(results: &Results, what: &str) {
     assert!(imbalance < 1e-9, "{what}: imbalance {imbalance:e}");
 }
 
-/// A bar of 10 m/s wave speed that flies into a wall at this speed; time in which it flies the gap stays.
+/// A bar with a wave speed of 10 m/s that hits a wall at this speed. The time of flight across the gap is always the same.
 fn bar(job: &str, speed: f64) -> Case {
     Case::of(job)
         .set("initial.velocity", &format!("[{speed:e}, 0]"))
@@ -47,7 +47,7 @@ fn bars_are_thrown_back_alike_at_any_speed() {
     }
 }
 
-/// Scheme, dimension, viscosity in Pa s, step and end in s, and how many bounces there must be at least.
+/// Scheme, dimension, viscosity in Pa s, step and end in s, and the smallest accepted number of rebounds.
 type Fall = (&'static str, usize, f64, f64, f64, usize);
 
 #[test]

@@ -1,4 +1,4 @@
-//! What linear cells lose near a Poisson's ratio of 0.5, and what crossed diagonals give back.
+//! The locking of linear cells near a Poisson's ratio of 0.5, and its reduction by crossed diagonals.
 
 use crate::{case::Case, family};
 
@@ -28,7 +28,7 @@ fn deflection(poisson_ratio: f64, n: usize, diagonal: &str) -> f64 {
 #[test]
 fn bending_locks_near_a_half_and_crossed_diagonals_do_not() {
     for ratio in family(&[0.4999], &[0.3, 0.45, 0.49, 0.499]) {
-        // Converged from crossed cells, whose errors fall fourfold.
+        // The limit for crossed cells, whose errors decrease by a factor of four per refinement.
         let (fine, finer) = (deflection(ratio, 8, "crossed"), deflection(ratio, 16, "crossed"));
         let exact = finer + (finer - fine) / 3.0;
         let lost = |diagonal| 1.0 - deflection(ratio, 4, diagonal) / exact;

@@ -1,9 +1,9 @@
-//! Jumps and kinks for very many steps.
+//! Laws with jumps and kinks over very many steps.
 
 use crate::{case::Case, results::Results, thorough};
 use clarke::linear_algebra::tensor::larger;
 
-/// Largest of some numbers, without signs.
+/// The largest absolute value of some numbers.
 fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().map(|x| x.abs()).fold(0.0, larger)
 }
@@ -43,7 +43,7 @@ fn a_block_rests_on_a_jump_for_all_steps() {
     assert_balanced(&results);
 }
 
-/// A load that passes the jump in both directions, with a hundred steps in each period of a second.
+/// A load that crosses the jump in both directions, with a period of one second and a hundred steps per period.
 #[test]
 fn a_block_sticks_and_slips_alike_in_every_period() {
     let periods = if thorough() { 1000 } else { 10 };
@@ -62,7 +62,7 @@ fn a_block_sticks_and_slips_alike_in_every_period() {
     assert_balanced(&results);
 }
 
-/// The pressure of the job's law at a normal velocity.
+/// The pressure of the contact law of the job at a normal velocity.
 fn pressure(velocity: f64) -> f64 {
     let speed = velocity.abs();
     let size = match speed {
@@ -73,7 +73,7 @@ fn pressure(velocity: f64) -> f64 {
     size.copysign(velocity)
 }
 
-/// Velocities of a mass of 1 kg/m^2 on the law, by backward differences; each step has one solution, found by halving.
+/// Velocities of a mass of 1 kg/m^2 on this law, by backward differences. Each step has one solution, which bisection finds.
 fn by_hand(steps: usize) -> Vec<f64> {
     let (step, mut velocity) = (0.01, 0.0);
     let advance = |n: usize| {
@@ -102,7 +102,7 @@ fn a_plate_whose_points_cross_every_kink_together_is_one_mass() {
     let together =
         results.table("history.csv").numbers("active_changes").iter().filter(|n| **n == 17.0).count();
     println!("{steps} steps, {together} in which all points change their branch: {off:.1e} m/s off");
-    // The plate is a stiff body, not a rigid one.
+    // The plate is stiff, but not rigid.
     assert!(off < 1e-6 * largest(&expected), "{off:e}");
     assert!(together >= steps / 50, "{together} steps in which all points change");
     assert_balanced(&results);

@@ -1,4 +1,4 @@
-//! Loads that are no number in the middle of a run, and supports that are not there.
+//! Loads that become undefined during a run, and missing supports.
 
 use crate::{case::Case, family};
 

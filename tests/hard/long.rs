@@ -1,4 +1,4 @@
-//! Very many steps: no drift of the balance, no memory that grows, sums that keep their digits.
+//! Very many steps: the energy balance does not drift, memory does not grow, and sums keep their accuracy.
 
 use crate::{assert_close, case::Case, results::Results, thorough};
 use clarke::{
@@ -6,12 +6,12 @@ use clarke::{
     linear_algebra::tensor::larger,
 };
 
-/// A million steps, or a sample.
+/// A million steps, or fewer in a sample.
 fn steps() -> usize {
     if thorough() { 1_000_000 } else { 5_000 }
 }
 
-/// What is in the body and what left it, less what was put in, over what was put in.
+/// Stored plus dissipated energy minus supplied energy, relative to the supplied energy.
 fn missing(results: &Results) -> f64 {
     let history = results.table("history.csv");
     let energies = Energy::COLUMNS.into_iter().zip(Energy::ROLES).filter(|(_, role)| *role != Role::Work);
@@ -20,7 +20,7 @@ fn missing(results: &Results) -> f64 {
         / history.numbers("viscous_dissipation").last().expect("a step")
 }
 
-/// A square of two cells, loaded to and fro, on a law with kinks.
+/// A square of two cells under an oscillating load, on a law with kinks.
 fn shaken(steps: usize) -> Case {
     Case::square(1)
         .set("traction.0.value", "['0', '-10*sin(2*pi*t)']")
@@ -55,7 +55,8 @@ fn a_million_steps_of_a_small_job_drift_in_nothing_and_take_no_more_memory() {
     assert!(off < 1e-9 * largest, "{off:e}");
 }
 
-/// A bar that creeps at a constant rate: strain and history cancel to a stress that is ever smaller beside them.
+/// A bar that creeps at a constant rate: the stress is the difference of strain and history, relative to which it becomes smaller
+/// and smaller.
 #[test]
 fn the_history_keeps_its_digits_while_it_is_summed_up() {
     let (steps, step) = (steps(), 0.01);

@@ -1,7 +1,7 @@
-//! Hard cases that one job can't show: families over a parameter, units, refusals, very many steps.
+//! Hard cases that need more than one job: families over a parameter, units, refusals, very many steps.
 //!
-//! `make test` tries a sample of each family, `make hard` the whole (`CLARKE_HARD=1`); docs/stability.md has the numbers.
-//! The tests print what they measured.
+//! `make test` tries a sample of each family, `make hard` the whole (`CLARKE_HARD=1`); docs/stability.md has the numbers. The tests
+//! print the measured numbers.
 
 mod bounds;
 #[path = "../runs/case.rs"]
@@ -24,7 +24,7 @@ mod theta;
 mod units;
 mod vanishing;
 
-/// A sample of a family, or all of it in `make hard`.
+/// A sample of a family, or the whole family in `make hard`.
 fn family<T: Clone>(sample: &[T], others: &[T]) -> Vec<T> {
     let others = if thorough() { others } else { &[] };
     [sample, others].concat()
@@ -35,7 +35,7 @@ fn thorough() -> bool {
     std::env::var_os("CLARKE_HARD").is_some()
 }
 
-/// These must agree within a share of the expected number.
+/// The numbers must agree within a fraction of the expected one.
 #[track_caller]
 fn assert_close(found: f64, expected: f64, share: f64, what: &str) {
     assert!((found - expected).abs() <= share * expected.abs(), "{what}: {found:e} instead of {expected:e}");

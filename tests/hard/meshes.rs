@@ -1,4 +1,4 @@
-//! Meshes at the edge: one cell, fewer contact nodes than ranks, ranks without contact, bad cells on many ranks.
+//! Extreme meshes: one cell, fewer contact nodes than ranks, ranks without contact, bad cells on many ranks.
 
 use crate::{assert_close, case::Case, family, results::assert_same_answer};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn a_body_of_one_cell_has_the_displacements_worked_out_by_hand() {
 
 #[test]
 fn more_ranks_than_contact_nodes_and_ranks_without_contact_change_nothing() {
-    // Two contact nodes below a tower.
+    // A tower on two contact nodes.
     let tower = || Case::square(1).set("mesh.rectangle.cells", "[1, 12]").set("solver.tolerance", "1e-13");
     let corner = Case::of("block_in_a_corner")
         .set("solver.tolerance", "1e-13")

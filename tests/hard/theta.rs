@@ -1,8 +1,9 @@
-//! Steps with theta from far below 1 to far beyond it: solved, refused in the certificate's words, or failed, never wrong.
+//! Steps with theta from far below 1 to far above 1: they are solved, refused with the message of the certificate, or failed, but
+//! never wrong.
 
 use crate::{case::Case, family};
 
-/// The law of the job: falls by 2 Pa s/m between 1 and 2 m/s.
+/// The law of the job, which decreases by 2 Pa s/m between 1 and 2 m/s.
 fn pressure(velocity: f64) -> f64 {
     match velocity {
         ..1.0 => 10.0 * velocity,
@@ -11,7 +12,7 @@ fn pressure(velocity: f64) -> f64 {
     }
 }
 
-/// A layer with this theta of a step, whose load meets the middle of the falling branch.
+/// A layer with this theta of a step, whose load intersects the decreasing branch in the middle.
 fn layer(theta: f64) -> (Case, f64, f64) {
     let shear = 2.0 / theta;
     let load = shear * 1.5 + pressure(1.5);
@@ -63,7 +64,7 @@ fn what_is_found_beyond_one_is_a_solution_and_others_are_told() {
     }
 }
 
-/// With mass the layer has one motion in time, whatever its steps: up to the first rest position that it meets.
+/// With mass, the layer has one motion in time for any steps: up to the first equilibrium position that it reaches.
 #[test]
 fn adaptive_steps_follow_the_one_motion_though_longer_ones_have_several_solutions() {
     for (load, rest) in

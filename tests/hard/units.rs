@@ -1,10 +1,10 @@
-//! The same physics in other units has the same digits.
+//! The same problem in other units has the same results.
 
 use crate::{case::Case, family, results::Results};
 use clarke::linear_algebra::tensor::larger;
 use toml::Value;
 
-/// Numbers of one unit of stress, length and time in the units of a job.
+/// The values of 1 Pa, 1 m and 1 s in the units of a job.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     stress: f64,
@@ -17,7 +17,7 @@ const MILLIMETRES: Units = Units { stress: 1e-6, length: 1e3, time: 1.0 };
 /// Young's modulus, the side and the time of a wave across it are 1.
 const NONDIMENSIONAL: Units = Units { stress: 1e-3, length: 1.0, time: 31.622776601683793 };
 
-/// Keys of the job with the powers of stress, length and time in their units.
+/// Keys of the job, with the exponents of stress, length and time in their units.
 const KEYS: [(&str, [i32; 3]); 16] = [
     ("mesh.rectangle.size", [0, 1, 0]),
     ("material.density", [1, -2, 2]),
@@ -81,7 +81,7 @@ fn job(kind: &str) -> Case {
     }
 }
 
-/// Largest difference of a column after its factor was taken out, over its largest number.
+/// Largest difference of a column after division by its conversion factor, relative to its largest number.
 fn off(one: &Results, other: &Results, table: &str, column: &str, factor: f64) -> f64 {
     let (one, other) = (one.table(table).numbers(column), other.table(table).numbers(column));
     assert_eq!(one.len(), other.len());

@@ -1,4 +1,4 @@
-//! Effects that vanish: the answer tends to that without them, or the job is refused.
+//! Vanishing effects: the results tend to those without the effect, or the job is refused.
 
 use crate::{case::Case, family};
 use clarke::linear_algebra::tensor::larger;
@@ -15,7 +15,7 @@ fn implicit() -> Case {
         .set("time.scheme", "'implicit_euler'")
 }
 
-/// Distances to the limit over its largest displacement, of the sizes in turn; they must shrink with them.
+/// Distances from the limit, relative to its largest displacement, for each size of the effect; they must decrease with the size.
 fn assert_approached(what: &str, limit: &[f64], sizes: &[f64], of: impl Fn(f64) -> Vec<f64>) {
     let scale = limit.iter().fold(0.0, |most, x| larger(most, x.abs()));
     let distance = |size: f64| {
@@ -76,7 +76,7 @@ fn a_body_that_nothing_holds_is_refused_without_inertia_and_flies_with_it() {
     let flies = free().without("contact");
     assert!(flies.run(1).number("max_energy_imbalance") < 1e-9);
     let held = || implicit().without("material.density").without("contact");
-    // Held at its side along one axis only: it may slide along the other.
+    // One side is fixed along one axis only, so that the body may slide along the other.
     let sliding = held().set("support.0.fix", "['x']");
     sliding.run_with(1, &[]).expect(2).says("translation along y");
 }

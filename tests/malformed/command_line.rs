@@ -8,7 +8,7 @@ fn paper() -> String {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml").display().to_string()
 }
 
-/// Command lines (`JOB` stands for a good job, `OUT` for a folder that isn't there) and what must be said of each.
+/// Command lines (`JOB` stands for a valid job, `OUT` for a folder that does not exist) and the required parts of their messages.
 const REFUSED: &[(&[&str], &[&str])] = &[
     (&["chekc", "JOB"], &["`chekc` is neither a command nor a job file", "did you mean `solver check`?"]),
     (&["inspct"], &["did you mean `solver inspect`?"]),

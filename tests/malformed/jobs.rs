@@ -1,4 +1,4 @@
-//! The bad jobs of tests/refusals, run: they are refused as the library refuses them.
+//! The invalid jobs of tests/refusals as runs: the program refuses them in the same way as the library.
 
 use crate::refusal::{refused_job, try_all};
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ fn header<'a>(text: &'a str, word: &'a str) -> impl Iterator<Item = &'a str> {
     text.lines().filter_map(move |line| line.strip_prefix(word)).map(str::trim)
 }
 
-/// Place and words of a fault that a job's header announces.
+/// Position and message of a fault that the head of a job announces.
 fn expected(line: &str) -> Vec<String> {
     let mut parts: Vec<String> = line.split(" | ").map(str::to_owned).collect();
     if !parts[0].starts_with("--set") {

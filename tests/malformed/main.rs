@@ -1,5 +1,5 @@
-//! Malformed jobs, meshes and command lines, given to the solver itself under `mpirun`: each is refused in words,
-//! once, and leaves nothing behind.
+//! Malformed jobs, meshes and command lines, run by the solver under `mpirun`: each is refused with one message and leaves no
+//! files.
 
 mod command_line;
 mod jobs;

@@ -1,4 +1,4 @@
-//! Bad and damaged mesh files, run with a job that is good by itself.
+//! Invalid and damaged mesh files, run with an otherwise valid job.
 
 use crate::refusal::{refused_job, try_all};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ enum Job {
 }
 use Job::{Dynamic, Quasistatic, Space};
 
-/// The files of tests/meshes/bad, and what must be said of each.
+/// The files of tests/meshes/bad and the required parts of their messages.
 const MESHES: &[(&str, Job, &[&str])] = &[
     ("another_format", Dynamic, &["another_format.msh: not a Gmsh MSH file", "solid cube"]),
     (
@@ -117,7 +117,7 @@ fn job(kind: Job, mesh: &Path) -> String {
     )
 }
 
-/// Runs a job with this mesh; the file or the job must be named.
+/// Runs a job with this mesh; the message must contain the name of the file or of the job.
 fn refused_mesh(kind: Job, mesh: &Path, words: &[&str]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let words: Vec<String> = words.iter().map(|part| (*part).to_owned()).collect();
@@ -154,7 +154,7 @@ fn what_is_no_readable_file_is_refused_as_a_mesh() {
     std::fs::copy(meshes().join("square_ascii.msh"), &locked).expect("copied");
     let nobody: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o000);
     std::fs::set_permissions(&locked, nobody).expect("locked");
-    // The superuser reads every file.
+    // The superuser can read every file.
     if std::fs::File::open(&locked).is_err() {
         cases.push((locked, &["locked.msh", "Permission denied"]));
     }

@@ -1,4 +1,4 @@
-//! What every refusal has in common.
+//! Common properties of all refusals.
 
 use crate::launch::{Outcome, run};
 use std::{
@@ -6,9 +6,9 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-/// Ranks of each refused run.
+/// Number of ranks of each refused run.
 const RANKS: usize = 2;
-/// Runs at a time.
+/// Number of simultaneous runs.
 const THREADS: usize = 4;
 
 /// Runs a job that stands alone in a folder; the refusal must hold these words, and the folder nothing new.
