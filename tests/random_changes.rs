@@ -1,4 +1,4 @@
-//! Good jobs and meshes with random changes, through everything up to the first step, in this process.
+//! Valid jobs and meshes with random changes, processed up to the first step in this process.
 
 use clarke::{
     error::{Error, Exit},
@@ -50,7 +50,7 @@ on = "bottom"
 
 const SQUARE: &str = include_str!("meshes/square_ascii.msh");
 
-/// Words that a change may put in the place of another.
+/// Words that a change may insert.
 const WORDS: &[&str] = &[
     "0",
     "1",
@@ -78,7 +78,7 @@ const WORDS: &[&str] = &[
     "[1, -1, 1]",
 ];
 
-/// Line and word to change, and what with.
+/// The line and the word to change, and the replacement.
 type Change = (prop::sample::Index, prop::sample::Index, Option<&'static str>);
 
 fn changes(most: usize) -> impl Strategy<Value = Vec<Change>> {
@@ -86,7 +86,7 @@ fn changes(most: usize) -> impl Strategy<Value = Vec<Change>> {
     prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>(), word), 0..most)
 }
 
-/// Puts words in the place of values (behind `=`, if there is one), or removes lines.
+/// Replaces values (after `=`, if there is one) by words, or removes lines.
 fn changed(text: &str, changes: &[Change]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for (line, word, replacement) in changes {
@@ -137,7 +137,7 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
         }
         Ok(())
     });
-    // A panic ends the process by MPI_Abort, and what the test runner has captured is lost: these words are not captured.
+    // A panic ends the process by MPI_Abort, and output captured by the test runner is lost; this output is not captured.
     result.unwrap_or_else(|fault| {
         let _ = writeln!(std::io::stderr(), "{fault}");
         panic!("{fault}")
@@ -149,7 +149,7 @@ fn changed_jobs_and_meshes_are_ready_to_run_or_refused_in_words() {
     assert_eq!(left, 1, "a check writes nothing");
 }
 
-/// Whether a refusal names the file and place in the job or the mesh, the probe, or the field.
+/// Whether a refusal contains the file and the position in the job or the mesh, the probe, or the field.
 fn names_its_place(words: &str, folder: &Path) -> bool {
     let names = ["job.toml:", "probe \"", "traction: ", "initial.", "cells, fewer than", "support"];
     words.contains(&folder.display().to_string()) || names.iter().any(|name| words.contains(name))

@@ -1,5 +1,5 @@
-//! Bad jobs in tests/refusals: each says in its header which faults must be reported, where, and there may be no
-//! others.
+//! Invalid jobs in tests/refusals: the header of each lists the faults that must be reported and their positions. No other faults
+//! may be reported.
 //!
 //! `# expect: line:column | fragment | fragment` is one fault; `# set: a.b=c` is an override.
 
@@ -20,7 +20,7 @@ fn header<'a>(text: &'a str, word: &str) -> Vec<&'a str> {
     text.lines().filter_map(|line| line.strip_prefix(word)).map(str::trim).collect()
 }
 
-/// What is missing or too much in the refusal of this job.
+/// The differences between expected and reported faults of this job.
 fn differences(text: &str) -> Result<(), String> {
     let overrides: Vec<String> = header(text, "# set:").into_iter().map(str::to_owned).collect();
     let report = match Job::from_text(text, "job.toml", Path::new("."), &overrides) {

@@ -15,7 +15,7 @@ pub fn run(ranks: usize, scenario: &str, folder: &Path) {
 }
 
 pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
-    // Launchers that share this folder race to make and remove it.
+    // Launchers that share this folder compete in creating and removing it.
     let own = tempfile::tempdir().expect("folder");
     Command::new("mpirun")
         .env("OMPI_MCA_orte_tmpdir_base", own.path())
@@ -25,7 +25,7 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
         .env(SCENARIO, scenario)
         .env(FOLDER, folder)
         .env("OMP_NUM_THREADS", "1")
-        // Tests share the cores: a rank that waits gives its core away.
+        // Tests share the cores: waiting ranks yield.
         .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
@@ -33,7 +33,7 @@ pub fn start(ranks: usize, scenario: &str, folder: &Path) -> Output {
         .expect("mpirun")
 }
 
-/// A number that looks random.
+/// A pseudorandom number.
 pub fn scramble(seed: u64) -> u64 {
     let mixed = (seed.wrapping_add(0x9e37_79b9_7f4a_7c15) ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb) ^ (mixed >> 31)

@@ -1,4 +1,4 @@
-//! Checkpoints, and what becomes of damaged ones.
+//! Checkpoints, intact and damaged.
 
 use crate::mpirun::{self, scramble};
 use crate::owner;
@@ -49,7 +49,7 @@ pub fn write(world: &impl Communicator, folder: &Path) {
     checkpoint_file::write(&folder.join("checkpoint-64.h5"), world, HEADER, &sets, &tables).expect("write");
 }
 
-/// Everything in the checkpoint, for these ids.
+/// The contents of the checkpoint for these ids.
 fn read_all(
     path: &Path,
     world: &impl Communicator,
@@ -147,7 +147,7 @@ pub fn damage(world: &impl Communicator, folder: &Path) {
     refused(&[good.as_slice(), &[0]].concat());
     refused(&vec![0; good.len()]);
 
-    // Damage that was there before the seal: the tables' own checksums.
+    // Damage before sealing, which the checksums of the tables detect.
     let number = history(117)[1].to_le_bytes();
     let place = good.windows(8).position(|bytes| bytes == number).expect("a number of the table");
     let mut bad = good.clone();

@@ -1,4 +1,4 @@
-//! Field files, read back serially the way other programs do.
+//! Field files, read serially as other programs read them.
 
 use crate::{mpirun, owner};
 use clarke::io::output::fields::{Field, FieldFile, FieldMesh, Place, Shape};

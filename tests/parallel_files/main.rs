@@ -1,5 +1,5 @@
-//! Files that several ranks write and read together. A test starts this program again under `mpirun`, once for each
-//! scenario and number of ranks, and checks what the scenario did or left.
+//! Files that several ranks write and read together. A test starts this program again under `mpirun`, once for each scenario and
+//! number of ranks, and checks the outcome and the files of the scenario.
 
 mod checkpoints;
 mod fields;
@@ -10,7 +10,7 @@ mod rows;
 use mpi::Threading;
 use mpi::traits::Communicator;
 
-/// The side of the tests that runs under `mpirun`.
+/// The part of the tests that runs under `mpirun`.
 #[test]
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
@@ -41,7 +41,7 @@ fn scenario() {
     }
 }
 
-/// The rank that owns a row, as if by a partitioner; of more than two ranks one owns nothing.
+/// The rank that owns a row, as if assigned by a partitioner; if there are more than two ranks, one of them owns nothing.
 pub fn owner(id: u64, size: usize) -> usize {
     let working = if size > 2 { size - 1 } else { size };
     (mpirun::scramble(id) % working as u64) as usize

@@ -1,4 +1,4 @@
-//! Tables of which each rank has a slab.
+//! Tables of which each rank holds a range of rows.
 
 use crate::mpirun;
 use clarke::io::output::parallel_file::{Element, ParallelFile};
@@ -8,7 +8,7 @@ use std::path::Path;
 const ROWS: u64 = 37;
 const WIDTH: usize = 3;
 
-/// A rank's first row and number of rows: uneven, and none on rank 1.
+/// First row and number of rows of a rank: unequal, and none on rank 1.
 fn slab(rank: usize, size: usize) -> (u64, usize) {
     let weights: Vec<u64> = (0..size as u64).map(|rank| if rank == 1 { 0 } else { rank + 1 }).collect();
     let whole: u64 = weights.iter().sum();

@@ -1,4 +1,4 @@
-//! Steps chosen by their error.
+//! Adaptive steps.
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 

@@ -1,5 +1,5 @@
-//! The batch scripts of `jobs/cluster` with stand-ins for the batch system: however a job spells its output folder, a run that
-//! stops with a checkpoint there is submitted again and goes on from it.
+//! The batch scripts of `jobs/cluster` with a simulated batch system: for every spelling of the output folder in the job, a run
+//! that stops with a checkpoint is submitted again and continues from the checkpoint.
 
 use crate::{
     case::Case,
@@ -12,7 +12,7 @@ use std::{
     process::Command,
 };
 
-/// What stands before all tables of a job, what stands behind them, an option, and the output folder that they make.
+/// The text before and after the tables of a job, an option, and the resulting output folder.
 const SPELLINGS: [(&str, &str, Option<&str>, &str); 7] = [
     ("", "[output]\nfolder = \"double\"", None, "double"),
     ("", "[output]\nfolder='single'", None, "single"),
@@ -23,7 +23,7 @@ const SPELLINGS: [(&str, &str, Option<&str>, &str); 7] = [
     ("", "[output]\nfolder = \"file\"", Some("output.folder='option'"), "option"),
 ];
 
-/// A job that stops with a checkpoint after its first step, in a folder with commands that only write down how they were called.
+/// A job that stops with a checkpoint after its first step, in a folder with commands that only record their arguments.
 struct Submission {
     case: Case,
     job: PathBuf,
@@ -95,7 +95,7 @@ fn a_requeued_job_goes_on_from_the_folder_that_it_names_however_it_spells_it() {
             .says(&format!("continuing from {}", checkpoint.display()));
         assert_eq!(submission.submitted().as_deref(), Some("requeue 7\n"), "{folder}");
         assert!(submission.path(folder).join("checkpoint-2.h5").is_file(), "{folder}");
-        // Submitted once more by mistake, it loses nothing.
+        // A second submission by mistake loses nothing.
         submission.run("slurm.sbatch", &arguments, &[("SLURM_JOB_ID", "8")]).expect(2).says("--restart");
         assert!(
             submission.submitted().is_none() && submission.path(folder).join("checkpoint-2.h5").is_file()

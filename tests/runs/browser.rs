@@ -1,4 +1,4 @@
-//! How a browser shows a page of `solver report`; passed over where no Chromium is installed.
+//! The page of `solver report` in a browser; skipped if Chromium is not installed.
 
 use std::{path::Path, process::Command};
 
@@ -10,7 +10,7 @@ fn browser() -> Option<&'static str> {
     BROWSERS.iter().find(starts).copied()
 }
 
-/// What the browser says and the document as it has it after loading this file.
+/// The messages of the browser, and the document after loading this file.
 fn load(browser: &str, profile: &Path, page: &Path) -> (String, String) {
     let said = Command::new(browser)
         .args([
@@ -28,8 +28,7 @@ fn load(browser: &str, profile: &Path, page: &Path) -> (String, String) {
     (String::from_utf8_lossy(&said.stderr).into_owned(), String::from_utf8_lossy(&said.stdout).into_owned())
 }
 
-/// The page fits wide and narrow screens with all of its pictures drawn, and the console stays silent. `folder` is room for
-/// other files.
+/// The page fits wide and narrow screens, all pictures are drawn, and the console has no messages. `folder` is for temporary files.
 #[track_caller]
 pub fn assert_fits(page: &Path, folder: &Path) {
     let Some(browser) = browser() else {

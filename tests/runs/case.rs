@@ -1,4 +1,4 @@
-//! Jobs made for a test from the paper's, each in a folder of its own.
+//! Jobs derived from the paper's job for a test, each in its own folder.
 
 use crate::{
     launch::{self, Outcome, Running},
@@ -42,7 +42,7 @@ impl Case {
             .set("output.probe", probes)
     }
 
-    /// A job of the folder `jobs`, with its own steps.
+    /// A job of the folder `jobs`, with its original steps.
     pub fn of(name: &str) -> Self {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("jobs/{name}.toml"));
         let text = std::fs::read_to_string(&file).expect("job");
@@ -89,12 +89,12 @@ impl Case {
         self
     }
 
-    /// Where the job file is.
+    /// The job file.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Where the results are.
+    /// The output folder.
     pub fn results(&self) -> Results {
         Results::of(self.folder().join("out"))
     }
@@ -104,17 +104,17 @@ impl Case {
         self.start_with(ranks, &[])
     }
 
-    /// Starts the job with these arguments behind its name.
+    /// Starts the job with these arguments after its name.
     pub fn start_with(&self, ranks: usize, arguments: &[&str]) -> Running {
         Running::start(ranks, &self.arguments(arguments))
     }
 
-    /// Runs the job with these arguments behind its name.
+    /// Runs the job with these arguments after its name.
     pub fn run_with(&self, ranks: usize, arguments: &[&str]) -> Outcome {
         launch::run(ranks, &self.arguments(arguments))
     }
 
-    /// Runs the job, which must succeed, over whatever ran in its folder before.
+    /// Runs the job, which must succeed, and overwrites earlier results in its folder.
     #[track_caller]
     pub fn run(&self, ranks: usize) -> Results {
         self.run_with(ranks, &["--force"]).expect(0);
@@ -128,7 +128,7 @@ impl Case {
         self
     }
 
-    /// Writes the job file and says where it is.
+    /// Writes the job file and returns its path.
     pub fn written(&self) -> PathBuf {
         let file = self.folder().join("job.toml");
         std::fs::write(&file, toml::to_string(&self.job).expect("TOML")).expect("written");

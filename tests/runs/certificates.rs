@@ -1,9 +1,9 @@
-//! Certificates: known numbers, and what a run does with them.
+//! Certificates: known values, and their effect on runs.
 
 use crate::{case::Case, launch, results::Results};
 use serde_json::Value;
 
-/// What `solver check --json` says of a case.
+/// The output of `solver check --json` for a case.
 fn check(case: &Case, ranks: usize) -> Value {
     let job = case.written();
     let printed = launch::run(ranks, &["check", job.to_str().expect("path"), "--json"]).expect(0).stdout;
@@ -84,13 +84,13 @@ fn check_says_how_contact_pressures_grow_with_the_velocity() {
     assert!(growth(&Case::square(8).without("contact")).is_null());
 }
 
-/// The block of `slip_weakening_block`, as good as rigid.
+/// The block of `slip_weakening_block`, nearly rigid.
 fn rigid_block() -> Case {
     Case::of("slip_weakening_block").set("material.viscosity", "{ volumetric = 1e9, shear = 1e9 }")
 }
 
-/// The pressure in Pa at which the step of a rigid block on slip weakening friction has several solutions: one that sliding
-/// and rotating add up to at its bottom, `rho h / (k fall (1 + 3 h^2 / (h^2 + l^2)))`.
+/// The pressure in Pa above which a step of a rigid block on slip weakening friction has several solutions, from its sliding and
+/// rotation: `rho h / (k d (1 + 3 h^2 / (h^2 + l^2)))` with the decrease `d` of the coefficient.
 fn bound_of_rigid_block(step: f64) -> f64 {
     let (density, height, length, fall) = (1000.0, 0.1, 0.4, 0.2 / 0.05);
     let turning = 3.0 * height * height / (height * height + length * length);
@@ -115,7 +115,7 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
                 && words.contains("e-4 for each Pa, so that for given pressures up to 2.12"),
             "{words}"
         );
-        // A foundation that never presses with more than 500 Pa.
+        // A foundation whose pressure never exceeds 500 Pa.
         let bounded = rigid_block().set("contact.0.normal", "{ graph = { points = [[0, 0], [1, 500]] } }");
         let bounded = check(&bounded, ranks);
         close(
@@ -147,7 +147,7 @@ fn a_run_is_held_against_the_pressure_that_slip_weakening_is_certified_for() {
     assert!(tresca.run(1).summary()["max_slip_pressure"].is_null());
 }
 
-/// Kinetic energy at the last step of a run of 40 steps that accepts whatever stability says.
+/// Kinetic energy at the last step of a run of 40 steps that accepts instability.
 fn kinetic_energy_after(step: f64) -> f64 {
     let case = Case::square(8)
         .without("contact")
@@ -160,7 +160,7 @@ fn kinetic_energy_after(step: f64) -> f64 {
     case.run(1).table("history.csv").last("kinetic_energy")
 }
 
-/// Of a large mesh, where short steps don't ask for more.
+/// For a large mesh with short steps, for which the sharp bound is not computed.
 #[test]
 fn the_bound_of_the_cells_is_below_the_sharp_one_and_near_it() {
     let square = || Case::square(72).without("material.viscoplasticity");

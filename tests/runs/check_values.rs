@@ -1,4 +1,4 @@
-//! Numbers that independent programs give for the paper's square and its cube.
+//! Results of independent programs for the paper's square and the cube.
 
 use crate::{
     case::{paper_cube, paper_job},
@@ -7,17 +7,17 @@ use crate::{
 };
 use std::path::Path;
 
-/// What independent programs give at the probes `near_corner`, `middle` and `tip`: x = h, 0.5 and 1 at the bottom.
+/// Results of independent programs at the probes `near_corner`, `middle` and `tip`: x = h, 0.5 and 1 on the bottom.
 struct Expected {
     normal_velocity: [f64; 3],
     normal_displacement: [f64; 3],
     final_von_mises: f64,
 }
 
-/// Half a unit of the last digit given, with room for what the solver's tolerance leaves.
+/// Half a unit of the last digit, plus the error of the solver's tolerance.
 const NODAL: f64 = 0.6e-8;
 
-/// Runs a job of the repository with these overrides and holds its last state against the numbers.
+/// Runs a job of the repository with these overrides and compares its last state with the numbers.
 fn hold(job: &Path, ranks: usize, overrides: &[&str], normal: &str, expected: &Expected, stress_digit: f64) {
     let folder = tempfile::tempdir().expect("folder");
     let output = format!("output.folder={:?}", folder.path());

@@ -1,4 +1,4 @@
-//! Vertical parts of contact graphs: rest in a jump, rigid obstacles; and foundations that store energy.
+//! Vertical parts of contact graphs: rest at a jump, rigid obstacles; and foundations that store energy.
 
 use crate::{case::Case, results::assert_same_answer};
 use clarke::linear_algebra::tensor::larger;

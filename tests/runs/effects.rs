@@ -1,4 +1,4 @@
-//! What a job does not call for does not exist in its run.
+//! Effects that a job does not request leave no trace in its run.
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 
@@ -6,7 +6,7 @@ const ALL: [&str; 7] =
     ["inertia", "elasticity", "viscosity", "viscoplasticity", "traction", "body_force", "contact"];
 const HISTORY: &str = "viscoplastic_history";
 
-/// The key whose absence takes an effect out of a job.
+/// The key whose absence removes an effect from a job.
 fn key(effect: &str) -> &str {
     match effect {
         "inertia" => "material.density",
@@ -17,7 +17,7 @@ fn key(effect: &str) -> &str {
     }
 }
 
-/// A body that is strained and moves from the start, so that every effect has something to do.
+/// A body with strain and velocity from the start, so that every effect acts.
 fn moving(case: Case, displacement: &str, velocity: &str) -> Case {
     case.set("initial.displacement", displacement)
         .set("initial.velocity", velocity)

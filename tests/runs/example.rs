@@ -1,9 +1,9 @@
-//! The programs under `examples/` run as they stand, and give the same numbers on any number of ranks.
+//! The programs in `examples/` run unchanged and give the same numbers on any number of ranks.
 
 use crate::launch::Running;
 use std::{path::Path, process::Command};
 
-/// What the example prints on this many ranks: times, and norms of the velocity.
+/// The output of the example on this number of ranks: times, and norms of the velocity.
 fn printed(ranks: usize) -> Vec<[f64; 2]> {
     let folder = Path::new(env!("CARGO_BIN_EXE_solver")).parent().expect("a folder").join("examples");
     let mut command = Command::new("mpirun");

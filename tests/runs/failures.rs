@@ -1,8 +1,8 @@
-//! Runs that can't end well: each ends on all ranks, soon, with the right code and words that help.
+//! Runs that must fail: each ends soon, on all ranks, with the right exit code and a helpful message.
 
 use crate::case::Case;
 
-/// A load that has no value any more after 0.4 s.
+/// A load that is undefined after 0.4 s.
 fn failing_load() -> Case {
     Case::square(6).set("traction.0.value", "[0, '-10*sqrt(0.4 - t)']")
 }
@@ -40,8 +40,8 @@ fn a_load_that_fails_on_one_rank_only_ends_all_of_them() {
     assert_eq!(case.results().summary()["status"], "failed");
 }
 
-/// A free plate without stress, in flight at so many m/s, whose velocity grows by as much in the second and last step as the
-/// first argument has it.
+/// A free plate without stress with this initial velocity in m/s, whose velocity increases in the second and last step by the first
+/// argument.
 fn flying(growth: &str) -> Case {
     let parts = [
         "contact",
@@ -100,7 +100,7 @@ fn a_step_that_newtons_method_does_not_solve_fails_with_a_remedy() {
     let outcome = case.run_with(2, &[]).expect(1);
     outcome.says("step to t = 6.25").says("try a smaller [time] step");
     assert_eq!(case.results().summary()["status"], "failed");
-    // What the iteration was held to is no part of the problem: the run goes on with more of it.
+    // The limit on iterations is not part of the problem: the run continues with a larger one.
     case.run_with(2, &["--restart", "--set", "solver.max_newton_iterations=50"]).expect(0);
     assert_eq!(case.results().summary()["status"], "completed");
 }
@@ -152,7 +152,8 @@ fn a_folder_that_cannot_be_written_is_named() {
     outcome.says("cannot write").says("taken/history.csv");
 }
 
-/// A block that is pulled down the faster the faster it moves, up or down: against a load nothing balances it.
+/// A block with a contact law that pulls it down in proportion to its speed in both directions: no velocity is in equilibrium with
+/// a load.
 fn unsolvable() -> Case {
     Case::of("stick_on_a_jump")
         .set("contact.0.normal", "{ graph = { points = [[0, 0]], slope_before = 15, slope_after = -15 } }")
@@ -169,7 +170,7 @@ fn a_step_without_solution_fails_and_names_branches_that_come_back() {
         failed
             .says("step to t = 1.000000e-1 s (length 1.000e-1 s) failed: ")
             .says("try a smaller [time] step");
-        // Full steps alone go to and fro between both branches.
+        // Full steps alone alternate between the two branches.
         unsolvable().set("solver.petsc", "{ snes_linesearch_type = 'basic' }").run_with(ranks, &[]).expect(1).says(
             "failed: too many Newton iterations; Newton's method came back to the branches of the contact graph that it had 2 \
              iterations before; try a smaller [time] step",
@@ -179,7 +180,7 @@ fn a_step_without_solution_fails_and_names_branches_that_come_back() {
 
 #[test]
 fn the_log_counts_linear_systems_that_were_not_positive_definite() {
-    // On the contact alone the first step is solved without a look at a falling direction.
+    // On the contact unknowns alone, the first step is solved without a direction of negative curvature.
     for (preconditioner, indefinite) in [("'cholesky'", 2), ("'gamg'", 3)] {
         let case = unsolvable().set("contact.0.normal.graph.slope_before", "-15.0").set("time.end", "0.3");
         let log = case.set("solver.preconditioner", preconditioner).run(2).text("run.log");

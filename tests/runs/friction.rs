@@ -1,4 +1,4 @@
-//! Friction: closed forms of blocks that slide, stop and stick, and what a job with friction leaves.
+//! Friction: closed forms of blocks that slide, stop and stick, and the output of a job with friction.
 
 use crate::{
     case::Case,
@@ -164,11 +164,11 @@ fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_goes_on_to_the_last_b
     let (mut slides, mut rides, mut carried) = (0, 0, [0.0; 2]);
     for ((time, pressure), traction) in times.iter().zip(pressures).zip(tractions) {
         if *time > 0.0 && *time < 0.2 {
-            // -sigma_tau points against the sliding over the belt, which is backward.
+            // -sigma_tau points in the sliding direction relative to the belt, which is backward.
             assert!((traction + 0.5 * pressure).abs() <= 1e-6 * pressure, "{traction} Pa at {time} s");
             slides += 1;
         } else if *time > 0.23 {
-            // Its own weight spreads it, so that its sides rub apart: all together they carry nothing.
+            // Its own weight spreads it, so that the friction on its two halves has opposite directions and a zero sum.
             carried[0] += traction;
             carried[1] += pressure;
             rides += 1;

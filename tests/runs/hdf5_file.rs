@@ -1,4 +1,5 @@
-//! Numbers of result files, ordered by the global ids of nodes and cells, so that runs on other ranks compare.
+//! Numbers of result files, ordered by the global ids of nodes and cells, so that runs on different numbers of ranks can be
+//! compared.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The error indicator in what a run leaves.
+//! The error indicator in the output of a run.
 
 use crate::{
     case::Case,

@@ -1,14 +1,14 @@
-//! Newton and linear iterations of small jobs beside stored numbers, so that effort cannot creep up unseen.
+//! Newton and linear iterations of small jobs against stored numbers, so that an increase is noticed.
 //!
-//! One may be off on one rank with a factor. On several ranks, and with multigrid, sums are taken in another order, by which
-//! an iteration more or less may be needed here and there: a tenth either way.
+//! On one rank with a factor, a difference of one iteration is accepted. On several ranks and with multigrid, sums are computed in
+//! another order, which may change the number of iterations: a tenth is accepted.
 
 use crate::case::Case;
 
-/// Share by which counts on several ranks or with multigrid may differ.
+/// Accepted relative difference of counts on several ranks or with multigrid.
 const MARGIN: f64 = 0.1;
 
-/// What is wrong with the counts of a job.
+/// The differences in the counts of a job.
 fn count(name: &str, case: &Case, ranks: usize, stored: [f64; 2]) -> Option<String> {
     let results = case.run(ranks);
     let found = ["newton_iterations", "linear_iterations"].map(|key| results.number(key));

@@ -1,4 +1,4 @@
-//! The solver under `mpirun`, watched by a clock: a run that hangs is ended with all its processes, and the test fails.
+//! The solver under `mpirun` with a time limit: a run that hangs is ended with all its processes, and the test fails.
 
 use std::{
     io::Read,
@@ -13,36 +13,36 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Runs are small: one that takes longer hangs. `make hard` has runs of a million steps.
+/// Time limit: runs are small, so that a longer run has hung. `make hard` has runs of a million steps.
 fn guard() -> Duration {
     Duration::from_secs(if std::env::var_os("CLARKE_HARD").is_some() { 3000 } else { 120 })
 }
-/// Time after which an `mpirun` without ranks is ended.
+/// Time after which an `mpirun` whose ranks have ended is ended.
 #[allow(dead_code)]
 const DESERTED: Duration = Duration::from_secs(20);
-/// How long processes may outlive their `mpirun`.
+/// Time for which processes may outlive their `mpirun`.
 const FAREWELL: Duration = Duration::from_secs(5);
-/// Every process of a run carries the number of the run under this name.
+/// The environment variable with the number of the run, which all its processes have.
 const MARK: &str = "CLARKE_TEST_RUN";
 
-/// What a run said and how it ended.
+/// The output of a run and its exit code.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Exit code; 128 and the number where a signal ended it.
+    /// The exit code; 128 plus the number of the signal if a signal ended the run.
     pub code: i32,
     pub stdout: String,
     pub stderr: String,
 }
 
 impl Outcome {
-    /// This run must have ended so.
+    /// Requires this exit code.
     #[track_caller]
     pub fn expect(self, code: i32) -> Self {
         assert_eq!(self.code, code, "exit code\n{}\n{}", self.stdout, self.stderr);
         self
     }
 
-    /// The run must have said this.
+    /// Requires this text in the output.
     #[track_caller]
     pub fn says(self, words: &str) -> Self {
         let said = self.stdout.contains(words) || self.stderr.contains(words);
@@ -94,7 +94,7 @@ impl Collected {
     }
 }
 
-/// Whom a signal is sent to.
+/// The process to which a signal is sent.
 #[derive(Clone, Copy)]
 pub enum Target {
     /// `mpirun`.
@@ -103,9 +103,9 @@ pub enum Target {
     OneRank,
 }
 
-/// A run that goes on.
+/// A run in progress.
 pub struct Running {
-    /// Open MPI's own folder: launchers that share one race to make and remove it.
+    /// The folder of Open MPI: launchers that share one compete in creating and removing it.
     _own: tempfile::TempDir,
     launcher: Child,
     mark: String,
@@ -129,7 +129,7 @@ impl Running {
         let own = tempfile::tempdir().expect("folder");
         command.env("OMPI_MCA_orte_tmpdir_base", own.path());
         command.env(MARK, &mark).env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
-        // Tests share the cores: a rank that waits gives its core away.
+        // Tests share the cores: waiting ranks yield.
         command.env("OMPI_MCA_mpi_yield_when_idle", "1");
         if is_root() {
             command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
@@ -141,7 +141,7 @@ impl Running {
         Self { _own: own, launcher, mark, began: Instant::now(), stdout, stderr }
     }
 
-    /// Waits until the run has said this.
+    /// Waits until this text is in the output of the run.
     #[track_caller]
     pub fn wait_for(&mut self, words: &str) {
         while !self.stdout.so_far().contains(words) {
@@ -156,7 +156,7 @@ impl Running {
         assert!(self.try_signal(signal, target), "no process to send a signal to");
     }
 
-    /// Sends a signal, if the process is there.
+    /// Sends a signal if the process exists.
     pub fn try_signal(&self, signal: &str, target: Target) -> bool {
         let process = match target {
             Target::Launcher => Some(self.launcher.id()),
@@ -171,8 +171,8 @@ impl Running {
         self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
-    /// Waits for the end, but ends an `mpirun` that stays although its ranks are gone, and says whether it had to: after a kill
-    /// Open MPI 4.1 now and then locks itself up when it shuts down.
+    /// Waits for the end, but ends an `mpirun` that remains after its ranks have ended, and returns whether this was necessary:
+    /// after a kill, Open MPI 4.1 occasionally hangs during its shutdown.
     #[allow(dead_code)]
     pub fn end_launcher_without_ranks(&mut self) -> bool {
         let mut deserted = Instant::now();
@@ -188,7 +188,7 @@ impl Running {
         false
     }
 
-    /// Waits for the end; none of its processes may be left then.
+    /// Waits for the end; no process of the run may remain.
     #[track_caller]
     pub fn wait(mut self) -> Outcome {
         let status = loop {
@@ -219,7 +219,8 @@ impl Running {
         std::thread::sleep(Duration::from_millis(10));
     }
 
-    /// All processes of this run, `mpirun` among them: ranks are in process groups of their own, so the mark finds them.
+    /// All processes of this run, including `mpirun`. Ranks have their own process groups; the environment variable identifies
+    /// them.
     fn processes(&self) -> Vec<u32> {
         let wanted = format!("{MARK}={}", self.mark);
         let carries_mark = |process: &u32| {
@@ -231,7 +232,7 @@ impl Running {
         numbers.filter(carries_mark).collect()
     }
 
-    /// Ends what is left of the run.
+    /// Ends the remaining processes of the run.
     fn end_all(&self) -> Vec<u32> {
         let left = self.processes();
         for process in &left {
@@ -263,7 +264,7 @@ fn process_file(process: u32, name: &str) -> PathBuf {
     PathBuf::from(format!("/proc/{process}/{name}"))
 }
 
-/// Whether this is the superuser, whom Open MPI refuses to serve unless told twice.
+/// Whether the user is the superuser, for whom Open MPI needs two additional options.
 fn is_root() -> bool {
     std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").expect("/proc/self")) == 0
 }

@@ -1,4 +1,4 @@
-//! Whole runs of the solver under `mpirun`: their numbers, files, restarts and failures.
+//! Complete runs of the solver under `mpirun`: results, files, restarts and failures.
 
 mod adaptive;
 mod batch;

@@ -1,4 +1,4 @@
-//! Viscoplastic laws in whole runs.
+//! Viscoplastic laws in complete runs.
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 
@@ -41,7 +41,7 @@ fn energy_balances_to_rounding_under_every_law() {
             cases.push(("plane stress", square("plane_stress")));
         }
         for (place, case) in cases {
-            // Energy balances beyond the bound of explicit power laws, too.
+            // The energy balance holds beyond the bound of explicit power laws, too.
             let mut case = case
                 .set(LAW, law)
                 .set("solver.tolerance", "1e-12")

@@ -1,4 +1,4 @@
-//! The files of a run, as its contract with users says.
+//! The output files of a run, as documented.
 
 use crate::{
     case::{Case, paper_job},
@@ -143,7 +143,7 @@ fn memory_traffic_is_counted_by_phase() {
     assert_eq!(traffic["balance"], steps * (72 * (cell + stress) + (3 + 2) * field));
     assert_eq!(traffic["assembly"], serde_json::Value::Null);
     let count = |traffic: &serde_json::Value, phase: &str| traffic[phase].as_u64().unwrap_or(0);
-    // At the least the lower half of the matrix is read twice a step: some 7 nodes a row, of 4 numbers each.
+    // The lower half of the matrix is read at least twice per step: about 7 nodes per row with 4 numbers each.
     assert!(count(&traffic, "solve") > steps * 2 * 8 * 4 * 49 * 7 / 2, "{traffic}");
     assert!(count(&traffic, "output") > 10_000, "{traffic}");
     let multigrid = of(Case::square(12).set("solver.preconditioner", "\"gamg\""));

@@ -1,4 +1,4 @@
-//! Meshes whose parts ranks make or read by themselves: the same runs, and refusals on all ranks together.
+//! Meshes of which each rank generates or reads its own part: the same results, and refusals on all ranks together.
 
 use crate::{
     case::Case,
@@ -7,7 +7,7 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-/// Partition and rounding change the iterates, not the answer.
+/// Partition and rounding change the iterates, not the results.
 const SHARE: f64 = 1e-8;
 
 fn meshes() -> PathBuf {
@@ -24,7 +24,7 @@ fn wheel(mesh: &Path) -> Case {
         .set("checkpoint.every", "2")
 }
 
-/// A mesh of the repository, split.
+/// A partitioned mesh of the repository.
 fn split(folder: &Path, mesh: &str, parts: usize) -> PathBuf {
     let file = folder.join(format!("{mesh}-{parts}.h5"));
     partition(&meshes().join(mesh).with_extension("msh"), parts, &file);
@@ -222,7 +222,7 @@ fn a_mesh_in_parts_that_was_changed_and_sealed_again_is_not_the_one_its_header_t
     }
 }
 
-/// Makes the seal true again, as `io/output/seal.rs` describes it.
+/// Writes a valid seal again, as `io/output/seal.rs` describes it.
 fn reseal(path: &Path) {
     let mut bytes = std::fs::read(path).expect("read");
     let (seal, content) = bytes.split_at_mut(512);

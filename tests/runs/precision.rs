@@ -1,8 +1,8 @@
-//! Factors in single precision with corrections in double give the answer of factors in double precision.
+//! Factors in single precision with corrections in double precision give the results of factors in double precision.
 
 use crate::{case::Case, results::assert_same_answer};
 
-/// What two runs to the same residual may differ by.
+/// Accepted difference of two runs with the same residual.
 const SHARE: f64 = 1e-6;
 
 fn in_precision(case: Case, precision: &str) -> Case {
@@ -72,7 +72,7 @@ fn adaptive_steps_change_factors_in_single_precision() {
 
 #[test]
 fn where_single_precision_is_not_enough_double_takes_its_place() {
-    // Five decades between the resistance to changes of volume and to changes of shape.
+    // A ratio of 1e5 between the resistance to changes of volume and to changes of shape.
     let make = || Case::square(16).set("material.viscosity.volumetric", "5e6");
     let case = in_precision(make(), "single").run_and_keep(1);
     assert_eq!(case.results().summary()["factor_precision"], "double");

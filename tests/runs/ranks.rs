@@ -1,4 +1,4 @@
-//! A run on more ranks is the same run.
+//! Runs on different numbers of ranks have the same results.
 
 use crate::{
     case::Case,
@@ -6,7 +6,7 @@ use crate::{
 };
 use clarke::linear_algebra::tensor::larger;
 
-/// Partition and rounding change the iterates, not the answer.
+/// Partition and rounding change the iterates, not the results.
 const SHARE: f64 = 1e-8;
 
 /// Runs on 1, 2, 3, 4 and 7 ranks and compares with one rank.
@@ -24,7 +24,7 @@ fn compare(make: impl Fn() -> Case, what: &str) {
     }
 }
 
-/// Newton's method takes the same path; the linear solves may differ by what the preconditioner sees of the ranks.
+/// Newton's method takes the same iterations; linear iterations may differ, because the preconditioner depends on the ranks.
 fn assert_same_effort(alone: &Results, results: &Results, what: &str) {
     let (one, other) = (alone.table("history.csv"), results.table("history.csv"));
     let (one, other) = (one.numbers("newton_iterations"), other.numbers("newton_iterations"));
@@ -36,7 +36,7 @@ fn assert_same_effort(alone: &Results, results: &Results, what: &str) {
     assert!(results.number("max_energy_imbalance") < 1e-10, "{what}");
 }
 
-/// Counts of the whole problem do not depend on how it is split, and the split is reported.
+/// Sizes of the whole problem do not depend on the partition, and the partition is reported.
 fn assert_same_problem(alone: &Results, results: &Results, ranks: usize) {
     let (one, other) = (alone.summary(), results.summary());
     for key in [

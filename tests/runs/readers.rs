@@ -1,7 +1,7 @@
 //! Field files as ParaView's library and meshio read them.
 //!
-//! Needs `python3` with `venv`, and once the packages of `tests/readers/requirements.txt` (about 800 MB on disk). Where
-//! they can't be had the test fails and says so; `cargo test -- --skip readers::` leaves it out.
+//! Needs `python3` with `venv` and installs the packages of `tests/readers/requirements.txt` once (about 800 MB on disk). If they
+//! are not available, the test fails with a message; `cargo test -- --skip readers::` skips it.
 
 use crate::{case::Case, hdf5_file::NumberFile, results::Results};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use std::{
     sync::OnceLock,
 };
 
-/// Runs a command that must succeed and gives what it printed.
+/// Runs a command that must succeed and returns its output.
 fn output(command: &mut Command, remedy: &str) -> String {
     match command.output() {
         Ok(output) if output.status.success() => String::from_utf8(output.stdout).expect("text"),
@@ -22,7 +22,7 @@ fn output(command: &mut Command, remedy: &str) -> String {
     }
 }
 
-/// A Python with the readers: made once, kept between runs of the tests.
+/// A Python environment with the readers, created once and kept between runs of the tests.
 fn python() -> &'static Path {
     static PYTHON: OnceLock<PathBuf> = OnceLock::new();
     PYTHON.get_or_init(|| {
@@ -50,7 +50,7 @@ fn python() -> &'static Path {
     })
 }
 
-/// What the readers saw: reader -> steps.
+/// The values read by each reader: reader -> steps.
 fn read(results: &Results) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/readers/read_fields.py");
     let mut command = Command::new(python());
@@ -58,7 +58,7 @@ fn read(results: &Results) -> Value {
     serde_json::from_str(&seen).expect("JSON")
 }
 
-/// Where the components xx, xy, xz, yy, yz, zz of a tensor stand in what a reader gives.
+/// The positions of the components xx, xy, xz, yy, yz, zz of a tensor in the values of a reader.
 fn tensor_order(reader: &str) -> [usize; 6] {
     match reader {
         "vtkhdf" => [0, 3, 5, 1, 4, 2],

@@ -33,7 +33,7 @@ fn regions_of_the_same_material_are_the_body_of_one_material_to_the_last_bit() {
         for name in ["probes.csv", "profiles.csv"] {
             assert_eq!(results.text(name), other.text(name), "{what}: {name}");
         }
-        // Energies are summed batch by batch, and batches end where the region does.
+        // Energies are summed by batches, and no batch contains cells of two regions.
         assert_same_answer(&results, &other, 1e-12, what);
         assert_eq!(results.summary()["certificates"], other.summary()["certificates"], "{what}");
         assert_eq!(results.summary()["inventory"], other.summary()["inventory"], "{what}");

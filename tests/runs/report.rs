@@ -1,10 +1,10 @@
-//! The page that `solver report` makes of a run.
+//! The page of `solver report`.
 
 use crate::{browser::assert_fits, case::Case, launch};
 use resvg::usvg::roxmltree::{Document, Node, ParsingOptions};
 use std::path::{Path, PathBuf};
 
-/// Makes the report of a finished case.
+/// Writes the report of a finished case.
 #[track_caller]
 pub fn report(folder: &Path) -> PathBuf {
     launch::run_alone(&["report".as_ref(), folder.as_os_str()]).expect(0);
@@ -24,7 +24,7 @@ fn words(node: Node) -> String {
     node.descendants().filter_map(|inner| inner.text().filter(|_| inner.is_text())).collect()
 }
 
-/// The cell behind the one with these words.
+/// The cell after the one with this text.
 fn fact(page: &Document, name: &str) -> String {
     let header = elements(page, "th").into_iter().find(|th| words(*th) == name).expect(name);
     words(header.next_sibling_element().expect("value"))
@@ -40,7 +40,7 @@ fn files(folder: &Path, ending: &str) -> Vec<String> {
     names
 }
 
-/// Every picture of the page is named, drawn, and stands beside it as SVG and PNG; nothing leads out of the page.
+/// Every picture of the page has a name, is drawn, and exists as SVG and PNG file; the page refers to no other files.
 #[track_caller]
 fn check_page(page: &Path) -> Vec<String> {
     let html = std::fs::read_to_string(page).expect("page");
@@ -89,7 +89,7 @@ fn check_page(page: &Path) -> Vec<String> {
     names
 }
 
-/// The square whose numbers an independent program gave.
+/// The square for which an independent program computed the numbers.
 pub fn square() -> Case {
     Case::square(8)
 }

@@ -1,4 +1,4 @@
-//! A run that was interrupted and went on is the run that was not.
+//! A restarted run has the results of an uninterrupted one.
 
 use crate::{
     case::Case,
@@ -8,7 +8,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// Saves after 4, 8 and 12 of 16 steps.
+/// Saves checkpoints after 4, 8 and 12 of 16 steps.
 fn saving() -> Case {
     Case::square(8).set("checkpoint.every", "4")
 }
@@ -32,7 +32,7 @@ fn go_on(case: &Case, ranks: usize) -> Results {
     results
 }
 
-/// Not a bit may differ, neither in the tables nor in the fields nor in the next checkpoint.
+/// Tables, fields and the next checkpoint must be bitwise equal.
 #[track_caller]
 fn assert_identical(straight: &Results, results: &Results, what: &str) {
     for name in ["probes.csv", "history.csv", "profiles.csv"] {
@@ -118,7 +118,7 @@ fn a_restarted_run_with_each_contact_law_is_the_straight_run_to_the_last_bit() {
     }
 }
 
-/// A square that is damaged, whose bonds give way on the way.
+/// A square with damage whose bonds break during the run.
 fn weakened() -> Case {
     saving()
         .set("material.damage", "{ threshold = 0.05, viscosity = 0.5, exponent = 1 }")
@@ -148,7 +148,7 @@ fn a_run_with_damage_and_adhesion_goes_on_on_any_number_of_ranks() {
     }
 }
 
-/// A square that sinks into a foundation that remembers.
+/// A square that sinks into a foundation with memory.
 fn remembering() -> Case {
     saving().set("contact.0.memory", "{ stiffness_rate = 200, decay_time = 0.3 }")
 }
@@ -206,9 +206,9 @@ fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     compare_with_straight(make, 3, "cube");
 }
 
-/// Saves on some ranks and goes on on 1, 2, 3 and 4; the last state must be that of a run that was not interrupted.
+/// Saves on some number of ranks and continues on 1, 2, 3 and 4; the last state must be that of an uninterrupted run.
 fn go_on_on_other_ranks(case: Case, writers: usize, histories: &[&str]) {
-    // Solved further than by default, so that what is left of the equations does not hide the restart.
+    // With a tighter tolerance than the default, so that the residual does not hide errors of the restart.
     let case = case.set("solver.tolerance", "1e-13");
     case.run_with(1, &["--set", "output.folder='straight'"]).expect(0);
     let straight = Results::of(case.folder().join("straight"));
@@ -251,7 +251,7 @@ fn a_run_saved_on_four_ranks_goes_on_on_any_number() {
     go_on_on_other_ranks(saving(), 4, &[]);
 }
 
-/// Goes on from a checkpoint without taking a step, so that the restored state is what the field file gets.
+/// Continues from a checkpoint without taking a step, so that the restored state is written to the field file.
 fn assert_restored(case: &Case, saved: &Path, readers: usize, histories: &[&str]) {
     let file = saved.join("checkpoint-8.h5").display().to_string();
     let options = ["--set", "time.end=0.5", "--set", "output.folder='restored'", "--restart", &file];
@@ -325,7 +325,7 @@ fn a_run_is_refused_where_there_is_no_checkpoint() {
     outcome.says("nowhere.h5");
 }
 
-/// Interrupts the run and goes on with another key.
+/// Interrupts the run and continues with another value of a key.
 fn go_on_with(change: &str) -> (Outcome, Case) {
     let case = saving();
     interrupt(&case, 1);

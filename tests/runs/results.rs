@@ -1,4 +1,4 @@
-//! What a run left, read the way a user's script would.
+//! The output of a run, read as a script of a user would read it.
 
 use clarke::linear_algebra::tensor::larger;
 use serde_json::Value;
@@ -102,17 +102,17 @@ impl Table {
     }
 }
 
-/// Largest of some numbers, without signs.
+/// Largest absolute value of some numbers.
 fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
     numbers.map(f64::abs).fold(0.0, larger)
 }
 
-/// Largest difference of two lists of numbers over the largest number.
+/// Largest difference of two lists of numbers, relative to the largest number.
 pub fn relative_difference(one: &[f64], other: &[f64]) -> f64 {
     difference_over(0.0, one, other)
 }
 
-/// Largest difference of two lists of numbers over the largest number, or over this one if it is larger.
+/// Largest difference of two lists of numbers, relative to the largest number or to this one if it is larger.
 fn difference_over(least: f64, one: &[f64], other: &[f64]) -> f64 {
     assert_eq!(one.len(), other.len(), "lists of other lengths");
     let scale = larger(largest(one.iter().chain(other).copied()), least);
@@ -120,10 +120,10 @@ fn difference_over(least: f64, one: &[f64], other: &[f64]) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / scale }
 }
 
-/// Energies below this share of the largest are differences of larger ones, and carry their rounding.
+/// Energies below this fraction of the largest one are differences of larger energies and contain their rounding errors.
 const SMALL_ENERGY: f64 = 1e-4;
 
-/// Energies and what becomes of them, in `history.csv`.
+/// Columns of `history.csv` with energies, dissipations and work.
 pub const ENERGIES: [&str; 7] = [
     "kinetic_energy",
     "elastic_energy",
@@ -134,7 +134,7 @@ pub const ENERGIES: [&str; 7] = [
     "numerical_dissipation",
 ];
 
-/// Both runs must have gone through the same states: probes, energies and stress agree within this share of the largest.
+/// Both runs must have the same states: probes, energies and stress agree within this fraction of the largest value.
 #[track_caller]
 pub fn assert_same_answer(one: &Results, other: &Results, share: f64, what: &str) {
     let (a, b) = (one.table("probes.csv"), other.table("probes.csv"));

@@ -1,4 +1,4 @@
-//! Time schemes in whole runs.
+//! Time schemes in complete runs.
 
 use crate::{case::Case, results::relative_difference};
 

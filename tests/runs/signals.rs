@@ -1,4 +1,4 @@
-//! Requests to stop from outside: the state is saved, and the run goes on as if nothing had been.
+//! External requests to stop: the state is saved, and the continued run has the results of an uninterrupted one.
 //!
 //! Open MPI's `mpirun` passes SIGUSR1 on and ends as its ranks do. On SIGTERM and SIGINT it sends its ranks SIGTERM,
 //! kills them after a while (one second by default), and ends with a code of its own.
@@ -9,7 +9,7 @@ use crate::{
     results::Results,
 };
 
-/// Far more steps than any test waits for.
+/// More steps than any test waits for.
 fn endless() -> Case {
     Case::square(6)
         .set("time.step", "0.0009765625")
@@ -37,7 +37,7 @@ fn assert_saved(results: &Results, reason: &str) -> u64 {
     steps
 }
 
-/// Goes on for a few steps and holds the result against a run that was not stopped.
+/// Continues for a few steps and compares the result with an uninterrupted run.
 fn assert_goes_on(case: &Case, ranks: usize, steps: u64) {
     let end = format!("time.end={}", (steps + 8) as f64 / 1024.0);
     case.run_with(ranks, &["--restart", "--set", &end]).expect(0);

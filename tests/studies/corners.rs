@@ -1,4 +1,5 @@
-//! Singular stress at the clamped corners of the paper's problem: what it costs, and what graded meshes give back.
+//! Singular stress at the clamped corners of the paper's problem: reduced orders on uniform meshes, and their recovery on graded
+//! ones.
 
 use crate::scene::{Scene, number};
 use std::path::Path;

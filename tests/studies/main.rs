@@ -1,4 +1,4 @@
-//! Studies: refusals of the study file, and whole studies under `mpirun`.
+//! Studies: refusals of the study file, and complete studies under `mpirun`.
 
 #[path = "../runs/browser.rs"]
 mod browser;

@@ -3,7 +3,7 @@
 use crate::scene::{SOLUTION, SQUARE, Scene};
 use clarke::{error::Exit, postprocessing::study::Plan};
 
-/// What a study says that is refused.
+/// The refusal of a study.
 fn refused(study: &str) -> String {
     let scene = Scene::new(SQUARE, study);
     let error = Plan::load(&scene.path("study.toml"), &[], false).expect_err("refused");

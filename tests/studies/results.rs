@@ -1,4 +1,4 @@
-//! What studies find.
+//! Results of studies.
 
 use crate::scene::{SOLUTION, SQUARE, Scene, number};
 use clarke::postprocessing::study::{Plan, describe};
@@ -21,7 +21,7 @@ fn errors_against_a_known_solution_fall_with_the_orders_of_theory() {
          value = \"displacement_x\"\nover = \"end\"\n"
     );
     let study = format!("{study}{SOLUTION}");
-    // Top-level keys stand before the tables.
+    // Top-level keys precede the tables.
     let (norms, rest) = study.split_at(NORMS.len());
     let scene = Scene::new(SQUARE, "");
     scene.write("study.toml", &format!("{norms}[base]\njob = \"job.toml\"\n{rest}"));
@@ -29,7 +29,7 @@ fn errors_against_a_known_solution_fall_with_the_orders_of_theory() {
     let results = scene.results();
     let runs = results["runs"].as_array().expect("runs");
     assert_eq!(runs.len(), 6);
-    // The last run: refined in the mesh against run 3, in the step against run 4.
+    // The last run has a finer mesh than run 3 and a shorter step than run 4.
     let order =
         |norm: usize, kind: usize| number(&results, &format!("/runs/5/errors/{norm}/orders/{kind}/observed"));
     for (norm, expected) in [(0, 2.0), (1, 1.0), (2, 1.0)] {
@@ -97,7 +97,7 @@ fn a_study_has_the_same_numbers_on_one_two_and_three_ranks() {
 fn failed_runs_are_listed_with_their_words_and_the_others_compared() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
     let scene = Scene::new("", "");
-    // The first step is beyond the scheme's bound.
+    // The first step length exceeds the bound of the scheme.
     let study = format!(
         "[base]\njob = {paper:?}\n[product]\ncells = [[4, 4]]\nsteps = [0.25, 0.0625]\n[reference.run]\ncells = [8, 8]\n\
          step = 0.0625\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"end\"\n"
@@ -153,7 +153,7 @@ fn ablation_tells_what_each_effect_costs_and_changes() {
     assert_eq!(of("contact.0")["status"], "completed");
     assert!(of("material.viscoplasticity")["change"][2].as_f64().expect("change") > 0.01);
     assert_eq!(of("initial")["change"][0].as_f64(), Some(0.0), "the initial state is zero anyway");
-    // Nothing moves without the only load.
+    // Without its only load the body does not move.
     assert!((of("traction.0")["change"][0].as_f64().expect("change") - 1.0).abs() < 1e-9);
 }
 

@@ -1,4 +1,4 @@
-//! A study that is started again.
+//! A restarted study.
 
 use crate::scene::{SOLUTION, SQUARE, Scene, number};
 
