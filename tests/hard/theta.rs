@@ -83,8 +83,8 @@ fn adaptive_steps_follow_the_one_motion_though_longer_ones_have_several_solution
             case.run_with(1, &["--set", "solver.accept=[]"]).expect(2).says("theta of a step");
             let results = case.run(1);
             let found = -results.table("probes.csv").last("velocity_y");
-            let (steps, taken_back) = (results.number("steps"), results.number("rejected_steps"));
-            println!("{what}: at rest at {found:.6} m/s after {steps} steps, {taken_back} taken back");
+            let (steps, rejected) = (results.number("steps"), results.number("rejected_steps"));
+            println!("{what}: at rest at {found:.6} m/s after {steps} steps, {rejected} rejected");
             crate::assert_close(found, rest, 1e-4, &what);
         }
     }

@@ -65,7 +65,7 @@ fn steps_land_on_output_times() {
 }
 
 #[test]
-fn steps_that_are_taken_back_leave_nothing_behind() {
+fn rejected_steps_leave_no_trace() {
     let hasty = adaptive(8, "bdf2", 0.02);
     let results = hasty.run(1);
     assert!(results.number("rejected_steps") > 0.0);

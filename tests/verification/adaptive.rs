@@ -1,4 +1,4 @@
-//! Steps chosen by their error: what the error of a step is, and that steps taken back leave nothing.
+//! Adaptive steps: the error of a step, and rejected steps, which leave no trace.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -26,8 +26,8 @@ fn time(scheme: &str, end: f64, step: f64, tolerance: f64, bounds: [f64; 2]) -> 
     )
 }
 
-/// A free block that a force moves as a whole: its velocity is known in closed form after any steps, and with it the error by
-/// hand, `k_n / (k_n + k_{n-1}) |dv_n - w dv_{n-1}|` in the norm of the mass.
+/// A free block that a force moves as a rigid body: its velocity has a closed form for any steps, which gives the error `k_n / (k_n
+/// + k_{n-1}) |dv_n - w dv_{n-1}|` in the norm of the mass.
 fn by_hand(session: &Session) {
     let density = 4.0;
     let job = time("implicit_euler", 1.0, 0.1, 1e-3, [1e-6, 0.5])
@@ -103,8 +103,8 @@ fn strained_by_hand(session: &Session, scheme: &str) {
     }
 }
 
-/// A block that is held stretched, so that only its damage grows, in the first step from 0 to `d`: the error is half of that times the
-/// stress of the sound block, and the size counts what the damaged one bears.
+/// A block that is held in a stretched state, so that only its damage grows, in the first step from 0 to `d`: the error is `d / 2`
+/// times the stress of the undamaged block, and is relative to the stress of the damaged one.
 fn damaged_by_hand(session: &Session, scheme: &str) {
     let (modulus, strain, threshold, viscosity, length) = (100.0, 0.1, 0.2, 0.3, 0.2);
     let job = time(scheme, 1.0, length, 1e-3, [1e-6, 0.5])
@@ -126,7 +126,7 @@ fn damaged_by_hand(session: &Session, scheme: &str) {
     }
 }
 
-/// The paper's square, small, with flow, that meets a rigid obstacle on its way: there steps are taken back.
+/// The paper's square with few cells, with flow, which hits a rigid obstacle during the run, so that steps are rejected.
 fn paper(scheme: &str) -> String {
     time(scheme, 0.5, 0.03125, 0.02, [1e-5, 0.0625])
         + "[material]\nhypothesis = \"plane_stress\"\ndensity = 1\n\
@@ -137,7 +137,7 @@ fn paper(scheme: &str) -> String {
            normal.unilateral = { gap = 0.002 }\n"
 }
 
-/// All that a run has come to.
+/// The complete state of a run.
 fn fields(run: &Simulation<2, 3>) -> Vec<Vec<f64>> {
     let state = &run.state;
     let mut all: Vec<Vec<f64>> = [&state.displacement, &state.velocity, &state.previous_velocity]
@@ -147,7 +147,7 @@ fn fields(run: &Simulation<2, 3>) -> Vec<Vec<f64>> {
     all
 }
 
-/// The lengths that an adaptive run took, taken as they are without any step taken back, give the same bits.
+/// A run with the accepted step lengths of an adaptive run, without rejected steps, gives bitwise equal results.
 fn replay(session: &Session, scheme: &str) {
     let mesh = square(4);
     let mut run = simulation::<2, 3>(session, &paper(scheme), &mesh);
@@ -160,7 +160,7 @@ fn replay(session: &Session, scheme: &str) {
     }
     let rejected = run.totals.pace.expect("adaptive").rejected - at_start;
     let shortened = steps.windows(2).filter(|pair| pair[1].1 < 0.9 * pair[0].1).count();
-    assert!(rejected > 0 && shortened > 0, "{scheme}: {rejected} taken back, {steps:?}");
+    assert!(rejected > 0 && shortened > 0, "{scheme}: {rejected} rejected, {steps:?}");
     let mut other = simulation::<2, 3>(session, &paper(scheme), &mesh);
     let mut previous_length = 0.0;
     for (time, length) in steps {
@@ -197,6 +197,6 @@ pub fn errors(session: &Session) {
 }
 
 #[test]
-fn the_error_of_a_step_is_that_by_hand_and_steps_taken_back_leave_nothing() {
+fn the_error_of_a_step_is_that_by_hand_and_rejected_steps_leave_no_trace() {
     run_on(&[1, 2], "adaptive_errors");
 }

@@ -1,5 +1,5 @@
-//! Adhesion against a point mass on one bond, worked out here with a solver of its own: a plate that hardly deforms is torn
-//! off or slid along the ground.
+//! Adhesion against a point mass on one bond, computed here by a separate solver: a nearly rigid plate is torn off the ground or
+//! slides along it.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation, sum};
@@ -14,7 +14,7 @@ use clarke::{
     solver::certificate::Certificates,
 };
 
-/// Bonds of a unit of area; `length` cuts the stretch.
+/// Bonds of a unit of area; `length` truncates opening and sliding.
 #[derive(Clone, Copy)]
 struct Bond {
     stiffness: f64,
@@ -23,7 +23,7 @@ struct Bond {
     length: f64,
 }
 
-/// A mass over a unit of area, moving away from where the bonds were made.
+/// A mass per unit of area that moves away from the position at which the bonds formed.
 struct Mass {
     mass: f64,
     moved: f64,
@@ -37,7 +37,8 @@ impl Mass {
     fn advance(&mut self, bond: &Bond, step: f64) {
         let stretch = self.moved.clamp(0.0, bond.length);
         let drive = bond.stiffness * stretch * stretch;
-        // viscosity (b - before) / step = -max(b drive - energy, 0), by bisection: the left side less the right grows in b.
+        // viscosity (b - before) / step = -max(b drive - energy, 0), by bisection: the difference of the two sides increases with
+        // b.
         let open = |b: f64| bond.viscosity * (b - self.bonding) + step * (b * drive - bond.energy).max(0.0);
         let (mut low, mut high) = (0.0, self.bonding);
         for _ in 0..200 {
@@ -82,13 +83,13 @@ fn job<const D: usize>(
     }
     let velocity: Vec<f64> = direction.iter().map(|x| SPEED * x).collect();
     if direction[D - 1] == 0.0 {
-        // A guide against the torque of the bonds below.
+        // A guide that carries the torque of the bonds below.
         job += &format!("[[support]]\non = [\"top\"]\nfix = [\"{}\"]\n", ["y", "z"][D - 2]);
     }
     job + &format!("[initial]\nvelocity = {velocity:?}\n")
 }
 
-/// The bonding at the nodes here that lie low, and whether all others have none.
+/// The bonding at the bottom nodes of this rank, and whether all other nodes have none.
 fn bonding<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     let mut found = Vec::new();
     for history in run.body.node_histories() {
@@ -104,7 +105,7 @@ fn bonding<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     found
 }
 
-/// Moves a plate of this height along a direction, and holds it against a point mass.
+/// Moves a plate of this height along a direction, and compares it with a point mass.
 fn follows<const D: usize, const S: usize>(
     session: &Session,
     mesh: &GlobalMesh<D>,
@@ -159,7 +160,7 @@ fn torn_and_slid(session: &Session) {
     follows::<3, 6>(session, &space, 1.1, short, [0.6, 0.8, 0.0]);
 }
 
-/// Bonds on two faces: the node between them has one bonding, which both drive.
+/// Bonds on two faces: the node between them has one bonding, which depends on both faces.
 fn corner(session: &Session) {
     let bond = Bond { stiffness: 400.0, energy: 0.01, viscosity: 0.0, length: f64::INFINITY };
     let mesh = rectangle([1.0, 1.0], [1, 1], Diagonal::Right, [1.0, 1.0]).expect("mesh");
@@ -173,13 +174,13 @@ fn corner(session: &Session) {
         }
     }
     let values = sum(session, &values);
-    // Lifting opens the bottom only: there b falls to energy / (stiffness opening^2); at the corner half of the bonds, those
-    // of the left side, hold as much again.
+    // Lifting opens the bottom only, where b decreases to energy / (stiffness opening^2). At the corner, half of the bonds belong
+    // to the left side, which does not open, so that b decreases to twice this value.
     assert_eq!((values[2], values[3]), (1.0, 0.0), "upper left, upper right: {values:?}");
     assert!(values[1] < 0.1 && (values[0] / values[1] - 2.0).abs() < 0.1, "{values:?}");
 }
 
-/// Bonds without energy to break, stiffer than the step allows, make velocities grow just beyond the certified bound.
+/// Stiff unbreakable bonds make velocities grow with steps just above the certified bound.
 fn bound(session: &Session) {
     let grown = |factor: f64| {
         let bond = Bond { stiffness: 1e4, energy: 1e30, viscosity: 0.0, length: f64::INFINITY };
@@ -202,7 +203,7 @@ fn bound(session: &Session) {
     assert!(below < 10.0 && beyond > 1e4, "{below:e} {beyond:e}");
 }
 
-/// Bonds without stiffness, and no bonds, give the same numbers to the last bit.
+/// Bonds without stiffness and no bonds give bitwise equal results.
 fn inert(session: &Session) {
     let mesh = crossed([3, 2]);
     let bond = Bond { stiffness: 0.0, energy: 1.0, viscosity: 0.0, length: 0.1 };

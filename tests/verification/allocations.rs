@@ -1,7 +1,7 @@
-//! Steps allocate nothing: what they need is made with the run, or in its first steps.
+//! Steps allocate no memory: all memory is allocated in the set-up of the run or in its first steps.
 //!
-//! Counted is what this program asks of Rust's allocator, on one rank; not what PETSc, CHOLMOD, MPI and HDF5 ask of the system.
-//! A step for which a matrix is assembled sets up anew and may allocate; so may one that writes fields or a checkpoint.
+//! The test counts allocations by Rust's allocator on one rank, not those of PETSc, CHOLMOD, MPI and HDF5. A step that assembles a
+//! matrix sets up again and may allocate; so may a step that writes fields or a checkpoint.
 
 use allocation_counter::measure;
 use clarke::{
@@ -16,9 +16,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Steps that may make room.
+/// First steps, which may allocate.
 const FIRST: usize = 8;
-/// Steps behind these that must do with it.
+/// Steps after these, which must not allocate.
 const COUNTED: usize = 16;
 
 const PAPER: &str = "papers/wang_cheng_2022.toml";
@@ -36,7 +36,7 @@ fn loaded(job: &str, changes: &[&str]) -> Loaded {
     Job::from_text(&text, job, path.parent().expect("a folder"), &changes).expect("a job")
 }
 
-/// Allocations of each step behind the first ones for which no matrix was assembled.
+/// Allocations of each step after the first ones for which no matrix was assembled.
 fn steps<const D: usize, const S: usize>(session: &Session, loaded: &Loaded, mesh: Mesh<D>) -> Vec<u64> {
     let mut run = Simulation::<D, S>::on(session, loaded, mesh).expect("a simulation");
     let mut counts = Vec::with_capacity(COUNTED);
@@ -75,7 +75,7 @@ fn jobs(inside: &str) -> Vec<String> {
     jobs
 }
 
-/// Allocations of a whole run of so many steps of 1/64 s, with all that it writes.
+/// Allocations of a complete run of this number of steps of 1/64 s, with its output.
 fn whole_run(session: &Session, steps: u32) -> u64 {
     let out = tempfile::tempdir().expect("a folder");
     let out = format!("output.folder={:?}", out.path().join("out").to_str().expect("text"));
@@ -94,7 +94,7 @@ fn steps_allocate_nothing() {
     crate::run_on(&[1], "allocations");
 }
 
-/// The side under `mpirun`.
+/// The part under `mpirun`.
 pub fn count(session: &Session) {
     assert!(measure(|| drop(std::hint::black_box(vec![0.0; 100]))).count_total > 0, "nothing is counted");
     let changed: [(&str, &[&str]); 6] = [
@@ -118,7 +118,7 @@ pub fn count(session: &Session) {
     }
     assert!(faults.is_empty(), "allocations by step:\n{}", faults.join("\n"));
     assert!(sum > 20 * COUNTED, "only {sum} steps were counted");
-    // Texts of different lengths may take a piece more or less at the start and at the end.
+    // Texts of different lengths may need an allocation more or less at the start and at the end.
     let [more, less] = [64, 16].map(|steps| whole_run(session, steps));
     assert!(
         more.abs_diff(less) < 8,

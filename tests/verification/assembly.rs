@@ -1,4 +1,4 @@
-//! The assembled matrix against a dense one computed here by other formulas.
+//! The assembled matrix against a dense matrix computed here by other formulas.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, set_nodal, stir, sum};
@@ -145,7 +145,7 @@ fn gathered<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>
     sum(session, &dense)
 }
 
-/// Which components are held, by original node ids.
+/// The components that supports fix, by original node ids.
 fn held_components<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> Vec<bool> {
     let mut flags = vec![0.0; body.mesh.total_nodes * D];
     for at in 0..body.mesh.owned * D {

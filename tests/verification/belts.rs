@@ -1,4 +1,4 @@
-//! Friction acts on the velocity relative to the obstacle, whose work energy accounts for.
+//! Friction acts on the velocity relative to the obstacle, and the energy balance contains the work of the obstacle.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
@@ -35,7 +35,7 @@ fn start<const D: usize>(scheme: &str, step: f64, steps: usize, material: &str) 
     )
 }
 
-/// A soft block that falls on a floor, on a belt or thrown over a floor at rest.
+/// A soft block that falls on a moving belt, or is thrown over a floor at rest.
 fn thrown<const D: usize>(scheme: &str, laws: &str, floor: &str, velocity: [&str; 3]) -> String {
     let material = "density = 2\nelasticity = { youngs_modulus = 100, poisson_ratio = 0.3 }\n\
                     viscosity = { volumetric = 0.5, shear = 1 }";
@@ -49,7 +49,7 @@ fn thrown<const D: usize>(scheme: &str, laws: &str, floor: &str, velocity: [&str
     )
 }
 
-/// Velocities at the owned nodes after every step, and what friction dissipated in all.
+/// Velocities at the owned nodes after every step, and the total dissipation of friction.
 fn moved<const D: usize, const S: usize>(
     session: &Session,
     job: &str,
@@ -66,7 +66,8 @@ fn moved<const D: usize, const S: usize>(
     (found, run.totals.energy.contact)
 }
 
-/// Who rides on a belt sees a floor at rest: all velocities differ by that of the belt, and friction takes the same energy.
+/// In the frame of the belt, the floor is at rest: all velocities differ by that of the belt, and friction dissipates the same
+/// energy.
 fn seen_from_the_belt<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let (belt, along) = if D == 2 {
         (["0.7*t", "0", "-0.001"], [0.7, 0.0, 0.0])
@@ -97,7 +98,7 @@ fn seen_from_the_belt<const D: usize, const S: usize>(session: &Session, mesh: &
     }
 }
 
-/// A stiff block at rest on a belt of 1 m/s is sped up by `mu g`, then sticks to it.
+/// A stiff block, initially at rest on a belt that moves at 1 m/s, accelerates at `mu g` and then sticks to the belt.
 fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let material = "density = 1000\nviscosity = { volumetric = 1e6, shear = 1e6 }";
     for scheme in SCHEMES {
@@ -126,7 +127,7 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
                 let feet =
                     velocity.chunks_exact(D).zip(&run.body.mesh.nodes).filter(|(_, x)| x[D - 1] == 0.0);
                 let off = feet.fold(0.0, |m, (v, _)| larger(m, (v[0] - 1.0).abs()));
-                // Its own weight spreads it, by some 1e-4 m/s at its sides.
+                // Its own weight spreads it, by about 1e-4 m/s at its sides.
                 assert!(off < 1e-3, "feet are {off:e} m/s off the belt\n{job}");
                 stuck += 1;
             } else if time < 0.24 {
@@ -135,7 +136,8 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
             assert!(run.totals.energy_imbalance <= 1e-10, "{:e}\n{job}", run.totals.energy_imbalance);
         }
         assert!(stuck > 4);
-        // One half of the belt's work speeds the block up, the other goes into friction, but for the first order of the steps.
+        // Half of the work of the belt becomes kinetic energy, the other half is dissipated by friction, up to an error of first
+        // order in the step.
         let (kinetic, work) = (run.totals.energy.kinetic, run.totals.energy.work);
         let dissipated = run.totals.energy.contact;
         assert!(
@@ -146,8 +148,8 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
     }
 }
 
-/// What sticks to a belt that speeds up has its velocity at the end of a step by the formula of the scheme, over steps of any length:
-/// of a belt at `t^2` exactly `2 t` by the second-order one, but for the first step.
+/// A point that sticks to an accelerating belt has the velocity given by the formula of the scheme, for steps of any length: for a
+/// belt at `t^2` exactly `2 t` with the second-order formula, except in the first step.
 fn speeding_up(session: &Session) {
     let material = "density = 2\nelasticity = { youngs_modulus = 100, poisson_ratio = 0.3 }\nviscosity = { volumetric = 1, shear = 2 }";
     let job = format!(
@@ -171,8 +173,8 @@ fn speeding_up(session: &Session) {
     }
 }
 
-/// Holds the friction at each node with pressure against Coulomb's law on an obstacle with the velocity `surface` in space at a
-/// place; gives the torque of friction on the body about `centre` along the last axis, and the points that touch.
+/// Compares the friction at each node with pressure with Coulomb's law on an obstacle with the velocity `surface` at a position.
+/// Returns the torque of friction on the body about `centre` along the last axis, and the number of points in contact.
 fn hold_against<const D: usize, const S: usize>(
     session: &Session,
     run: &Simulation<D, S>,
@@ -207,11 +209,11 @@ fn hold_against<const D: usize, const S: usize>(
     session.sum([torque, touching])
 }
 
-/// A roller or ball that turns under a block drags it against the law, whichever way it turns.
+/// A rotating roller or ball below a block drags it according to the law, in both directions of rotation.
 fn rolled<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let material = "density = 2\nelasticity = { youngs_modulus = 100, poisson_ratio = 0.3 }\n\
                     viscosity = { volumetric = 1, shear = 2 }";
-    // Turning to the left in the plane is turning about -y in space, where z is up.
+    // A counterclockwise rotation in the plane is a rotation about -y in space, where z is up.
     for (spin, axis, scheme) in [
         (7.0, [0.0, -1.0, 0.0], "bdf2"),
         (-7.0, [0.0, -1.0, 0.0], "lagged_euler"),
@@ -245,7 +247,7 @@ fn rolled<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D
     }
 }
 
-/// A pad is pressed on a brake disc that turns: the torque is `mu p` times the integral of the radius.
+/// A pad is pressed on a rotating brake disc: the torque is `mu p` times the integral of the radius.
 fn braked(session: &Session) {
     let material = "density = 1000\nelasticity = { youngs_modulus = 1e7, poisson_ratio = 0.2 }\n\
                     viscosity = { volumetric = 1e4, shear = 2e4 }";
@@ -280,7 +282,7 @@ fn braked(session: &Session) {
     }
 }
 
-/// Where a support holds the direction of the belt and leaves another free, the friction along that is not known.
+/// If a support fixes the direction of the belt but not the other tangential direction, the friction in the latter is not known.
 fn held(session: &Session) {
     let material = "density = 2\nviscosity = { volumetric = 1, shear = 2 }";
     let job = |fix: &str| {

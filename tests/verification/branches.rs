@@ -1,11 +1,12 @@
-//! Changes of branches are counted between the state before a step and that at its end, over all ranks.
+//! The number of branch changes in a step is the number of points, over all ranks, whose branch differs between the start and the
+//! end of the step.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, simulation};
 use clarke::{parallel::session::Session, run::Simulation};
 
-/// A block that falls with `v = g t` beside a law whose slope changes at 0.25 m/s: all its feet change in the step that passes that
-/// velocity and in no other, also where the solution is what the step was started from.
+/// A block that falls with `v = g t` on a law whose slope changes at 0.25 m/s: all contact points change their branch in the step
+/// that passes this velocity and in no other, also if the start value of the step is its solution.
 pub fn passed(session: &Session) {
     let job = format!(
         "{}[time]\nend = 0.6\nstep = 0.1\n[material]\nhypothesis = \"plane_strain\"\ndensity = 1\n\

@@ -11,7 +11,7 @@ use clarke::{
 };
 use std::path::Path;
 
-/// Which callback goes wrong, on one rank, at which call.
+/// The callback that fails on one rank, and the number of the failing call.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     None,
@@ -40,7 +40,7 @@ impl Cubic<'_> {
     }
 }
 
-/// Counts a call, and fails at the one that is to go wrong.
+/// Counts a call, and fails at the given one.
 fn called(fault: Fault, calls: &mut [usize; 5], callback: usize) -> Result<()> {
     {
         calls[callback] += 1;

@@ -10,7 +10,7 @@ use clarke::{
     parallel::session::Session,
 };
 
-/// A free body that falls feels nothing but its weight: `v = g t`.
+/// A body in free fall: `v = g t`.
 fn falling<const D: usize, const S: usize>(
     session: &Session,
     hypothesis: &str,
@@ -54,8 +54,8 @@ fn falling<const D: usize, const S: usize>(
     assert!(run.totals.energy.viscoplastic < 1e-18, "no stress, no flow");
 }
 
-/// A square of two triangles that can move along x on its right side only: two unknowns, whose modes are known.
-/// Backward Euler damps a mode of rate `r` by `1/(1 + k r)` a step.
+/// A square of two triangles that can move along x on its right side only: two unknowns with known modes. Backward Euler damps a
+/// mode of rate `r` by `1/(1 + k r)` per step.
 fn relaxation(session: &Session) {
     let (density, volumetric, shear, step): (f64, f64, f64, f64) = (1.7, 0.8, 2.2, 0.03);
     let mesh = rectangle([1.0, 1.0], [1, 1], Diagonal::Right, [1.0, 1.0]).expect("mesh");

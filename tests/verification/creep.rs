@@ -1,5 +1,5 @@
-//! Uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) worked out for one homogeneous
-//! cell, with projections of its own.
+//! Uniaxial viscoplastic creep, with and without damage, against the recursion (24)-(25) for one homogeneous cell, with separate
+//! projections.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -34,7 +34,7 @@ struct Cell {
     strain: Diagonal3,
     history: Diagonal3,
     stress: Diagonal3,
-    /// What damage has left, where there is damage.
+    /// The factor `1 - d` of the stress, if there is damage.
     left: Option<f64>,
 }
 
@@ -110,7 +110,7 @@ impl Cell {
         s[..self.kept].iter().map(|x| 0.5 * x * (x - mean) / shear).sum()
     }
 
-    /// A step of (24) and (25); gives the total stress.
+    /// A step of (24) and (25); returns the total stress.
     fn advance(&mut self) -> Diagonal3 {
         let excess = f64::max(self.energy() - DAMAGE.0, 0.0);
         if let Some(left) = &mut self.left {

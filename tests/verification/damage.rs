@@ -1,5 +1,5 @@
-//! Damage against closed forms: a body that is held keeps its strain, so that its damage follows an ordinary differential
-//! equation of its own in every cell.
+//! Damage against closed forms: a body fixed on all sides keeps its strain, so that the damage of each cell obeys an ordinary
+//! differential equation.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
@@ -20,7 +20,7 @@ fn energy<const S: usize>() -> f64 {
     0.5 * modulus * STRAIN * STRAIN
 }
 
-/// A body held on all sides, stretched along x. A force too small to matter keeps the equations from being all rounding.
+/// A body fixed on all sides and stretched along x. A negligible force makes the residual tolerance well defined.
 fn job<const D: usize>(hypothesis: &str, damage: &str, steps: usize) -> String {
     let mut job = format!("{}[time]\nend = {END}\nstep = {}\n", any_mesh::<D>(), END / steps as f64);
     job += "[solver]\ntolerance = 1e-13\n[material]\n";
@@ -78,7 +78,7 @@ fn held<const D: usize, const S: usize>(session: &Session, hypothesis: &str, mes
     }
 }
 
-/// A law that never sets in, and its absence, give the same numbers to the last bit.
+/// A law whose threshold is never reached and no damage give bitwise equal results.
 fn inert(session: &Session, mesh: &GlobalMesh<2>) {
     let with = job::<2>("plane_stress", "threshold = 1e30, viscosity = 1", 20);
     let with =

@@ -1,4 +1,4 @@
-//! An effect is called in its own phases only, and nothing is gathered that nobody needs.
+//! An effect is called in its own phases only, and only fields that an effect needs are gathered.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, body, brick, crossed, part, simulation};
@@ -19,14 +19,14 @@ use clarke::{
 };
 use std::{cell::RefCell, collections::BTreeMap, path::Path, rc::Rc};
 
-/// Calls by phase, and the fields that any of them found gathered.
+/// Calls by phase, and the fields that were gathered for any of them.
 #[derive(Debug, Default, PartialEq)]
 struct Seen {
     calls: BTreeMap<&'static str, usize>,
     gathered: BTreeMap<&'static str, Vec<&'static str>>,
 }
 
-/// An effect that notes how it is called.
+/// An effect that records its calls.
 struct Watched<E> {
     inner: E,
     seen: Rc<RefCell<Seen>>,
@@ -91,7 +91,7 @@ impl<const D: usize, const S: usize, E: Effect<D, S>> Effect<D, S> for Watched<E
     }
 }
 
-/// What a body that feels these effects sees in all phases of a step, and the number of its batches.
+/// The calls to these effects of a body in all phases of a step, and the number of batches.
 fn seen_by<const D: usize, const S: usize>(
     session: &Session,
     whole: &clarke::mesh::GlobalMesh<D>,
@@ -122,7 +122,7 @@ fn matrix<const D: usize, const S: usize>(
     body.matrix(session, 0.1).expect("matrix").values
 }
 
-/// Elasticity is in the matrix where it acts at the end of the step, and only there.
+/// The matrix contains elasticity if and only if the elastic stress is taken at the end of the step.
 fn matrices<const D: usize, const S: usize>(session: &Session, whole: &clarke::mesh::GlobalMesh<D>) {
     let tensor = Isotropic { volumetric: 1.0, shear: 2.0 };
     let of = |with_elasticity: bool, at: Evaluation| {

@@ -1,4 +1,4 @@
-//! In every step of any job energy balances, and contact lies on its graph.
+//! In every step of random jobs, the energy balance holds and contact points lie on the graph of their law.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
@@ -110,7 +110,7 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
     text += &match law {
         "damped" => {
             let symmetry = draw.one_of(&["even", "odd", "one_sided"]);
-            // Mirrored, a rise falls.
+            // Reflection turns an increase into a decrease.
             let rise = if symmetry == "even" { -fall } else { draw.between(0.1, 3.0) };
             if symmetry == "one_sided" && high < 0.3 {
                 format!("[contact.normal.exponential_damper]\nlimit = {high}\nvelocity = {first}\n")
@@ -226,7 +226,7 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
             );
         } else {
             job += &contact;
-            // Memory goes with laws that know no gap and friction that does not follow the pressure, at nodes.
+            // Memory can be combined with laws without gap and friction that does not depend on the pressure, at nodes.
             let strange = ["gauss", "gap", "obstacle", "unilateral", "coulomb", "slip_weakening"];
             if !strange.iter().any(|word| contact.contains(word)) {
                 let (stiffness, time) = (weak.between(10.0, 200.0), weak.between(0.002, 0.5));
@@ -269,7 +269,7 @@ fn balanced<const D: usize, const S: usize>(
     (run.totals, text)
 }
 
-/// What each scheme must have met, as it stands in jobs.
+/// The tables that must have occurred for each scheme.
 const MET: [&str; 24] = [
     "plane_stress",
     "density",

@@ -1,4 +1,4 @@
-//! Bounds of explicit flow: by power laws, whose rate has none, and of flow beside elastic stress.
+//! Step bounds of explicit flow: for power laws, whose relaxation rate is unbounded, and for flow together with elastic stress.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, noise, set_nodal, simulation};
@@ -9,7 +9,7 @@ use clarke::{
     solver::certificate::Certificates,
 };
 
-/// A bar whose rate of creep is a fifth power, under four times its yield stress.
+/// A bar with the exponent 5, under four times its yield stress.
 fn bar(law: &str, time: &str) -> String {
     format!(
         "{}[material]\nhypothesis = 'plane_stress'\nelasticity = {{ youngs_modulus = 1000, poisson_ratio = 0.3 }}\n\
@@ -25,7 +25,7 @@ fn started(session: &Session, job: &str) -> Simulation<2, 3> {
     simulation(session, job, &rectangle([1.0, 0.5], [4, 2], Diagonal::Right, [1.0; 2]).expect("mesh"))
 }
 
-/// The steps that are taken, and the error that ends them.
+/// The number of steps, and the error that ends the run.
 fn steps(session: &Session, run: &mut Simulation<2, 3>) -> (u64, Option<Agreed>) {
     loop {
         match run.advance(session) {
@@ -43,8 +43,8 @@ fn reach(session: &Session, run: &Simulation<2, 3>) -> f64 {
     session.largest([mine])[0]
 }
 
-/// In the first steps nothing flows. Then the overstress is three times the yield stress, and the law relaxes `3^4` times as fast
-/// as at the overstress that the bound of the set-up goes by.
+/// In the first steps the bar does not flow. Then the overstress is three times the yield stress, and the law relaxes `3^4` times
+/// as fast as at the overstress for which the set-up computes the bound.
 pub fn power_laws(session: &Session) {
     let time = |step: f64, more: &str| format!("[time]\nend = 0.5\nstep = {step}\n{more}");
     for law in ["metric = 'compliance'", "hardening_modulus = 50"] {
@@ -77,8 +77,8 @@ pub fn power_laws(session: &Session) {
     }
 }
 
-/// Where viscosity and elasticity are multiples of each other, and all stress relaxes alike, an error changes by the factor
-/// `1 - k / eta - k / tau` in a step of length `k`.
+/// If viscosity and elasticity are proportional and all stress components relax at the same rate, an error changes by the factor `1
+/// - k / eta - k / tau` in a step of length `k`.
 pub fn together(session: &Session) {
     let (eta, tau) = (0.2, 0.1);
     let job = |step: f64| {

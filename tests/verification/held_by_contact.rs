@@ -1,5 +1,5 @@
-//! Blocks that contact and friction alone hold: quasistatic ones, under loads whose stress is uniform, and one whose inertia counts for
-//! next to nothing.
+//! Blocks whose rigid motions are prevented by contact and friction only: quasistatic blocks under loads with uniform stress, and a
+//! block with negligible inertia.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -20,7 +20,7 @@ const POISSON: f64 = 0.3;
 const FRICTION: f64 = 0.5;
 const PRESSURE: f64 = 1e8;
 
-/// A block on a plane under `PRESSURE` from above, kept from growing sideways, and sheared.
+/// A block on a plane under `PRESSURE` from above, with lateral supports, and under shear.
 fn job<const D: usize>(pressure: f64, shear: f64, solver: &str) -> String {
     let side = POISSON / (1.0 - POISSON) * pressure;
     let vector = |along: f64, up: f64| {
@@ -85,7 +85,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
             assert_eq!(run.state.step, 2);
         }
     }
-    // More than friction bears, and a pull that lifts it off.
+    // A shear load above the friction bound, and a load that lifts the block off.
     for (pressure, shear) in [(PRESSURE, 1.01 * FRICTION * PRESSURE), (-PRESSURE, 0.0)] {
         let mut run = simulation::<D, S>(session, &job::<D>(pressure, shear, solvers[0]), mesh);
         let found = session.agree(run.advance(session)).expect_err("a failure");
@@ -94,7 +94,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
         assert!(words.contains("contact and friction alone hold these motions"), "{words}");
         assert!(words.contains("translation along x"), "{words}");
     }
-    // Without friction nothing holds it along the plane.
+    // Without friction nothing prevents the motion along the plane.
     let text = job::<D>(PRESSURE, 0.0, solvers[0]).replace("friction.coulomb = { coefficient = 0.5 }\n", "");
     let mut loaded = Job::from_text(&text, "job.toml", Path::new("."), &[]).expect("a job");
     let refused = Simulation::<D, S>::new(session, &mut loaded, session.is_first().then(|| mesh.clone()));
@@ -114,7 +114,7 @@ pub fn blocks(session: &Session) {
     block::<3, 6>(session, &box_mesh([0.1, 0.1, 0.3], [2, 2, 5], [1.0; 3]).expect("mesh"));
 }
 
-/// A block whose inertia counts for next to nothing is pushed along its plane.
+/// A block with negligible inertia is pushed along its plane.
 pub fn nearly_free(session: &Session) {
     let mesh = rectangle([0.04, 0.04], [32, 32], Diagonal::Right, [1.0; 2]).expect("mesh");
     for density in [7800.0, 1e-3] {

@@ -1,4 +1,4 @@
-//! The distance of a step's solution to the contact graphs knows nothing of how the step was solved.
+//! The distance of the solution of a step to the contact graphs does not depend on the solution method.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, noise, simulation};
@@ -7,7 +7,7 @@ use clarke::{
     parallel::session::Session,
 };
 
-/// The distance to the graphs, with the same forces left open, of the same step solved in several ways.
+/// The distance to the graphs, with the same unbalanced forces, of the same step solved by several methods.
 pub fn judged(session: &Session) {
     let mesh = rectangle([0.2, 0.1], [8, 4], Diagonal::Right, [1.0; 2]).expect("mesh");
     let solvers = ["preconditioner = \"cholesky\"", "preconditioner = \"gamg\""];
@@ -53,8 +53,8 @@ pub fn judged(session: &Session) {
     }
 }
 
-/// Under a steady load a body without inertia comes to rest: velocities and the forces of a step are rounding, which is no distance to
-/// laws that press next to nothing.
+/// Under a steady load a body without inertia comes to rest. Velocities and forces of a step are then rounding errors, which must
+/// not count as a distance to laws with very small pressures.
 pub fn at_rest(session: &Session) {
     let mesh = rectangle([1.0, 1.0], [3, 3], Diagonal::Right, [1.0; 2]).expect("mesh");
     let laws = [

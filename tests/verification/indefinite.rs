@@ -1,5 +1,5 @@
-//! A contact law that falls faster than a step resists: CG meets negative curvature and GMRES solves, here a block whose
-//! velocities are known.
+//! A contact law whose decrease exceeds the resistance of a step: CG encounters negative curvature and GMRES solves the system. The
+//! test is a block with known velocities.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -12,10 +12,10 @@ use clarke::{
 };
 
 const STEP: f64 = 0.1;
-/// Fall of the contact law in Pa s/m; the block has `density height / STEP` = 10 Pa s/m against it.
+/// Decrease of the contact law in Pa s/m; the resistance of the block is `density height / STEP` = 10 Pa s/m.
 const FALL: f64 = 15.0;
 
-/// A block as good as rigid, 1 m high and guided on its sides, pressed with 1 Pa on a foundation that pulls it down.
+/// A nearly rigid block, 1 m high and guided on its sides, pressed with 1 Pa on a foundation that pulls it down.
 fn job<const D: usize>(preconditioner: &str) -> String {
     let mut job = format!(
         "{}[material]\ndensity = 1\nviscosity = {{ volumetric = 0, shear = 1e5 }}\n",
@@ -51,7 +51,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
                     run.state.step
                 );
             }
-            // On the contact alone CG may find the solution without a look at a falling direction.
+            // On the contact unknowns alone, CG may find the solution without a direction of negative curvature.
             let on_the_whole_body = preconditioner == "gamg";
             assert!(outcome.indefinite_solves > 0 || !on_the_whole_body, "{preconditioner}: {outcome:?}");
             assert!(outcome.inclusion_residual < 1e-9, "{preconditioner}: {outcome:?}");

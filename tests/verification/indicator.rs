@@ -1,5 +1,5 @@
-//! The error indicator: zero where there is nothing to find, by hand on two cells, against sums over the whole mesh on
-//! any number of ranks, and against the true error of a manufactured solution.
+//! The error indicator: zero for uniform stress, by hand on two cells, against sums over the whole mesh on any number of ranks, and
+//! against the true error of a manufactured solution.
 
 use crate::manufactured::{self, VISCOSITY, elasticity, motion, rule};
 use crate::run_on;
@@ -44,7 +44,7 @@ fn indicated<const D: usize, const S: usize>(
     stress: &[Mandel<S>],
 ) -> Indicated {
     let mut indicator = ErrorIndicator::new(session, &run.body).expect("indicator");
-    // A second state must not see the means of the first.
+    // A second state must not use the means of the first.
     let other: Vec<Mandel<S>> = stress.iter().map(|stress| stress.map(|value| 1.0 - value)).collect();
     indicator.of(session, &run.body, &other).expect("indicated");
     indicator.of(session, &run.body, stress).expect("indicated")
@@ -82,7 +82,7 @@ fn two_cells(session: &Session) {
     assert!(two.cells.iter().all(|eta| *eta == 0.0));
 }
 
-/// Random stresses: against the definition, worked out over the whole mesh on every rank.
+/// Random stresses: against the definition, computed over the whole mesh on every rank.
 fn noisy<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, hypothesis: &str) {
     let run = at_rest::<D, S>(session, whole, hypothesis);
     let stress =
@@ -157,7 +157,7 @@ pub fn sums(session: &Session) {
     noisy::<3, 6>(session, &with_core(brick([4, 4, 3])), "");
 }
 
-/// Indicated over true error of the stress at the end, in the norm of the elastic energy.
+/// Ratio of the indicated to the true error of the stress at the end, in the elastic energy norm.
 fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
     let end = 0.25;
     let job = manufactured::job::<2>("plane_stress", "nodal", "", end, end / (2 * n) as f64);
@@ -196,7 +196,7 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
     found.total / session.sum([square])[0].sqrt()
 }
 
-/// On a regular mesh means are of higher order than stresses, but for the cells along the surface.
+/// On a regular mesh the means are of higher order than the stresses, except in cells at the surface.
 pub fn effectivity_tends_to_one(session: &Session) {
     let regular = |n: usize| rectangle([1.0, 1.0], [n, n], Diagonal::Right, [1.0; 2]).expect("mesh");
     let indices = [6, 12, 24].map(|n| effectivity(session, &regular(n), n));

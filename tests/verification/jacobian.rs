@@ -51,7 +51,7 @@ fn wall() -> Gap {
     Gap::Distance(Scalar::Number(0.01))
 }
 
-/// Below the body, a plane that slides along it; in space it turns in itself, too.
+/// A plane below the body that moves tangentially; in space it also rotates about its normal.
 fn belt<const D: usize>() -> Gap {
     let expression = |text: &str| Scalar::Expression(Expression::parse(text).expect("an expression"));
     let mut point = vec![Scalar::default(); D];
@@ -76,7 +76,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
     let mut coupled = 0;
     for (law, normal) in laws().into_iter().enumerate() {
         let nodal = FRICTION.map(|friction| (Quadrature::Nodal, friction, true, false));
-        // Of a fixed point, which holds the pressures that friction follows.
+        // For the fixed-point iteration, which keeps the pressures in the friction bounds.
         let held = FRICTION[2..].iter().map(|friction| (Quadrature::Nodal, *friction, false, false));
         let dragged = FRICTION[1..].iter().map(|friction| (Quadrature::Nodal, *friction, true, true));
         let dragged = dragged.filter(|_| normal.depends_on_displacement());

@@ -1,5 +1,5 @@
-//! Verification on small meshes in memory, from the simple to the composite: PETSc's handles, assembly, the Jacobian, which
-//! effects are called, uniform fields, energy and closed forms, manufactured solutions.
+//! Verification on small meshes in memory, from simple to composite problems: PETSc handles, assembly, the Jacobian, calls to
+//! effects, uniform fields, energy and closed forms, manufactured solutions.
 //!
 //! A test starts this program again under `mpirun`, once for each scenario and number of ranks.
 
@@ -39,7 +39,7 @@ mod scenes;
 mod schemes;
 mod softening;
 mod subspace;
-mod taken_back;
+mod rejected_steps;
 mod tolerance;
 mod unloading;
 mod uniqueness;
@@ -48,7 +48,7 @@ mod wave;
 use clarke::parallel::session::Mpi;
 use std::path::PathBuf;
 
-/// The side of the tests that runs under `mpirun`.
+/// The part of the tests that runs under `mpirun`.
 #[test]
 #[ignore = "started by the other tests, under mpirun"]
 fn scenario() {
@@ -97,8 +97,8 @@ fn scenario() {
         "random_laws" => random_laws::solve(&session),
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
-        "taken_back" => taken_back::in_the_plane(&session),
-        "failed_set_up" => taken_back::after_failures(&session),
+        "rejected_steps" => rejected_steps::in_the_plane(&session),
+        "failed_set_up" => rejected_steps::after_failures(&session),
         "softening" => softening::all(&session),
         "branches" => branches::passed(&session),
         "unloading" => unloading::all(&session),

@@ -82,7 +82,7 @@ fn body_force<const D: usize>(field: &Field<D>, (follows, elastic): (&str, (f64,
     )
 }
 
-/// What the body touches below.
+/// The contact at the bottom of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Touch {
     /// A linear damper.
@@ -95,12 +95,12 @@ pub enum Touch {
     Dragging,
 }
 
-/// A spring is felt from this place on, has this stiffness and this exponent.
+/// Position of the spring, its stiffness and its exponent.
 const SPRING: (f64, f64, f64) = (-2.0, 0.8, 1.5);
 /// Coulomb's coefficient and Tresca's bound.
 const FRICTION: (f64, f64) = (0.3, 0.7);
 
-/// What acts beside the body's own inertia, elasticity and viscosity, and how steps are taken.
+/// The effects in addition to inertia, elasticity and viscosity, and the scheme.
 #[derive(Debug, Clone)]
 pub struct Case<'a> {
     pub hypothesis: &'a str,
@@ -189,7 +189,7 @@ pub fn job_of<const D: usize>(case: &Case) -> String {
     job + &format!("[initial]\ndisplacement = {:?}\nvelocity = {:?}\n", at_start(0), at_start(1))
 }
 
-/// Component i of what has to act below against what is touched there: pressure, and friction while all slides.
+/// Component i of the load that balances the contact at the bottom: pressure, and friction of sliding points.
 fn against_touch<const D: usize>(field: &Field<D>, touch: Touch, i: usize) -> String {
     let low = D - 1;
     let velocity = |i: usize| format!("({}*{})", field.time.text(1, "t"), field.text(i, &[]));

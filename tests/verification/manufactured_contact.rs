@@ -10,14 +10,14 @@ use clarke::{
 };
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];
-/// In which time stress relaxes.
+/// Relaxation time of the stress.
 const RELAXES: Option<f64> = Some(0.4);
 
 fn case<'a>(scheme: &'a str, hypothesis: &'a str, (relaxation, touch): (Option<f64>, Touch)) -> Case<'a> {
     Case { hypothesis, scheme, quadrature: "nodal", extra: "", relaxation, touch, end: 0.5, step: 0.0 }
 }
 
-/// Steps that fall with the square of the mesh size, or for a scheme of second order with the size itself: one order shows
+/// Steps proportional to the square of the mesh size, or to the mesh size for a scheme of second order, so that one order shows
 /// both errors.
 fn step(scheme: &str, cells: usize, of_size: f64) -> f64 {
     if scheme == "bdf2" { 2.0 * of_size / cells as f64 } else { of_size * 4.0 / (cells * cells) as f64 }

@@ -1,6 +1,6 @@
-//! Flow in states that change from place to place. A bar between lubricated walls is stretched by
-//! `u_x = T(t) U(x)`, so that strain is uniaxial and stress is not. The flow law, written down here once more, is integrated along that
-//! strain; polynomials through its stresses give the loads. The solver must find the stresses at first order.
+//! Flow in nonuniform states. A bar between lubricated walls is stretched by `u_x = T(t) U(x)`, so that the strain is uniaxial and
+//! the stress is not. A separate implementation of the flow law is integrated along this strain; polynomials through its stresses
+//! define the loads. The solver must find the stresses at first order.
 
 use crate::manufactured::{VISCOSITY, elasticity, rule};
 use crate::run_on;
@@ -250,7 +250,8 @@ fn job<const D: usize>(hypothesis: &str, law: Law, scheme: &str, step: f64) -> (
     (text, at_end)
 }
 
-/// Errors of the total stress at the end: in L2, and of its mean over the body, which does not feel that stress is constant in cells.
+/// Errors of the total stress at the end: in L2, and of its mean over the body, which does not depend on the piecewise constant
+/// approximation.
 fn errors<const D: usize, const S: usize>(
     session: &Session,
     mesh: &GlobalMesh<D>,

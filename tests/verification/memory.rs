@@ -1,4 +1,4 @@
-//! Contact memory against a point mass on a foundation whose whole past is summed up here in every step.
+//! Contact memory against a point mass on a foundation, computed here by summation over the whole history in every step.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
@@ -36,7 +36,7 @@ fn job<const D: usize>(sides: &[&str], [rate, time]: [f64; 2]) -> String {
     )
 }
 
-/// The remembered pressures at the nodes here that lie low; none elsewhere.
+/// The memory pressures at the bottom nodes of this rank; there are none elsewhere.
 fn pressures<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64> {
     let mut found = Vec::new();
     for history in run.body.node_histories() {
@@ -52,7 +52,7 @@ fn pressures<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<f64>
     found
 }
 
-/// A stiff plate of this height and area that is pressed in, lifted off and pressed in again.
+/// A stiff plate of this height and area that is pressed into the foundation, lifted off and pressed in again.
 fn follows<const D: usize, const S: usize>(
     session: &Session,
     mesh: &GlobalMesh<D>,
@@ -96,7 +96,7 @@ fn follows<const D: usize, const S: usize>(
     assert!(largest > 0.1 * DAMPING * SPEED, "memory matters: {largest} Pa");
 }
 
-/// Held for long, memory is a spring: its stiffness bounds the explicit step, `k^2 stiffness = 4 mass` for a rigid plate.
+/// Over long times memory is a spring, whose stiffness limits the explicit step: `k^2 stiffness = 4 mass` for a rigid plate.
 fn bound(session: &Session) {
     let mut run = simulation::<2, 4>(session, &job::<2>(&["bottom"], MEMORY), &crossed([3, 2]));
     let known = Certificates::of(session, &run.body, &run.state, &mut run.scheme, 0.0).expect("certificates");
@@ -105,7 +105,7 @@ fn bound(session: &Session) {
     assert!((found / expected - 1.0).abs() < 1e-2, "{found} s instead of {expected} s");
 }
 
-/// A memory that never presses, and none, give the same numbers to the last bit.
+/// A memory with zero pressure and no memory give bitwise equal results.
 fn inert(session: &Session) {
     let with = job::<2>(&["bottom"], [0.0, 0.1]).replace("1e6", "5");
     let (start, end) =
@@ -124,7 +124,7 @@ fn inert(session: &Session) {
     assert!(pressures(&one).iter().all(|pressure| *pressure == 0.0));
 }
 
-/// A node remembers one displacement: that along one normal.
+/// A node stores the history of one displacement, that along one normal.
 fn refused_at_edges(session: &Session) {
     let text = job::<2>(&["bottom", "left"], MEMORY);
     let mut loaded = Job::from_text(&text, "job.toml", Path::new("."), &[]).expect("a job");

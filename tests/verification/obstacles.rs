@@ -1,5 +1,5 @@
-//! Obstacles that move do work that energy accounts for; contacts of different laws meet at edges; contacts that
-//! are bounds are solved alike by PETSc's solver for variational inequalities.
+//! The energy balance contains the work of moving obstacles; contacts with different laws meet at edges; PETSc's solver for
+//! variational inequalities finds the same solutions of unilateral contact.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
@@ -31,12 +31,12 @@ fn time(step: f64, steps: usize, more: &str) -> String {
     format!("[time]\nend = {}\nstep = {step}\n[solver]\ntolerance = 1e-13\n{more}\n", step * steps as f64)
 }
 
-/// Components of a vector that is 2D or 3D: those along x and y, and 0.4 across.
+/// Components of a vector in 2D or 3D: those along x and y, and 0.4 along the third axis.
 fn vector<const D: usize>(x: &str, y: &str) -> String {
     if D == 2 { format!("[\"{x}\", \"{y}\"]") } else { format!("[\"{x}\", 0.4, \"{y}\"]") }
 }
 
-/// The last axis, along which bodies stand on their bottom.
+/// The vertical axis.
 fn up<const D: usize>() -> &'static str {
     ["", "", "y", "z"][D]
 }
@@ -111,7 +111,7 @@ fn difference(session: &Session, one: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
     off / size
 }
 
-/// A plane is a gap that is an expression; so are a ball and a shell.
+/// A plane, a ball and a shell give the same results as gaps defined by expressions.
 fn alike<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let (z, across) = (up::<D>(), if D == 2 { "" } else { "-(y-0.4)^2" });
     let half = format!("0.52^2-(x-0.2-5*t)^2{across}");
@@ -227,9 +227,9 @@ fn mixed_laws<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMe
     [totals.energy.elastic, totals.energy.contact, totals.energy.viscous, totals.energy.work]
 }
 
-/// An elastic bar of 1 m with waves of 10 m/s flies at 0.1 m/s into a wall 1 cm away: it touches from 0.1 s to 0.3 s under
-/// 1000 Pa, and flies back. Gives first and last time in touch, the mean pressure between 0.15 s and 0.25 s, and the
-/// velocity of the rebound.
+/// An elastic bar of 1 m with a wave speed of 10 m/s hits a wall at a distance of 1 cm at 0.1 m/s: it is in contact from 0.1 s to
+/// 0.3 s under 1000 Pa and rebounds. Returns the first and last time of contact, the mean pressure between 0.15 s and 0.25 s, and
+/// the velocity of the rebound.
 fn impact(session: &Session, cells: usize) -> [f64; 4] {
     let step = 0.025 / cells as f64;
     let job = format!(
@@ -269,7 +269,7 @@ pub fn impacts(session: &Session) {
         assert!((first - 0.1).abs() <= 0.05 / cells, "it arrives at {first} s");
         assert!((last - 0.3).abs() <= 0.1 / cells, "it leaves at {last} s");
         assert!((pressure - 1000.0).abs() <= 400.0 / cells, "it presses with {pressure} Pa");
-        // The node that hits the wall loses what kinetic energy it has: a share of the bar that falls with its cells.
+        // The node that hits the wall loses its kinetic energy, a fraction of that of the bar that decreases with the cell size.
         assert!((-0.1..=-0.1 + 0.12 / cells).contains(&rebound), "it flies back with {rebound} m/s");
     }
     let lost = found.map(|f| 0.1 + f[3]);

@@ -1,4 +1,4 @@
-//! One cell with one contact facet: forces at its nodes worked out by hand, at nodes and at Gauss points.
+//! One cell with one contact facet: nodal forces computed by hand, for quadrature at nodes and at Gauss points.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, part};
@@ -91,7 +91,7 @@ fn assert_along<const D: usize>(found: &[f64], normal: Vector<D>, expected: &[f6
 }
 
 fn by_hand(session: &Session) {
-    // 1 Pa at rest and 3 Pa s/m; and 2 Pa s/m for what approaches.
+    // A law with 1 Pa at rest and 3 Pa s/m, and one with 2 Pa s/m in approach only.
     let damper = Polyline::new(vec![[0.0, 1.0]], 3.0, 3.0).expect("graph");
     let one_sided = Polyline::new(vec![[0.0, 0.0]], 0.0, 2.0).expect("graph");
     let (nodal, gauss) = (Quadrature::Nodal, Quadrature::Gauss);
@@ -153,7 +153,7 @@ fn refusal(session: &Session) {
     set_up(&job("bottom", "newton")).expect("Newton's method takes any normal");
 }
 
-/// Where the graph is vertical its velocity is known to the last digit, whatever the pressure is.
+/// Where the graph is vertical, the velocity is exact for any pressure.
 fn pushed_hard(session: &Session) {
     let nodes = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
     let mesh = part(session, &cell(nodes, vec![0, 1, 2], vec![[0, 1], [1, 2], [2, 0]]));

@@ -1,5 +1,5 @@
-//! Where no motion can be prescribed: the order in the step of each effect under each of its schemes, from the
-//! differences of runs whose steps are halved.
+//! Effects for which no motion can be prescribed: the order of convergence in the step of each effect with each of its schemes,
+//! from the differences of runs with halved steps.
 
 use crate::manufactured::{Case, Touch, job_of};
 use crate::run_on;
@@ -18,7 +18,7 @@ pub const END: f64 = 0.4;
 /// Schemes with their orders.
 pub const SCHEMES: [(&str, f64); 3] = [("lagged_euler", 1.0), ("implicit_euler", 1.0), ("bdf2", 2.0)];
 
-/// An effect: its tables, and what tells that it acted.
+/// An effect: its tables, and a test that it was active.
 pub struct Acting {
     pub name: &'static str,
     material: &'static str,

@@ -115,12 +115,12 @@ fn elastic<const D: usize, const S: usize>(
     assert_linear(session, &what, &run.body.mesh.nodes, &displacement, &diagonal(strains.0, strains.1));
     assert!(run.state.velocity.norm().expect("norm") < 1e-11, "at rest");
     assert_stress(session, &what, &run, stress);
-    // It creeps to its strain, along and across; in space the change of volume swings about its own by next to nothing.
+    // It creeps to its final strain in both directions; in space the change of volume oscillates negligibly about its final value.
     let across = if S == 6 { 2.0 } else { 1.0 };
     let strain = (strains.0 * strains.0 + across * strains.1 * strains.1).sqrt();
     let off = (run.totals.peaks.strain - strain).abs();
     assert!(off < 1e-6, "{what}: largest strain {} instead of {strain}", run.totals.peaks.strain);
-    // Stress across the plane takes its time where there is any.
+    // Stress normal to the plane, if there is any, needs time to relax.
     let off = (run.totals.peaks.von_mises - LOAD).abs();
     assert!(S == 4 || off < 1e-10, "{what}: largest von Mises stress {}", run.totals.peaks.von_mises);
 }

@@ -1,4 +1,4 @@
-//! The safe handles around PETSc do what they say.
+//! The safe handles around PETSc behave as documented.
 
 use crate::run_on;
 use clarke::{
@@ -156,7 +156,7 @@ pub fn solve_linear(session: &Session) {
     assert_eq!(outcome.words(), "too many linear iterations");
 }
 
-/// Iterations of a solve that never reaches its tolerance, limited by options alone.
+/// Number of iterations of a solve that never reaches its tolerance, limited by options.
 fn limited_iterations(session: &Session, prefix: &str) -> usize {
     let matrix = matrix(session);
     let mut ksp = Ksp::new(prefix).expect("solver");
@@ -199,7 +199,7 @@ pub fn set_options(session: &Session) {
     assert_eq!(limited_iterations(session, "asked_"), 2, "PETSc still works after errors");
 }
 
-/// Every way to PETSc that needs no handle fails with words.
+/// Every function of PETSc that needs no handle fails with a message.
 fn assert_refused() {
     let refused = [
         DistributedVector::ghosted(1, 1, &[]).err(),
@@ -260,7 +260,7 @@ fn linear_solves_reach_the_solution_and_say_when_they_do_not() {
 /// PETSc refuses a product of vectors of two lengths on the last rank, while the others wait inside another one.
 pub fn fail_alone(session: &Session) {
     let mut long = vector(session);
-    // PETSc knows the norm of a vector of zeros by itself.
+    // PETSc stores the norm of a vector of zeros.
     set(session, &mut long, |u| (u as f64).sin());
     let outcome = if session.rank() + 1 == session.ranks() {
         let short = DistributedVector::ghosted(1, share(session).1, &[]);

@@ -1,4 +1,4 @@
-//! What `profiles.csv` says of stress and traction on oblique boundaries with facets of unequal size.
+//! Stress and traction in `profiles.csv` on oblique boundaries with facets of unequal size.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
@@ -16,7 +16,7 @@ use clarke::{
 };
 use std::{f64::consts::SQRT_2, path::Path};
 
-/// Turns a place by the angle whose cosine is 0.8 and whose sine is 0.6: about z in the plane, about y in space.
+/// Rotates a position by the angle with cosine 0.8 and sine 0.6: about z in the plane, about y in space.
 fn turned<const D: usize>(place: [f64; D]) -> [f64; D] {
     let mut out = place;
     (out[0], out[D - 1]) = (0.8 * place[0] - 0.6 * place[D - 1], 0.6 * place[0] + 0.8 * place[D - 1]);
@@ -37,7 +37,7 @@ fn measure<const D: usize>(corners: &[[f64; D]; D]) -> f64 {
     if D == 2 { norm(&edge(1)) } else { 0.5 * norm(&cross(&edge(1), &edge(D - 1))) }
 }
 
-/// The rows of a profile: places, and the three numbers behind them.
+/// The rows of a profile: positions, and the three numbers after them.
 fn rows<const D: usize>(folder: &Path) -> Vec<([f64; D], [f64; 3])> {
     let text = std::fs::read_to_string(folder.join("profiles.csv")).expect("the file");
     let row = |line: &str| {
@@ -47,7 +47,7 @@ fn rows<const D: usize>(folder: &Path) -> Vec<([f64; D], [f64; 3])> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// Holds a profile of the bottom against what `expected` says for the original node.
+/// Compares a profile of the bottom with the `expected` values at the original nodes.
 fn hold<const D: usize>(
     what: &str,
     folder: &Path,
@@ -88,7 +88,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
         profiles.write::<S>(session, body, state, stress).expect("written");
         profiles.flush().expect("flushed");
     };
-    // Without contact: a stress that is the same everywhere, and one that changes from cell to cell.
+    // Without contact: a uniform stress, and one that differs between cells.
     let uniform: Mandel<S> = std::array::from_fn(|c| 3.0 + c as f64 * if c % 2 == 0 { 1.5 } else { -2.5 });
     let of_cell =
         |cell: usize| -> Mandel<S> { std::array::from_fn(|c| 5.0 * noise((9000 + cell * S + c) as u64)) };
@@ -117,7 +117,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
         };
         hold("a stress that changes", folder, &whole, |id| [moved(1, id), moved(2, id), pressure(id)]);
     }
-    // With contact: the component of the traction along the part of the normal that no support holds.
+    // With contact: the component of the traction along the part of the normal that no support fixes.
     let facets = body.mesh.boundary("bottom").expect("a boundary").facets.clone();
     let law = NormalResponse::Unilateral(Unilateral { bound: Bound::Displacement, gap: None });
     let contact = Contact::new(
@@ -139,7 +139,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
             |id: usize| left.facets.iter().any(|f| whole.facets[*f as usize].contains(&(id as u32)));
         let pressure = |id: usize| {
             let traction: [f64; D] = random(3)(id, &[0.0; D]);
-            // x is held on the left: of the normal the part along the last axis is left, which points down.
+            // The left side fixes x, so that only the part of the normal along the last axis, which points down, is free.
             if is_held(id) { -traction[D - 1] } else { dot(&traction, &normal) }
         };
         hold("tractions", folder, &whole, |id| [moved(1, id), moved(2, id), pressure(id)]);

@@ -1,4 +1,4 @@
-//! Steps see what loads and obstacles do inside them, and end where the job says.
+//! Steps resolve the changes of loads and obstacles within them, and end at the times given in the job.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -8,7 +8,7 @@ use clarke::{
     run::Simulation,
 };
 
-/// What a block of density 4 on rollers is pushed or hit by in a second.
+/// The load or the obstacle that acts in one second on a block of density 4 on rollers.
 fn job(scheme: &str, time: &str, rest: &str) -> String {
     format!(
         "{}[time]\nend = 1\nscheme = \"{scheme}\"\n{time}\n[material]\nhypothesis = \"plane_strain\"\ndensity = 4\n\
@@ -41,7 +41,7 @@ fn speed(session: &Session, run: &Simulation<2, 4>) -> f64 {
     sum / count
 }
 
-/// The whole impulse of a pulse reaches the block, however long steps may be.
+/// The complete impulse of a pulse acts on the block, for any largest step.
 fn pushed(session: &Session) {
     let pulses = [
         ("8*max(0, 1 - abs(t - 0.6)/0.01)", 0.08, &[0.59, 0.6, 0.61][..]),
@@ -66,7 +66,7 @@ fn pushed(session: &Session) {
     }
 }
 
-/// A wall that comes and goes within a step of the largest length throws the block away.
+/// A wall that approaches and recedes within a step of the largest length repels the block.
 fn hit(session: &Session) {
     let wall = "[[contact]]\non = [\"left\"]\n\
                 normal.compliance = { stiffness = 100, gap = \"0.01 - 0.03*max(0, 1 - abs(t - 0.6)/0.02)\" }";
@@ -77,7 +77,7 @@ fn hit(session: &Session) {
     assert!(speed(session, &run) > 1e-3, "{}", speed(session, &run));
 }
 
-/// Fixed and adaptive steps end at the times that the job names.
+/// Fixed and adaptive steps end at the times in `land_on`.
 fn named(session: &Session) {
     let force = "[[body_force]]\nvalue = [1, 0]";
     let fixed = "step = 0.1\nland_on = [0.25, 0.7]";

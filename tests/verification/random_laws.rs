@@ -1,4 +1,4 @@
-//! Steps with random contact laws that have one solution, under random loads, are all solved.
+//! All steps with random contact laws and random loads are solved if they have one solution.
 
 use crate::mpirun::scramble;
 use crate::run_on;
@@ -8,13 +8,13 @@ use clarke::{
     parallel::session::Session,
 };
 
-/// Laws in an ordinary run, and the variable that asks for another number.
+/// Number of laws in a usual run, and the environment variable for another number.
 const LAWS: usize = 50;
 const NUMBER: &str = "CLARKE_RANDOM_LAWS";
-/// Newton iterations of a step, all attempts together; most steps take fewer than ten.
+/// Largest accepted number of Newton iterations of a step over all attempts; most steps take fewer than ten.
 const ITERATIONS: usize = 2000;
 
-/// Numbers that look random, in a row.
+/// A sequence of pseudorandom numbers.
 struct Numbers(u64);
 
 impl Numbers {
@@ -32,7 +32,7 @@ impl Numbers {
     }
 }
 
-/// A graph with its steepest fall, at velocities about 1 m/s and pressures about 1 Pa.
+/// A graph and its steepest decrease, with velocities of about 1 m/s and pressures of about 1 Pa.
 struct Law {
     points: Vec<[f64; 2]>,
     before: f64,
@@ -104,7 +104,7 @@ pub fn solve(session: &Session) {
         let velocity = numbers.power_of_ten(-3.0, 1.0);
         let step = numbers.power_of_ten(-3.0, 0.0);
         let fall = law.steepest_decrease();
-        // A fall of 8 Pa s/m leaves theta of a step below 1 for this body at every step.
+        // With a decrease of 8 Pa s/m, theta of a step is below 1 for this body at every step length.
         let slope = numbers.power_of_ten(-2.0, 0.9);
         let pressure = velocity * if fall > 0.0 { slope / fall } else { numbers.power_of_ten(-1.0, 2.0) };
         let size = pressure * numbers.power_of_ten(-1.5, 2.5);

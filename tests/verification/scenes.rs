@@ -20,7 +20,7 @@ use clarke::{
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 use std::path::Path;
 
-/// A number in [-1, 1) that looks random.
+/// A pseudorandom number in [-1, 1).
 pub fn noise(seed: u64) -> f64 {
     (scramble(scramble(seed)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
@@ -30,12 +30,12 @@ pub fn crossed(cells: [usize; 2]) -> GlobalMesh<2> {
     rectangle([1.2, 0.9], cells, Diagonal::Crossed, [1.3, 0.8]).expect("mesh")
 }
 
-/// A graded brick whose inner nodes were moved about.
+/// A graded brick with randomly displaced interior nodes.
 pub fn brick(cells: [usize; 3]) -> GlobalMesh<3> {
     stir(box_mesh([1.0, 0.8, 1.1], cells, [1.2, 1.0, 0.9]).expect("mesh"), 0.12 / cells[0] as f64)
 }
 
-/// Moves every node that is not on the surface by up to `reach` along each axis.
+/// Displaces every interior node by up to `reach` along each axis.
 pub fn stir<const D: usize>(mut mesh: GlobalMesh<D>, reach: f64) -> GlobalMesh<D> {
     let mut outside = vec![false; mesh.nodes.len()];
     mesh.facets.iter().flatten().for_each(|&node| outside[node as usize] = true);
@@ -47,7 +47,7 @@ pub fn stir<const D: usize>(mut mesh: GlobalMesh<D>, reach: f64) -> GlobalMesh<D
     mesh
 }
 
-/// This rank's part of a mesh that every rank has made.
+/// The part of this rank of a mesh that every rank has generated.
 pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D> {
     let parts = session
         .is_first()
@@ -55,7 +55,7 @@ pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D>
     distribute(session, parts).expect("distributed")
 }
 
-/// A body at rest whose displacement is fixed on some boundaries, with these effects.
+/// A body at rest with supports on some boundaries and these effects.
 pub fn body<const D: usize, const S: usize>(
     session: &Session,
     whole: &GlobalMesh<D>,
@@ -75,7 +75,7 @@ pub fn body<const D: usize, const S: usize>(
     (body, state)
 }
 
-/// The job of this text on a mesh that every rank has made.
+/// The job of this text on a mesh that every rank has generated.
 pub fn simulation<const D: usize, const S: usize>(
     session: &Session,
     job: &str,

@@ -33,7 +33,7 @@ fn advance(session: &Session, run: &mut Simulation<2, 3>, steps: usize, ratio: f
     }
 }
 
-/// The order seen in the differences of runs whose steps are halved, of velocity and displacement.
+/// The observed orders of velocity and displacement, from the differences of runs with halved steps.
 fn order(session: &Session, job: &str, ratio: f64, end: f64) -> [f64; 2] {
     let mesh = rectangle([1.0, 1.0], [6, 6], Diagonal::Crossed, [1.0, 1.0]).expect("mesh");
     let fields = [16, 32, 64].map(|steps| {
@@ -74,7 +74,7 @@ pub fn orders(session: &Session) {
     }
 }
 
-/// A held block whose stress `s` decays by `s' = -s / t` everywhere: each scheme's own recursion.
+/// A fixed block whose stress `s` decays by `s' = -s / t` everywhere: the recursion of each scheme.
 fn relaxation(session: &Session, scheme: &str) {
     let (time, step, steps) = (0.5, 0.05, 20);
     let job = under(
@@ -106,8 +106,8 @@ fn relaxation(session: &Session, scheme: &str) {
     assert_eq!(run.state.step, steps);
 }
 
-/// A bar under a steady pull without viscosity or inertia: elastic at once, then it flows at the rate of the law, which both
-/// schemes integrate exactly.
+/// A bar under a constant tensile load without viscosity or inertia: an instantaneous elastic strain, then flow at the rate of the
+/// law, which both schemes integrate exactly.
 fn creep<const D: usize, const S: usize>(
     session: &Session,
     (scheme, hypothesis): (&str, &str),
@@ -180,7 +180,7 @@ fn relaxation_and_creep_follow_each_schemes_closed_form() {
 
 /// Cells along a side of the paper's square.
 const SIDE: usize = 16;
-/// Steps of the reference; adapted steps are no shorter than its.
+/// Number of steps of the reference; adaptive steps are not shorter than its steps.
 const FINE: usize = 8192;
 
 /// The paper's problem, with overrides.

@@ -5,7 +5,7 @@ use crate::scenes::{any_mesh, crossed, simulation};
 use crate::unloading::tangent;
 use clarke::{io::output::history::Totals, parallel::session::Session, run::Simulation};
 
-/// What softens: its tables, what tells that it acted, and whether derivatives must have been met that are not symmetric.
+/// A softening effect: its tables, a test that it was active, and whether nonsymmetric derivatives must have occurred.
 struct Softening {
     name: &'static str,
     material: &'static str,
@@ -55,7 +55,7 @@ const ALL: [Softening; 5] = [
     },
 ];
 
-/// A square that is pulled and bent fast to and fro.
+/// A square under rapidly oscillating tension and bending.
 fn derivatives(session: &Session, softening: &Softening, scheme: &str) {
     let job = format!(
         "{}[time]\nscheme = \"{scheme}\"\nend = 0.6\nstep = 0.02\n[solver]\ntolerance = 1e-12\n[material]\n\
@@ -87,8 +87,8 @@ fn values(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
     all.flat_map(|h| h.values.into_owned()).filter(|value| *value != 0.0).collect()
 }
 
-/// A strip that is stretched to a given strain within the run and held: with damage that follows at once (next to no viscosity) its
-/// energy comes to rest at the threshold where damage is free to grow.
+/// A strip that is stretched to a given strain and held. With nearly rate-independent damage (very small viscosity), its elastic
+/// energy per volume decreases to the threshold where damage can grow.
 fn long_steps(session: &Session, scheme: &str) {
     let job = |steps: usize| {
         format!(

@@ -1,4 +1,4 @@
-//! A preconditioner that is made for the subspace of a solve.
+//! A preconditioner that is built for the subspace of a solve.
 
 use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};

@@ -1,5 +1,5 @@
-//! Adaptive steps: the error of a run falls with the tolerance, also where nothing moves and only stress, damage, bonds or memory
-//! change. Closed forms of bodies whose strain is uniform.
+//! Adaptive steps: the error of a run decreases with the tolerance, also if nothing moves and only stress, damage, bonds or memory
+//! change. The tests use closed forms for bodies with uniform strain.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
@@ -12,7 +12,7 @@ use clarke::{
 
 const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];
 const HELD: &str = "[[support]]\non = [\"left\", \"right\", \"bottom\", \"top\"]\nfix = \"all\"\n";
-/// A force too small to matter keeps the equations from being all rounding.
+/// A negligible force makes the residual tolerance well defined.
 const SPECK: &str = "[[body_force]]\nvalue = [1e-8, 1e-8]\n";
 
 /// `[time]` and the head of `[material]`.
@@ -26,8 +26,8 @@ fn head(scheme: &str, end: f64, largest: f64, tolerance: f64) -> String {
     )
 }
 
-/// Runs with a loose and a tight tolerance, and holds the largest error over time of each against the other: at most a `share`,
-/// and at most `enough`. Velocities of `lagged_euler` lag by a step, so that each change of its length shows as an
+/// Runs with a loose and a tight tolerance: the largest error over time with the tight one must be at most `share` times that with
+/// the loose one, and at most `enough`. Velocities of `lagged_euler` lag by a step, so that each change of the step length is an
 /// error, which keeps steps short at tight tolerances.
 fn falls(
     session: &Session,
@@ -51,7 +51,7 @@ fn falls(
     assert!(errors[1] <= share * errors[0] && errors[1] <= enough, "{what}: {errors:?}");
 }
 
-/// A held block whose stress decays as `exp(-t / 0.5)`.
+/// A fixed block whose stress decays as `exp(-t / 0.5)`.
 fn relaxation(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let job = |tolerance: f64| {
         head(scheme, 2.0, 0.5, tolerance)
@@ -71,8 +71,8 @@ fn relaxation(session: &Session, scheme: &str, bounds: [f64; 2]) {
     falls(session, &format!("relaxation, {scheme}"), job, off, (1e-4, bounds));
 }
 
-/// A bar that creeps under a steady pull `p`: viscosity `theta E`, flow `-S / tau`. With `c = 1 / theta + 1 / tau` the stress without
-/// viscosity is `p (1 - exp(-c t)) / (theta c)`, and what is left of `p` pulls against viscosity.
+/// A bar that creeps under a constant tensile load `p`: viscosity `theta E`, flow `-S / tau`. With `c = 1 / theta + 1 / tau` the
+/// stress without viscosity is `p (1 - exp(-c t)) / (theta c)`, and the rest of `p` is the viscous stress.
 fn creep(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (modulus, ratio, theta, tau, pull) = (100.0, 0.25, 0.5, 1.0, 1.0);
     let volumetric = theta * modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio));
@@ -101,14 +101,14 @@ fn creep(session: &Session, scheme: &str, bounds: [f64; 2]) {
     falls(session, &format!("creep, {scheme}"), job, off, (tight, bounds));
 }
 
-/// The values of a history of cells or nodes here.
+/// The values of a history of the cells or nodes of this rank.
 fn history(run: &Simulation<2, 4>, name: &str) -> Vec<f64> {
     let of_cells = run.body.cell_histories();
     let of_nodes = run.body.node_histories();
     of_cells.chain(of_nodes).filter(|h| h.name == name).flat_map(|h| h.values.into_owned()).collect()
 }
 
-/// A stretched block that is held: damage `1 - exp(-r t)` with `r` the excess of the release rate over the viscosity.
+/// A fixed stretched block: damage `1 - exp(-r t)`, where `r` is the release rate above the threshold divided by the viscosity.
 fn damage(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (modulus, ratio, strain, threshold, viscosity) = (100.0, 0.25, 0.1, 0.2, 0.3);
     let energy = 0.5 * modulus * (1.0 - ratio) / ((1.0 + ratio) * (1.0 - 2.0 * ratio)) * strain * strain;
@@ -131,8 +131,8 @@ fn damage(session: &Session, scheme: &str, bounds: [f64; 2]) {
     falls(session, &format!("damage, {scheme}"), job, off, (1e-4, bounds));
 }
 
-/// A block held apart from the ground, too viscous to sag: its bonds give way by themselves, `b = l + (1 - l) exp(-drive t / viscosity)` with `l` the
-/// energy over the drive.
+/// A block at a distance from the ground, with a viscosity that prevents its motion: its bonds break at constant opening, `b = l +
+/// (1 - l) exp(-drive t / viscosity)` with `l = energy / drive`.
 fn bonds(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (stiffness, opening, energy, viscosity) = (100.0, 0.1, 0.25, 0.5);
     let drive = stiffness * opening * opening;
@@ -156,8 +156,8 @@ fn bonds(session: &Session, scheme: &str, bounds: [f64; 2]) {
     falls(session, &format!("bonds, {scheme}"), job, off, (1e-4, bounds));
 }
 
-/// A stiff plate on a foundation that remembers, pressed in and lifted by turns: the differential equations of its depth and of
-/// the pressure, in much shorter steps.
+/// A stiff plate on a foundation with memory, alternately pressed in and lifted: compared with the differential equations for its
+/// depth and the pressure, solved with much shorter steps.
 fn memory(session: &Session, scheme: &str, bounds: [f64; 2]) {
     let (mass, damping, rate, decay, load, frequency) = (10.0, 30.0, 600.0, 0.5, 60.0, 9.0);
     let job = |tolerance: f64| {

@@ -1,5 +1,5 @@
-//! Certificates of a step against dense generalised eigenvalue problems. The matrices of contact are the derivatives that the
-//! solver itself works with, at nodes and at Gauss points.
+//! Certificates of a step against dense generalised eigenvalue problems. The contact matrices are the derivatives that the solver
+//! uses, at nodes and at Gauss points.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
@@ -15,19 +15,19 @@ use clarke::{
 };
 use std::path::Path;
 
-/// A symmetric matrix over all velocity components that no support holds.
+/// A symmetric matrix over all free velocity components.
 type Dense = Vec<Vec<f64>>;
 
-/// Relative distance up to which an ascent and a dense solution count as equal.
+/// Accepted relative difference between the iterative and the dense solution.
 const EQUAL: f64 = 1e-6;
 const STEP: f64 = 0.1;
-/// Steepest fall of the normal law in Pa s/m, and its largest pressure in Pa.
+/// Steepest decrease of the normal law in Pa s/m, and its largest pressure in Pa.
 const FALL: f64 = 25.0;
 const LARGEST: f64 = 500.0;
-/// The law at rest is in the middle of its fall.
+/// At rest the law is in the middle of its decreasing branch.
 const FALLING: &str = "[contact.normal.graph]\npoints = [[-10.0, 500.0], [10.0, 0.0]]\n";
 const SLIP: &str = "[contact.friction.slip_weakening]\nstatic = 0.5\ndynamic = 0.3\ndecay_velocity = 0.4\n";
-/// Steepest fall of the coefficient in s/m.
+/// Steepest decrease of the coefficient in s/m.
 const SLIP_FALL: f64 = 0.2 / 0.4;
 
 /// Largest `b(y, y) / c(y, y)` for positive definite `c`: the largest eigenvalue of `L^-1 b L^-T` with `c = L L^T`, by Jacobi's
@@ -108,7 +108,7 @@ fn dense<const D: usize, const S: usize>(
     free.iter().map(|&at| column(at)).collect()
 }
 
-/// The matrix of what adds to nodal forces. Collective.
+/// The matrix of a function that adds to nodal forces. Collective.
 fn dense_form<const D: usize, const S: usize>(
     session: &Session,
     run: &Simulation<D, S>,
@@ -145,7 +145,7 @@ fn falling<const D: usize, const S: usize>(
     dense_form(session, run, slopes).into_iter().map(|row| row.into_iter().map(|x| -x).collect()).collect()
 }
 
-/// The matrix of `sum of fall w w_tau^2` over the points with friction. Collective.
+/// The matrix of the form `sum of d w w_tau^2` over the points with friction, with the decrease `d` and the weight `w`. Collective.
 fn sliding<const D: usize, const S: usize>(session: &Session, run: &Simulation<D, S>, fall: f64) -> Dense {
     let square = |x: &[f64]| run.body.contacts.iter().map(|c| c.tangential_square(x)).sum::<f64>();
     dense_form(session, run, |x, forces| {
@@ -215,7 +215,7 @@ fn compare<const D: usize, const S: usize>(
     if slip > 0.0 {
         return;
     }
-    // Gauss points integrate squares exactly, whatever the job's quadrature.
+    // Gauss points integrate squares exactly, with any quadrature in the job.
     let exact = |contact: &Contact<D>| {
         let law = contact.law.clone();
         let facets = contact.facets();
@@ -267,8 +267,9 @@ fn all<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) 
     compare::<D, S>(session, mesh, &unbounded, [2000.0, 0.0, SLIP_FALL], "slip weakening");
 }
 
-/// A cube that falls with the velocity in the middle of the falling branch, where pressure and traction balance. The integral of
-/// `w_nu^2` would have `theta` below 1, but velocities that alternate from node to node feel more at nodal points.
+/// A cube that moves with the velocity in the middle of the decreasing branch, where pressure and traction are in equilibrium. With
+/// the integral of `w_nu^2`, `theta` would be below 1, but for velocities that alternate between nodes the sum over nodal points is
+/// larger.
 fn cube(quadrature: &str, solver: &str) -> String {
     format!(
         "{}[material]\ndensity = 1.0\n[[traction]]\non = ['bottom']\nvalue = [0, 0, -9]\n\
@@ -286,7 +287,7 @@ fn theta_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str) -> f
     found.theta_step.expect("theta")
 }
 
-/// How many solutions guesses find in the step of the cube.
+/// The number of solutions that `guesses` finds in the step of the cube.
 fn solutions_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str, accept: &str) -> usize {
     let job = cube(quadrature, &format!("accept = {accept}\nguesses = 30"));
     let mut run = simulation::<3, 6>(session, &job, mesh);
@@ -299,7 +300,7 @@ fn several(session: &Session) {
     let found = solutions_of_cube(session, &mesh, "nodal", "['uniqueness']");
     println!("theta of a step {nodal} at nodes, {exact} at Gauss points; {found} solutions");
     assert!(exact < 0.9 && nodal > 1.5 && found > 1);
-    // Guesses are taken also where the certificate says that there is one solution.
+    // `guesses` also searches if the certificate guarantees one solution.
     assert_eq!(solutions_of_cube(session, &mesh, "gauss", "[]"), 1);
     let refused =
         Job::from_text(&cube("nodal", ""), "job.toml", Path::new("."), &[]).and_then(|mut loaded| {

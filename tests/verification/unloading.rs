@@ -1,4 +1,4 @@
-//! Flow under the formula of second order ends where the stress leaves the yield surface.
+//! With the formula of second order, flow ends where the stress leaves the yield surface.
 
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};
@@ -17,7 +17,7 @@ fn histories<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<u64>
     all.flat_map(|history| history.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()).collect()
 }
 
-/// The bar that keeps a permanent set, over a few steps: closed form in the head of its job.
+/// The bar with a permanent set, over a few steps; the head of its job contains the closed form.
 fn permanent_set(session: &Session, steps: u64) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/permanent_set.toml");
     let step = format!("time.step={}", 2.0 / steps as f64);
@@ -53,7 +53,7 @@ fn permanent_set(session: &Session, steps: u64) {
     }
 }
 
-/// A square that is pulled, and sheared, fast to and fro far beyond its yield stress.
+/// A square under rapidly oscillating tension and shear far above its yield stress.
 fn to_and_fro(session: &Session, law: &str) {
     let job = format!(
         "{}[time]\nscheme = \"bdf2\"\nend = 1\nstep = 0.02\n[material]\nhypothesis = \"plane_strain\"\ndensity = 1\n\
@@ -74,8 +74,8 @@ fn to_and_fro(session: &Session, law: &str) {
     assert!(dissipated > 0.1 && limited > 2, "{law}: {dissipated} J, {limited} steps with limited flow");
 }
 
-/// Holds the derivative of the forces of cells and of what acts at the surface against differences around the next displacement that motion as it is would lead
-/// to; tells whether a derivative was not symmetric.
+/// Compares the derivatives of the forces of cells and of surface effects with finite differences at the displacement extrapolated
+/// to the next step; returns whether a derivative was not symmetric.
 pub fn tangent(session: &Session, run: &mut Simulation<2, 4>, law: &str) -> bool {
     let step = run.state.step_length;
     let two_steps = run.scheme.scheme().is_two_step() && run.state.step > 1;

@@ -36,7 +36,7 @@ impl<const D: usize> Field<D> {
         std::array::from_fn(|axis| along.iter().filter(|&&a| a == axis).count() as i32)
     }
 
-    /// A derivative of the factor of component `i` that depends on the place.
+    /// A derivative of the spatial factor of component `i`.
     pub fn value(&self, i: usize, along: Along<'_>, x: &[f64; D]) -> f64 {
         let orders = Self::orders(along);
         (0..D).map(|j| self.waves[i][j].value(orders[j], x[j])).product()

@@ -1,4 +1,4 @@
-//! Steps that are taken back leave no trace in the state, in histories, or in what the surface keeps, to the last bit.
+//! Rejected steps leave the state, the histories and the data of the surface bitwise unchanged.
 
 use crate::orders::{Acting, EFFECTS, END, SCHEMES};
 use crate::run_on;
@@ -11,10 +11,10 @@ use clarke::{
 };
 
 const STEPS: f64 = 16.0;
-/// Lengths of the steps that are tried and taken back, over that of the steps that stay.
+/// Ratio of the lengths of rejected steps to that of accepted steps.
 const TRIED: [f64; 2] = [2.0, 0.5];
 
-/// Everything that a step changes.
+/// All data that a step changes.
 fn all<const D: usize, const S: usize>(run: &Simulation<D, S>) -> Vec<(&'static str, Vec<f64>)> {
     let state = &run.state;
     let fields = [("velocity", &state.velocity), ("displacement", &state.displacement)];
@@ -55,12 +55,12 @@ pub fn in_the_plane(session: &Session) {
 }
 
 #[test]
-fn steps_taken_back_leave_no_trace_in_any_effect_under_any_scheme() {
-    run_on(&[1, 2], "taken_back");
+fn rejected_steps_leave_no_trace_in_any_effect_under_any_scheme() {
+    run_on(&[1, 2], "rejected_steps");
 }
 
-/// The set-up for steps of another length fails at each of its agreements in turn; steps of the length before it are what they are
-/// without any failure.
+/// The set-up for steps of another length fails at each of its agreements in turn; steps of the previous length then give the same
+/// results as without a failure.
 fn failing_and_straight(session: &Session, effect: &Acting, under: &str) {
     let text = effect.job::<2>(under, END / STEPS);
     let mesh = || rectangle([1.0; 2], [5; 2], Diagonal::Crossed, [1.0; 2]).expect("mesh");
@@ -77,7 +77,7 @@ fn failing_and_straight(session: &Session, effect: &Acting, under: &str) {
                 fail_at(None);
                 ended
             };
-            // The matrix of another step stands beside the preconditioner when the set-up fails.
+            // When the set-up fails, the matrix belongs to another step than the preconditioner.
             attempt(0.9 * END / STEPS, false).expect("an attempt");
             let ended = attempt(shorter, true);
             attempt(END / STEPS, false).unwrap_or_else(|e| panic!("{under}, after operation {number}: {e}"));
