@@ -1,8 +1,7 @@
-//! A known solution, compared with fields on a mesh by quadrature.
+//! Comparison of an exact solution with fields on a mesh, by quadrature.
 //!
-//! Gauss-Legendre points in each direction of the cell, collapsed toward a corner: four points, exact for polynomials
-//! of degree 6 in the plane and 5 in space. Strains of the solution come from fourth-order central differences over a
-//! thousandth of the cell's size.
+//! Four Gauss-Legendre points in each direction of the cell, collapsed toward a corner, are exact for polynomials of degree 6 in
+//! the plane and 5 in space. Strains of the solution are fourth-order central differences over a thousandth of the cell size.
 
 use super::squares::{Squares, minus, mix, symmetric, tensor_square};
 use super::{
@@ -23,10 +22,10 @@ const LINE: [(f64, f64); 4] = [
     (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
     (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
 ];
-/// Share of a cell's size over which differences are taken.
+/// Step of the differences as a fraction of the cell size.
 const NEARBY: f64 = 1e-3;
 
-/// A solution known as expressions.
+/// An exact solution, given by expressions.
 #[derive(Debug, Clone)]
 pub struct ExactFields {
     displacement: Vec<Scalar>,
@@ -35,7 +34,7 @@ pub struct ExactFields {
 }
 
 impl ExactFields {
-    /// From the study's expressions.
+    /// Creates the solution from the expressions of the study.
     pub fn new(exact: &Exact) -> Self {
         Self {
             displacement: exact.displacement.clone(),
@@ -56,7 +55,7 @@ impl ExactFields {
         components.get(axis).map(|component| component.evaluate(time, point))
     }
 
-    /// The squares of a norm over some cells of a field's mesh, each added with its cell.
+    /// Computes the squares of a norm on some cells of the mesh of a field, and passes each with its cell to `add`.
     pub fn visit<const D: usize>(
         &self,
         space: Space,

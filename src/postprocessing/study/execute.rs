@@ -1,4 +1,4 @@
-//! The runs of a study, one after the other, each as an ordinary run in its own folder.
+//! Executes the runs of a study one after the other, each as an ordinary run in its own folder.
 
 use super::{
     plan::Planned,
@@ -14,18 +14,18 @@ use std::time::{Duration, Instant};
 
 /// The outcome of a run.
 pub(super) enum Outcome {
-    /// It was run now, or found as an earlier study left it.
+    /// The run was executed now, or an earlier study had finished it.
     Ran {
         /// Its record.
         record: Box<Record>,
-        /// Whether it was found.
+        /// Whether an earlier study had finished it.
         found: bool,
     },
-    /// It was requested to stop.
+    /// The run was stopped on request.
     Stopped,
 }
 
-/// Runs a planned run, unless its folder holds it already. A run that fails is an outcome, not an error. Collective.
+/// Executes a planned run, unless its folder contains the finished run. A failed run is an outcome, not an error. Collective.
 pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) -> Result<Outcome> {
     let folder = planned.loaded.job.output_folder();
     let digest = session.on_first(|| digest(planned, session.ranks()))?.unwrap_or_default();

@@ -15,24 +15,24 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Share of the body that two meshes may not have in common.
+/// Accepted fraction of the body that only one of two meshes covers.
 const UNCOVERED: f64 = 0.01;
-/// Times nearer than this share are the same.
+/// Times whose relative difference is smaller are equal.
 const SAME_TIME: f64 = 1e-9;
 
-/// An error and the same norm of the reference.
+/// The norm of an error and that of the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Norm of run minus reference.
+    /// Norm of the difference of run and reference.
     pub error: f64,
     /// Norm of the reference.
     pub size: f64,
 }
 
-/// What a run is compared with.
+/// The solution with which a run is compared.
 #[derive(Clone, Copy)]
 pub(super) enum Target<'a> {
-    /// The folder of another run; whether times between its steps are allowed.
+    /// The folder of another run, and whether times between its steps are allowed.
     Run(&'a Path, bool),
     /// Expressions.
     Exact(&'a ExactFields),
@@ -43,29 +43,29 @@ pub(super) enum Target<'a> {
 pub(super) struct Errors {
     /// One for each norm.
     pub measured: Vec<Measured>,
-    /// Where each sits in time and space.
+    /// The distribution of each error in time and space.
     pub places: Vec<Place>,
     /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
-/// Where an error sits.
+/// The distribution of an error in time and space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Place {
-    /// Times in s with the norm in space; of a norm at the end that one alone.
+    /// Times in s with the norm in space; only the last time for a norm at the end.
     pub over_time: Vec<[f64; 2]>,
-    /// The time in s of the largest of these.
+    /// The time in s of the largest norm.
     pub worst: f64,
-    /// The root of the mean square of the error in each cell at that time.
+    /// The root mean square of the error in each cell at that time.
     pub cells: Vec<f64>,
 }
 
-/// What norms are taken of.
+/// The quantity of a norm.
 #[derive(Clone, Copy, PartialEq)]
 struct Kind {
     of: Quantity,
     space: Space,
-    /// Whether that is at the end alone.
+    /// Whether the norm is that at the end only.
     at_end: bool,
 }
 
@@ -106,7 +106,7 @@ pub(super) fn errors<const D: usize>(
     Ok(found)
 }
 
-/// Notes on a mesh that does not cover this share of the reference's body; refused if the share is large.
+/// Adds a note on a mesh that covers only this fraction of the reference's body; refused if the difference is large.
 fn covered(uncovered: f64) -> Result<Vec<String>> {
     let covers = 100.0 * (1.0 - uncovered);
     if uncovered.abs() > UNCOVERED {
@@ -122,7 +122,8 @@ fn covered(uncovered: f64) -> Result<Vec<String>> {
     Ok((uncovered.abs() > 1e-9).then(words).into_iter().collect())
 }
 
-/// The squares at the steps after time 0, or at the last alone, and where they are largest. Collective.
+/// The squares at the steps after time 0, or at the last one only, and their distribution at the time of the largest one.
+/// Collective.
 fn over_time<const D: usize>(
     session: &Session,
     pair: &Pair<D>,
@@ -177,7 +178,7 @@ fn contained<const D: usize>(times: &[f64], reference: &StoredFields<D>) -> Resu
     }
 }
 
-/// The error of one value at a probe; `point` is where it is. In each process by itself.
+/// The error of a value at the probe at `point`. Not collective.
 pub(super) fn probe_error(
     folder: &Path,
     target: Target,

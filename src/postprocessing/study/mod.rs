@@ -1,7 +1,7 @@
-//! Accuracy against cost: a job on several meshes, with several steps and schemes, held against a reference.
+//! Studies of accuracy and cost: a job on several meshes, with several steps and schemes, compared with a reference.
 //!
-//! Every run is an ordinary run in a folder of its own; a study that is started again finds those that are finished.
-//! Each rank reads the fields of a run and of the reference whole and integrates over its share of the cells.
+//! Every run is an ordinary run in its own folder; a restarted study uses the finished runs. Each rank reads the complete fields of
+//! a run and of the reference and integrates over its part of the cells.
 
 mod ablate;
 mod check;
@@ -44,7 +44,7 @@ use record::{Ran, seconds_of};
 use results::RunResult;
 use std::io::Write;
 
-/// The reference of the study's keys: of all tables, or of one table or key.
+/// The reference of the keys of studies: of all tables, or of one table or key.
 pub fn describe(table: Option<&str>) -> Result<String> {
     describe_kind(document::kind(), table)
 }
@@ -54,8 +54,7 @@ pub fn describe_json() -> String {
     format!("{:#}", document::kind().schema)
 }
 
-/// Runs the study and writes its tables; with `with_ablation` the base job is run without each of its effects as well.
-/// Collective.
+/// Executes the study and writes its tables; with `with_ablation` the base job is also run without each of its effects. Collective.
 pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit> {
     let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;
@@ -88,8 +87,8 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
     Ok(Exit::Done)
 }
 
-/// Runs a share of the study's runs, each in its own folder, and writes no tables: the study, started on as many ranks when
-/// all shares are done, finds them finished. Collective.
+/// Executes a part of the runs of the study, each in its own folder, and writes no tables. When all parts are finished, the study,
+/// started on the same number of ranks, uses their runs. Collective.
 pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
     let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;

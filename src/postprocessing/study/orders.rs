@@ -1,10 +1,10 @@
-//! Observed orders of convergence, and those that theory predicts.
+//! Observed and theoretical orders of convergence.
 
 use super::document::{Norm, Space};
 use crate::job::Scheme;
 use serde::{Deserialize, Serialize};
 
-/// What a run was refined in against an earlier one.
+/// The quantity that is refined between two runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refined {
@@ -17,7 +17,7 @@ pub enum Refined {
 }
 
 impl Refined {
-    /// How tables call it.
+    /// Its symbol in tables.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Mesh => "h",
@@ -27,30 +27,29 @@ impl Refined {
     }
 }
 
-/// What orders need to know of a run.
+/// The properties of a run that determine orders.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Size {
-    /// Runs are refinements of each other only within a family: scheme, tolerance and other overrides.
+    /// The family: scheme, tolerance and other overrides. Only runs of one family are refinements of each other.
     pub family: String,
-    /// Cells over all the mesh to the power -1/dimension.
+    /// Mesh size: the number of cells to the power -1/dimension.
     pub mesh: f64,
     /// Length of a step in s.
     pub step: f64,
 }
 
-/// A run, what it refines, and by which factor.
+/// The refinement from a coarser run to a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Refinement {
-    /// Position of the coarser run.
+    /// Index of the coarser run.
     pub of: usize,
-    /// What was refined.
+    /// The refined quantity.
     pub what: Refined,
-    /// By which factor; of mesh and step the geometric mean.
+    /// The refinement factor; for mesh and step, their geometric mean.
     pub factor: f64,
 }
 
-/// Of each run the next coarser ones: in the mesh, in the step, and, where there are neither, in both. `None` stands
-/// for runs without results.
+/// For each run the next coarser runs: in the mesh, in the step and, if there are none, in both. `None` is a run without results.
 pub(super) fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
     let of = |at: usize| -> Vec<Refinement> {
         let Some(fine) = &sizes[at] else { return Vec::new() };
@@ -83,13 +82,13 @@ pub(super) fn refinements(sizes: &[Option<Size>]) -> Vec<Vec<Refinement>> {
     (0..sizes.len()).map(of).collect()
 }
 
-/// The order that two errors show.
+/// The observed order of two errors.
 pub(super) fn observed(coarse: f64, fine: f64, factor: f64) -> Option<f64> {
     let order = (coarse / fine).ln() / factor.ln();
     order.is_finite().then_some(order)
 }
 
-/// The order that theory predicts: the study's, or that of smooth solutions.
+/// The theoretical order: that given in the study, or that for smooth solutions.
 pub(super) fn expected(norm: &Norm, what: Refined, scheme: Scheme) -> f64 {
     let mesh: f64 = if norm.space == Space::H { 2.0 } else { 1.0 };
     let step = f64::from(scheme.order());

@@ -1,14 +1,14 @@
-//! What two meshes of the same body have in common: the pieces in which both fields are polynomials.
+//! The intersections of the cells of two meshes of the same body, in which the fields of both meshes are polynomials.
 //!
-//! Every cell of one mesh is cut by the facets of the cells of the other it meets. The pieces are simplices again, so
-//! integrals over them are exact, whether or not one mesh is a refinement of the other.
+//! Every cell of one mesh is cut by the facets of the cells of the other mesh that it intersects. The intersections are divided
+//! into simplices, so that integrals over them are exact, whether or not one mesh is a refinement of the other.
 
 use super::stored::StoredMesh;
 use crate::{linear_algebra::tensor::Vector, mesh::shape::signed_measure, mesh::tree::BoxTree};
 
-/// A barycentric coordinate this near to zero is on the facet.
+/// A point with a barycentric coordinate of smaller absolute value is on the facet.
 const ON_FACET: f64 = 1e-12;
-/// Pieces smaller than this share of their cell are left out.
+/// Pieces smaller than this fraction of their cell are neglected.
 const SLIVER: f64 = 1e-13;
 
 /// A simplex in one cell of each mesh.
@@ -18,16 +18,16 @@ pub(super) struct Piece<const D: usize> {
     pub one: u32,
     /// Cell of the second mesh.
     pub other: u32,
-    /// Corners in m, `D + 1` used.
+    /// Corners in m, of which `D + 1` are used.
     pub corners: Corners<D>,
     /// Area or volume in m^D.
     pub volume: f64,
 }
 
-/// Corners of a simplex, `D + 1` used.
+/// Corners of a simplex, of which `D + 1` are used.
 pub(super) type Corners<const D: usize> = [Vector<D>; 4];
 
-/// The pieces that lie in the cells `range` of the second mesh.
+/// The pieces in the cells `range` of the second mesh.
 pub(super) fn overlap<const D: usize>(
     one: &StoredMesh<D>,
     other: &StoredMesh<D>,
@@ -91,7 +91,7 @@ fn cut<const D: usize>(
             let triangle = |a: usize| [part[a], crossing(a, outside[0]), crossing(a, outside[1])];
             prism(&triangle(inside[0]), &triangle(inside[1]))
         }
-        // All but one corner: the facet and its picture on the cut.
+        // Three of four corners: a prism between the facet and the cut.
         _ => {
             let facet: Vec<Vector<D>> = inside.iter().map(|&a| part[a]).collect();
             let picture: Vec<Vector<D>> = inside.iter().map(|&a| crossing(a, outside[0])).collect();

@@ -1,8 +1,8 @@
-//! A share of a study's runs, so that several jobs of a cluster may work on one study.
+//! A part of the runs of a study, so that several jobs of a cluster can execute one study.
 
 use std::str::FromStr;
 
-/// Every `count`-th run from the `first`-th on, counted from 1: written `first/count`.
+/// Every `count`-th run, starting with run `first`, counted from 1; written `first/count`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     first: usize,
@@ -10,7 +10,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// Whether the run at this place, counted from 0, is of this part.
+    /// Whether the run with this index, counted from 0, belongs to this part.
     pub fn has(self, index: usize) -> bool {
         index % self.count == self.first - 1
     }

@@ -1,4 +1,4 @@
-//! The runs of a study: every job is loaded before the first one runs.
+//! The plan of a study: the jobs of all runs are loaded before the first run starts.
 
 use super::{
     check::check,
@@ -11,10 +11,10 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-/// Tolerance of whole multiples.
+/// Tolerance in tests for integer multiples.
 const WHOLE: f64 = 1e-6;
 
-/// A run, ready to be started.
+/// A run that is ready to start.
 #[derive(Debug, Clone)]
 pub struct Planned {
     /// Name of the run and of its folder.
@@ -27,7 +27,7 @@ pub struct Planned {
     pub scheme: Scheme,
     /// The solver's tolerance.
     pub tolerance: f64,
-    /// What else it overrides.
+    /// Further overrides.
     pub set: Vec<String>,
     /// Tolerance of adaptive steps.
     pub adaptive: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Planned {
     pub loaded: Loaded,
 }
 
-/// What runs are compared with.
+/// The solution with which runs are compared.
 #[derive(Debug)]
 pub enum PlannedReference {
     /// A run.
@@ -44,27 +44,27 @@ pub enum PlannedReference {
     Exact(ExactFields),
 }
 
-/// A study without faults.
+/// A valid study.
 #[derive(Debug)]
 pub struct Plan {
-    /// The study as it was written.
+    /// The study file as structs.
     pub study: Study,
     /// The study file's name without extension.
     pub name: String,
-    /// Where its files go.
+    /// The output folder.
     pub folder: PathBuf,
     /// The base job with the overrides of all runs.
     pub base: Loaded,
     /// The runs, in the order of the study.
     pub runs: Vec<Planned>,
-    /// What they are compared with.
+    /// The solution with which they are compared.
     pub reference: Option<PlannedReference>,
-    /// The reference's steps on the meshes of the runs, if errors are split.
+    /// The runs with the steps of the reference on the meshes of the other runs, if errors are split.
     pub split: Vec<Planned>,
 }
 
 impl Plan {
-    /// Reads the study in the file `path` with `overrides` written over it, and loads the job of every run.
+    /// Reads the study in the file `path`, applies `overrides`, and loads the jobs of all runs.
     pub fn load(path: &Path, overrides: &[String], colour: bool) -> Result<Self> {
         let (text, folder) = read(kind(), path)?;
         let document = Document::new(kind(), &text, &path.display().to_string(), overrides, colour)?;
@@ -123,7 +123,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Makes every run write its fields when it is compared, and the reference at all of these times.
+    /// Sets the output times: every run writes its fields at the times of comparison, the reference at all of these times.
     fn choose_times(&mut self) -> Result<()> {
         let mut faults = Vec::new();
         let interval = self.study.compare.interval;
@@ -170,7 +170,7 @@ impl Plan {
     }
 }
 
-/// The number, if it is whole and above zero.
+/// The number, if it is a positive integer.
 fn whole(number: f64) -> Option<u64> {
     let near = number.round();
     (near >= 1.0 && (number - near).abs() <= WHOLE * near).then_some(near as u64)
@@ -180,7 +180,7 @@ fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if a == 0 { b } else { greatest_common_divisor(b % a, a) }
 }
 
-/// Where runs are made from.
+/// The data from which runs are derived.
 struct Source<'a> {
     file: PathBuf,
     set: &'a [String],
@@ -243,7 +243,7 @@ impl Source<'_> {
 }
 
 impl Source<'_> {
-    /// The override that makes steps adaptive.
+    /// The override for adaptive steps.
     fn adaptive(&self, run: &Run, tolerance: f64) -> String {
         let step = run.step.unwrap_or(self.base.time.step);
         let [smallest, largest] = match &self.base.time.adaptive {
@@ -255,7 +255,7 @@ impl Source<'_> {
         )
     }
 
-    /// The reference on each mesh of the runs but its own.
+    /// Runs with the steps of the reference on each mesh of the runs, except its own.
     fn on_meshes(
         &self,
         reference: &Run,
@@ -276,12 +276,12 @@ impl Source<'_> {
     }
 }
 
-/// Numbers of cells as names have them.
+/// The numbers of cells as part of a name.
 fn cells_name(cells: &[u32]) -> String {
     cells.iter().map(u32::to_string).collect::<Vec<_>>().join("x")
 }
 
-/// Removes what a study does not use, and directs the files of the run to its own folder.
+/// Removes output that a study does not use, and sets the output folder of the run.
 pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
     job.output.profile.clear();
@@ -304,7 +304,7 @@ fn default_name(job: &Job, cells: &[u32], run: &Run) -> String {
     parts.join("-")
 }
 
-/// All combinations, the steps running fastest.
+/// All combinations, with the steps in the innermost loop.
 fn products(product: Option<&Product>) -> Vec<Run> {
     fn choices<T: Clone>(list: &[T]) -> Vec<Option<T>> {
         if list.is_empty() { vec![None] } else { list.iter().cloned().map(Some).collect() }

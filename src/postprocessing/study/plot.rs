@@ -1,6 +1,6 @@
 //! Pictures of a study: error against wall time and against unknowns times steps, errors over time, errors on the body.
 //!
-//! A mark is a run. A line joins the runs of a scheme that no cheaper one of the scheme beats.
+//! Each mark is a run. A line joins those runs of a scheme that are more accurate than all cheaper runs of the scheme.
 
 use super::{
     document::{Quantity, Space},
@@ -43,7 +43,7 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
-/// Errors against what they cost, of a norm of which two runs are known.
+/// Errors against cost, for a norm that is known for at least two runs.
 fn costs(results: &Results, norm: usize, shown: &NormResult) -> Result<Vec<Picture>> {
     let seconds = |run: &RunResult| run.seconds.map(|seconds| seconds.computing);
     let work = |run: &RunResult| Some(run.counts.work() as f64);
@@ -105,7 +105,7 @@ fn error(run: &RunResult, norm: usize) -> Option<f64> {
     run.errors.get(norm)?.as_ref().map(|error| error.error)
 }
 
-/// The points that no cheaper one beats, by cost.
+/// The points whose error is smaller than that of all cheaper points, sorted by cost.
 fn front(points: &[Point]) -> Vec<Point> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -126,7 +126,7 @@ fn unit(of: Option<(Quantity, Space)>) -> &'static str {
     }
 }
 
-/// What the solver's tolerance changes, over the error that is left at the tightest one.
+/// The change by the solver's tolerance, relative to the error at the tightest tolerance.
 fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Option<Picture>> {
     let mut curves: Vec<Curve> = Vec::new();
     for row in &results.tolerances {
@@ -167,7 +167,7 @@ fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Opti
     )))
 }
 
-/// Errors over time of the runs that the study names, or of the most accurate one of each scheme.
+/// Errors over time of the runs listed in the study, or of the most accurate run of each scheme.
 fn over_time(
     plan: &Plan,
     results: &Results,
@@ -209,7 +209,7 @@ fn over_time(
     )))
 }
 
-/// Errors of cells on the body, of the runs that the study names.
+/// Errors of cells on the body, for the runs listed in the study.
 fn on_the_body(
     plan: &Plan,
     results: &Results,

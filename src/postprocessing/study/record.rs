@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, io::Read, path::Path};
 use xxhash_rust::xxh3::Xxh3;
 
-/// Name of the file in the run's folder.
+/// Name of the file in the folder of the run.
 const FILE: &str = "run.json";
 
 /// A run, finished or failed.
@@ -21,34 +21,34 @@ pub(super) struct Record {
     pub digest: String,
     /// `completed` or `failed`.
     pub status: String,
-    /// What went wrong.
+    /// The error message.
     pub error: Option<String>,
-    /// 2 or 3; 0 where the run did not come so far.
+    /// The dimension, 2 or 3; 0 if the run failed before it was known.
     pub dimension: usize,
     /// Cells of the mesh.
     pub cells: u64,
-    /// What it took.
+    /// Steps, iterations and sizes.
     #[serde(flatten)]
     pub counts: Counts,
     /// Effects that were simulated.
     pub effects: Vec<String>,
     /// Wall seconds of each repetition.
     pub seconds: Vec<Seconds>,
-    /// Digests of the files that errors are computed from.
+    /// Digests of the files from which errors are computed.
     pub files: BTreeMap<String, String>,
 }
 
-/// What a run took, as its `summary.json` counts it.
+/// Counts of a run from its `summary.json`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Counts {
-    /// Velocity components that are solved for.
+    /// Number of velocity components.
     pub unknowns: u64,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u64,
-    /// Steps taken back.
+    /// Number of rejected steps.
     pub rejected_steps: u64,
-    /// Preconditioners made.
+    /// Number of set-ups of a preconditioner.
     pub set_ups: u64,
     /// Newton iterations.
     pub newton_iterations: u64,
@@ -66,11 +66,11 @@ impl Counts {
 /// Wall seconds of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Seconds {
-    /// From its begin to its end.
+    /// Total.
     pub total: f64,
     /// Without writing files.
     pub computing: f64,
-    /// In solving the equations of the steps.
+    /// For the solution of the equations of the steps.
     pub solve: f64,
 }
 
@@ -78,7 +78,7 @@ pub struct Seconds {
 pub(super) struct Ran {
     /// Its record.
     pub record: Record,
-    /// Whether an earlier study left it.
+    /// Whether an earlier study had finished it.
     pub found: bool,
 }
 
@@ -93,7 +93,7 @@ pub(super) fn seconds_of(record: &Record, take: Take) -> Option<Seconds> {
 }
 
 impl Record {
-    /// A run that has not been tried yet.
+    /// The record of a run before its first execution.
     pub(super) fn new(digest: String) -> Self {
         Self {
             digest,
@@ -108,12 +108,12 @@ impl Record {
         }
     }
 
-    /// Whether the run reached its end.
+    /// Whether the run is completed.
     pub(super) fn is_complete(&self) -> bool {
         self.status == "completed"
     }
 
-    /// Adds what a repetition left in `summary.json`.
+    /// Adds the values in the `summary.json` of a repetition.
     pub(super) fn add_summary(&mut self, folder: &Path) -> Result<()> {
         let path = folder.join("summary.json");
         let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
@@ -131,7 +131,7 @@ impl Record {
         Ok(())
     }
 
-    /// Marks the run as finished and keeps the digests of its files.
+    /// Marks the run as finished and stores the digests of its files.
     pub(super) fn complete(&mut self, folder: &Path) -> Result<()> {
         for name in ["fields.vtkhdf", "probes.csv"] {
             if folder.join(name).exists() {
@@ -142,7 +142,7 @@ impl Record {
         Ok(())
     }
 
-    /// Writes the record to the run's folder, at once.
+    /// Writes the record to the folder of the run atomically.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
         let (path, part) = (folder.join(FILE), folder.join("run.json.part"));
@@ -152,7 +152,7 @@ impl Record {
         std::fs::rename(&part, &path).map_err(|error| Error::unwritable(&path, error))
     }
 
-    /// The record of a complete run with this digest and this many repetitions, if its files are still as it left them.
+    /// The record of a complete run with this digest and this number of repetitions, if its files are unchanged.
     pub(super) fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
         let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
         let record: Self = serde_json::from_str(&text).ok()?;
@@ -166,7 +166,7 @@ impl Record {
         good.then_some(record)
     }
 
-    /// Gives the record of rank 0 to all ranks. Collective.
+    /// Sends the record of rank 0 to all ranks. Collective.
     pub(super) fn share(session: &Session, mine: Option<Self>) -> Result<Option<Self>> {
         let text = mine.and_then(|record| serde_json::to_string(&record).ok()).unwrap_or_default();
         let mut length = text.len() as u64;
@@ -183,7 +183,7 @@ impl Record {
     }
 }
 
-/// Digest of all that makes a run what it is.
+/// Digest of all data that determine a run.
 pub(super) fn digest(planned: &Planned, ranks: usize) -> Result<String> {
     let mut hash = Xxh3::new();
     hash.update(planned.loaded.job.to_toml()?.as_bytes());

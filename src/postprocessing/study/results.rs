@@ -1,4 +1,4 @@
-//! What a study found: the object in `study.json`, from which all tables are made.
+//! The results of a study: the object in `study.json`, from which all tables are generated.
 
 use super::{
     measure::{Measured, Place},
@@ -7,39 +7,39 @@ use super::{
 };
 use serde::Serialize;
 
-/// The object; names are part of the contract.
+/// The object; its names are part of the public interface.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// Version of the solver with the id of its source.
     pub version: &'static str,
     /// Processes.
     pub ranks: usize,
-    /// The study's title, or its file's name.
+    /// The title of the study, or the name of its file.
     pub title: String,
-    /// Where published numbers come from.
+    /// The source of the published numbers.
     pub source: Option<String>,
     /// What the reader should know.
     pub notes: Vec<String>,
-    /// The reference run; absent for a known solution or none.
+    /// The reference run; absent for an exact solution or no reference.
     pub reference: Option<RunResult>,
-    /// How errors are measured: norms, then probes.
+    /// Norms, then probes.
     pub norms: Vec<NormResult>,
     /// The runs, in the order of the study.
     pub runs: Vec<RunResult>,
-    /// What looser tolerances of the solver change.
+    /// Changes by looser tolerances of the solver.
     pub tolerances: Vec<ToleranceResult>,
-    /// What it takes to reach the errors that the study asks for.
+    /// The cost of reaching the target errors of the study.
     pub targets: Vec<TargetResult>,
-    /// What each effect costs and changes; with --ablate only.
+    /// Cost and influence of each effect; with --ablate only.
     pub ablation: Option<Ablation>,
 }
 
-/// How an error is measured.
+/// A norm or a probe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NormResult {
     /// Such as `velocity_in_h_max` or `tip_velocity_y_end`.
     pub name: String,
-    /// The formula, in words and signs.
+    /// The formula.
     pub meaning: String,
     /// Whether it is a norm of the paper's table, with published numbers.
     pub is_published: bool,
@@ -48,44 +48,44 @@ pub struct NormResult {
 /// A run with its costs and errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunResult {
-    /// Its name and its folder's.
+    /// Name of the run and of its folder.
     pub name: String,
     /// Time scheme.
     pub scheme: String,
     /// Cells along each axis.
     pub cells: Vec<u32>,
-    /// Length of a step in s; of adaptive steps the first one tried.
+    /// Length of a step in s; for adaptive steps, of the first step that is tried.
     pub step: f64,
     /// Tolerance of adaptive steps; null for fixed ones.
     pub adaptive: Option<f64>,
     /// The solver's tolerance.
     pub tolerance: f64,
-    /// What else it overrides.
+    /// Further overrides.
     pub set: Vec<String>,
     /// `completed` or `failed`.
     pub status: String,
-    /// Why it failed, or why it could not be compared.
+    /// The reason why it failed or could not be compared.
     pub error: Option<String>,
     /// What the reader should know about its errors.
     pub notes: Vec<String>,
-    /// Whether an earlier study left it and it was not run again.
+    /// Whether an earlier study had finished it.
     pub found: bool,
-    /// What it took.
+    /// Steps, iterations and sizes.
     #[serde(flatten)]
     pub counts: Counts,
-    /// Wall seconds: the best or the median repetition.
+    /// Wall time in s of the best or the median repetition.
     pub seconds: Option<Seconds>,
-    /// Wall seconds of all repetitions.
+    /// Wall time in s of all repetitions.
     pub repetitions: Vec<Seconds>,
-    /// One for each norm; null where there is none.
+    /// One entry per norm; null if there is no error.
     pub errors: Vec<Option<ErrorResult>>,
-    /// Where the errors in norms sit; in errors.csv and pictures.
+    /// The distribution of the errors in time and space, for errors.csv and pictures.
     #[serde(skip)]
     pub places: Vec<Place>,
 }
 
 impl RunResult {
-    /// What it is one of: runs of a line differ in mesh, steps and tolerance.
+    /// The line of the run in charts: runs of a line differ in mesh, steps and tolerance.
     pub fn line(&self) -> String {
         if self.adaptive.is_some() { format!("{}, adaptive", self.scheme) } else { self.scheme.clone() }
     }
@@ -96,71 +96,71 @@ impl RunResult {
 pub struct ErrorResult {
     /// The error.
     pub error: f64,
-    /// The error over the norm of the reference.
+    /// The error relative to the norm of the reference.
     pub relative: Option<f64>,
-    /// When it is largest, in s.
+    /// The time in s of the largest error.
     pub worst_time: Option<f64>,
-    /// The part that the steps make: the distance to the reference's steps on the mesh of the run.
+    /// The error of the steps: the distance to the solution with the steps of the reference on the mesh of the run.
     pub of_steps: Option<f64>,
-    /// The part that the mesh makes: the distance of these to the reference.
+    /// The error of the mesh: the distance of that solution to the reference.
     pub of_mesh: Option<f64>,
-    /// Against coarser runs.
+    /// Orders with respect to coarser runs.
     pub orders: Vec<Order>,
-    /// Decimal digits gained against the first of these runs, a second of computing more.
+    /// Decimal digits gained with respect to the first of these runs, per additional second of computing time.
     pub digits_per_second: Option<f64>,
     /// The published error.
     pub published: Option<f64>,
-    /// Our error over the published one.
+    /// Ratio of the computed to the published error.
     pub ratio: Option<f64>,
-    /// The order that published errors show.
+    /// The order of the published errors.
     pub published_order: Option<f64>,
 }
 
 /// An observed order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Order {
-    /// What was refined.
+    /// The refined quantity.
     pub refined: Refined,
     /// The coarser run.
     pub against: String,
     /// The observed order.
     pub observed: f64,
-    /// The order that theory predicts, if it predicts one.
+    /// The theoretical order, if there is one.
     pub expected: Option<f64>,
 }
 
-/// A run beside the one that differs by a tighter tolerance only.
+/// Comparison of a run with the run that differs by a tighter tolerance only.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ToleranceResult {
     /// The run.
     pub run: String,
     /// Its tolerance.
     pub tolerance: f64,
-    /// The tightest of the runs that differ by tolerance only.
+    /// The run with the tightest tolerance among those that differ by tolerance only.
     pub tightest: String,
     /// Computing seconds.
     pub seconds: Option<f64>,
-    /// For each norm in space: its difference to the tightest, and that over the tightest's own error.
+    /// For each norm in space, the difference to that run.
     pub changes: Vec<Option<Change>>,
 }
 
-/// What a looser tolerance changed.
+/// The change by a looser tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Change {
-    /// Norm of the difference to the tightest run.
+    /// Norm of the difference to the run with the tightest tolerance.
     pub difference: f64,
-    /// The same over the error of the tightest run.
+    /// The same relative to the error of the run with the tightest tolerance.
     pub share_of_error: Option<f64>,
 }
 
-/// What it takes to reach an error.
+/// The cost of reaching a target error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetResult {
     /// The norm.
     pub norm: String,
-    /// The error that is asked for.
+    /// The target error.
     pub error: f64,
-    /// Of each scheme, with fixed and with adaptive steps, the fastest run that reaches it.
+    /// The fastest run that reaches the target, for each scheme with fixed and with adaptive steps.
     pub reached: Vec<Reached>,
 }
 
@@ -169,7 +169,7 @@ pub struct TargetResult {
 pub struct Reached {
     /// The scheme, and whether its steps are adaptive.
     pub scheme: String,
-    /// The run; null where none reaches the error.
+    /// The run; null if no run reaches the error.
     pub run: Option<String>,
     /// Its error.
     pub error: Option<f64>,
@@ -177,19 +177,19 @@ pub struct Reached {
     pub steps: Option<u64>,
     /// Its computing seconds.
     pub seconds: Option<f64>,
-    /// These over those of the fastest of all schemes.
+    /// Ratio of this time to that of the fastest scheme.
     pub ratio: Option<f64>,
     /// The larger part of its error, that of `steps` or of `mesh`, if the study separates them.
     #[serde(rename = "ruled_by")]
     pub dominant_error: Option<&'static str>,
 }
 
-/// What effects cost and change.
+/// Cost and influence of the effects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ablation {
     /// Computing seconds of the whole base job.
     pub seconds: Option<f64>,
-    /// Why the base job failed.
+    /// The reason why the base job failed.
     pub error: Option<String>,
     /// The effects.
     pub effects: Vec<EffectResult>,
@@ -198,11 +198,11 @@ pub struct Ablation {
 /// A base job without one of its tables.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectResult {
-    /// The table or key that was left out, such as `material.viscosity`.
+    /// The removed table or key, such as `material.viscosity`.
     pub without: String,
-    /// `completed`, `failed`, or `needed` where the job is refused without it.
+    /// `completed`, `failed`, or `needed` if the job is refused without it.
     pub status: String,
-    /// Why it failed or is needed.
+    /// The reason why it failed or is needed.
     pub error: Option<String>,
     /// Computing seconds without it.
     pub seconds: Option<f64>,

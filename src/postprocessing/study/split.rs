@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{error::Result, parallel::session::Session};
 
-/// Adds both parts of the errors of all runs whose mesh carries the reference's steps. Collective.
+/// Adds both parts of the errors for all runs on whose mesh the steps of the reference were computed. Collective.
 pub(super) fn add_parts(
     session: &Session,
     plan: &Plan,
@@ -48,7 +48,7 @@ pub(super) fn add_parts(
     Ok(())
 }
 
-/// Whether a run differs from the base job by mesh, steps and solver only.
+/// Whether a run differs from the base job in mesh, steps and solver only.
 fn keeps_physics(run: &Planned) -> bool {
     let concerns = |set: &String, table: &str| set.trim_start().starts_with(table);
     run.set.iter().all(|set| ["time.", "solver."].iter().any(|table| concerns(set, table)))

@@ -1,16 +1,16 @@
-//! Squares of norms, and the stored tensors that they are taken of.
+//! Squares of norms, and the stored tensors from which they are computed.
 
 use crate::linear_algebra::tensor::Vector;
 
-/// How often each stored component of a symmetric tensor counts.
+/// Multiplicities of the stored components of a symmetric tensor.
 const TWICE: [f64; 6] = [1.0, 2.0, 2.0, 1.0, 2.0, 1.0];
-/// Where the stored components stand: xx, xy, xz, yy, yz, zz.
+/// Indices of the stored components: xx, xy, xz, yy, yz, zz.
 const PLACES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// A norm's square of a difference, and of the reference alone.
+/// The squared norms of a difference and of the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Squares {
-    /// Of run minus reference.
+    /// Of the difference of run and reference.
     pub error: f64,
     /// Of the reference.
     pub size: f64,
@@ -24,7 +24,7 @@ impl Squares {
     }
 }
 
-/// The value of a linear field where corners have these shares.
+/// The value of a linear field at these barycentric coordinates.
 pub(super) fn mix<const D: usize>(corners: &[Vector<D>; 4], shares: &[f64; 4]) -> Vector<D> {
     std::array::from_fn(|i| corners.iter().zip(shares).map(|(corner, share)| share * corner[i]).sum())
 }

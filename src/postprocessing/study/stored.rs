@@ -1,4 +1,4 @@
-//! Fields as a run left them in `fields.vtkhdf`, read whole by the rank that asks.
+//! Complete fields in the `fields.vtkhdf` of a run, read by the calling rank.
 
 use crate::{
     error::{Error, Result},
@@ -9,7 +9,7 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-/// Times that differ by less than this share of the larger one are the same.
+/// Times whose relative difference is smaller are equal.
 const SAME_TIME: f64 = 1e-9;
 
 /// The mesh of a run and the geometry of its cells.
@@ -17,14 +17,14 @@ const SAME_TIME: f64 = 1e-9;
 pub struct StoredMesh<const D: usize> {
     /// Coordinates in m of the nodes.
     pub nodes: Vec<Vector<D>>,
-    /// Nodes, `D + 1` a cell.
+    /// Nodes, `D + 1` per cell.
     pub cells: Vec<u32>,
     /// Volumes and gradients.
     pub geometry: Vec<Simplex<D>>,
 }
 
 impl<const D: usize> StoredMesh<D> {
-    /// Measures the cells, `D + 1` nodes each.
+    /// Computes the geometry of the cells with `D + 1` nodes each.
     pub fn new(nodes: Vec<Vector<D>>, cells: Vec<u32>) -> Self {
         let of = |corners: &[u32]| {
             let mut points = [[0.0; D]; 4];
@@ -40,12 +40,12 @@ impl<const D: usize> StoredMesh<D> {
         self.geometry.len()
     }
 
-    /// Corners of a cell, `D + 1` used.
+    /// Corners of a cell, of which `D + 1` are used.
     pub fn corners(&self, cell: usize) -> [Vector<D>; 4] {
         self.of_corners(&self.nodes, cell)
     }
 
-    /// What nodes have at the corners of a cell, `D + 1` used.
+    /// Nodal values at the corners of a cell, of which `D + 1` are used.
     pub fn of_corners(&self, nodal: &[Vector<D>], cell: usize) -> [Vector<D>; 4] {
         let mut out = [[0.0; D]; 4];
         let nodes = &self.cells[cell * (D + 1)..][..=D];
@@ -53,7 +53,7 @@ impl<const D: usize> StoredMesh<D> {
         out
     }
 
-    /// Shares of the cell's corners in a point, `D + 1` used.
+    /// Barycentric coordinates of a point in a cell, of which `D + 1` are used.
     pub fn shares(&self, cell: usize, point: &Vector<D>) -> [f64; 4] {
         let first = self.nodes[self.cells[cell * (D + 1)] as usize];
         let mut shares = [1.0, 0.0, 0.0, 0.0];
@@ -73,16 +73,16 @@ impl<const D: usize> StoredMesh<D> {
 /// Values at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values<const D: usize> {
-    /// One vector a node.
+    /// One vector per node.
     Nodal(Vec<Vector<D>>),
-    /// One tensor a cell: xx, xy, xz, yy, yz, zz.
+    /// One tensor per cell: xx, xy, xz, yy, yz, zz.
     Cells(Vec<[f64; 6]>),
 }
 
 /// Values of a quantity on their mesh.
 #[derive(Clone, Copy)]
 pub struct FieldAt<'a, const D: usize> {
-    /// What they are values of.
+    /// The quantity.
     pub of: Quantity,
     /// Their time in s.
     pub time: f64,
@@ -103,7 +103,7 @@ pub(super) struct StoredFields<const D: usize> {
 }
 
 impl<const D: usize> StoredFields<D> {
-    /// Opens the field file in a run's folder. In each process by itself.
+    /// Opens the field file in the folder of a run. Not collective.
     pub(super) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join("fields.vtkhdf");
         let unreadable = |error: hdf5::Error| Error::unreadable(&path, error);

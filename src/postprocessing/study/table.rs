@@ -8,11 +8,11 @@ use super::{
 /// A table with a title and lines below it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Table {
-    /// What it shows.
+    /// Its title.
     pub title: String,
     /// Names of the columns; the first is text, the others are numbers.
     pub header: Vec<String>,
-    /// As many cells a row as the header has.
+    /// Rows, each with as many cells as the header.
     pub rows: Vec<Vec<String>>,
     /// Lines below the table.
     pub notes: Vec<String>,
@@ -24,7 +24,7 @@ impl Table {
         Self { title: title.into(), header, ..Self::default() }
     }
 
-    /// In columns, for the terminal.
+    /// The table as aligned text for the terminal.
     pub(super) fn text(&self) -> String {
         let width = |column: usize| {
             let cells = self.rows.iter().chain([&self.header]).filter_map(|row| row.get(column));
@@ -46,7 +46,7 @@ impl Table {
         out
     }
 
-    /// As a section of a Markdown document.
+    /// The table as a section of a Markdown document.
     pub(super) fn markdown(&self) -> String {
         let escaped = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
         let line =
@@ -64,7 +64,7 @@ impl Table {
     }
 }
 
-/// The study's norms, then its probes.
+/// The norms of the study, then its probes.
 pub(super) fn norms(study: &Study) -> Vec<NormResult> {
     let norm = |norm: &Norm| NormResult {
         name: format!("{}_{:?}_{}", quantity(norm.of), norm.space, over(norm.over)).to_lowercase(),
@@ -189,7 +189,7 @@ fn optional<T>(value: Option<T>, words: impl Fn(T) -> String) -> String {
     value.map_or("-".into(), words)
 }
 
-/// What was refined between runs, as far as this norm shows it.
+/// The refined quantities for which this norm has orders.
 fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
     let errors = results.runs.iter().filter_map(|run| run.errors.get(norm)?.as_ref());
     let mut found: Vec<_> = errors.flat_map(|error| &error.orders).map(|order| order.refined).collect();
@@ -198,7 +198,7 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
     found.into_iter().map(|refined| refined.symbol()).collect()
 }
 
-/// For each norm what its errors take: a row a scheme, seconds with the run that took them.
+/// For each norm the cost of its target errors, with one row per target and scheme.
 fn targets(results: &Results) -> Vec<Table> {
     let header =
         ["target", "scheme", "run", "error", "dominant error", "steps", "computing s", "relative time"];

@@ -1,11 +1,11 @@
-//! What it takes to reach an error: of each scheme the fastest run that does.
+//! The cost of target errors: for each scheme, the fastest run that reaches the target.
 
 use super::{
     document::Study,
     results::{Reached, Results, RunResult, TargetResult},
 };
 
-/// One for each error that the study asks for.
+/// One result for each target error of the study.
 pub(super) fn targets(study: &Study, results: &Results) -> Vec<TargetResult> {
     let mut lines: Vec<String> = Vec::new();
     for run in &results.runs {

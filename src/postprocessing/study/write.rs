@@ -104,7 +104,7 @@ fn csv(results: &Results) -> String {
     out
 }
 
-/// The shortest text that reads back as the number; nothing where there is none.
+/// The shortest text that is read back as the same number; empty if there is no number.
 fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map(|value| format!("{value:e}")).unwrap_or_default()
 }
