@@ -1,4 +1,4 @@
-//! The command line: arguments to exit codes.
+//! The command line.
 
 use crate::{
     error::{Error, Exit, Result},
@@ -36,7 +36,7 @@ Examples:
 
 Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
 
-/// What the commands are called, for misspelt ones.
+/// Names of the commands, for suggestions.
 const COMMANDS: [&str; 7] = ["run", "check", "describe", "inspect", "partition", "study", "report"];
 
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
@@ -58,60 +58,61 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a job (the same as naming the job alone).
+    /// Run a job; `solver JOB` is an abbreviation.
     Run(RunArguments),
-    /// Everything but the run: parse, mesh, effects, cost.
+    /// Check a job without running it: keys, mesh, effects, certificates, memory and time.
     Check {
         /// The job file.
         job: PathBuf,
         /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
         #[arg(long = "set", value_name = "KEY=VALUE")]
         overrides: Vec<String>,
-        /// Print one JSON object.
+        /// Print the result as one JSON object.
         #[arg(long)]
         json: bool,
     },
-    /// Every key of a job file (of a study file: describe study): meaning, unit, range, default.
+    /// Print the meaning, unit, range and default of the keys of a job file (describe study: of a study file).
     Describe {
-        /// Show this table or key only, such as material.elasticity or time.step.
+        /// Table or key to print, such as material.elasticity or time.step; absent: all tables.
         table: Option<String>,
         /// Print the JSON Schema of the whole job, or of the whole study.
         #[arg(long)]
         json: bool,
     },
-    /// What is in a checkpoint, a result file or a partitioned mesh.
+    /// Print the contents of a checkpoint, a field file or a partitioned mesh.
     Inspect {
         /// The file.
         file: PathBuf,
     },
-    /// Split a mesh into parts that ranks read by themselves (`[mesh] file = "FILE.h5"`).
+    /// Split a mesh into parts, of which each rank reads its own (`[mesh] file = "FILE.h5"`).
     Partition {
-        /// The mesh: of Gmsh (.msh), or split before (.h5).
+        /// The mesh: a Gmsh file (.msh) or a partitioned mesh (.h5).
         mesh: PathBuf,
-        /// How many parts: the most ranks that can run on it.
+        /// Number of parts, which is the largest number of ranks that can use the mesh.
         #[arg(short = 'n', value_name = "RANKS")]
         parts: usize,
         /// The file to write.
         #[arg(short = 'o', value_name = "FILE.h5")]
         output: PathBuf,
     },
-    /// Accuracy against cost.
+    /// Run a study of accuracy and cost.
     Study {
         /// The study file.
         study: PathBuf,
         /// Override a key of the study: timing.repetitions=3.
         #[arg(long = "set", value_name = "KEY=VALUE")]
         overrides: Vec<String>,
-        /// Also run the base job without each of its effects: what each costs and changes.
+        /// Also run the base job without each of its effects, to find the cost and the influence of each.
         #[arg(long)]
         ablate: bool,
-        /// Only every N-th run from the I-th on, and no tables: for N jobs of a cluster; the study then finds all runs finished.
+        /// Execute only every N-th run, starting with run I, and write no tables. Use it to distribute a study over N jobs of a
+        /// cluster; then run the study without this option to write the tables.
         #[arg(long, value_name = "I/N", conflicts_with = "ablate")]
         part: Option<study::Part>,
     },
-    /// Pictures and one self-contained HTML page.
+    /// Write pictures and one self-contained HTML page.
     Report {
-        /// Output folder of a run.
+        /// Output folder of a run or a study.
         folder: PathBuf,
     },
 }
@@ -123,15 +124,15 @@ struct RunArguments {
     /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Go on from the newest good checkpoint of the output folder, or from this file.
+    /// Continue from the newest intact checkpoint of the output folder, or from this file.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
-    /// Start even where the output folder holds the results of another job or a run to go on with, and overwrite them.
+    /// Start even if the output folder contains results of another job or an unfinished run, and overwrite them.
     #[arg(long, conflicts_with = "restart")]
     force: bool,
 }
 
-/// Runs the command line and gives the exit code.
+/// Executes the command line and returns the exit code.
 pub fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let result = match Cli::try_parse_from(&arguments) {
@@ -187,7 +188,7 @@ fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
     }
 }
 
-/// A clearer message than the parser's for a command line that it refused.
+/// A clearer message for a command line that the parser refuses.
 fn remedy(arguments: &[OsString]) -> Option<String> {
     let words: Vec<&str> = arguments.iter().skip(1).filter_map(|word| word.to_str()).collect();
     let behind = words.iter().position(|word| *word == "--restart").and_then(|at| words.get(at + 1));
@@ -213,7 +214,7 @@ fn job_behind_restart(job: &str) -> String {
     )
 }
 
-/// The message for a word that is no file but resembles a command.
+/// The message for a word that is not a file but resembles a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
     let near = nearest(word, COMMANDS)?;
@@ -227,8 +228,8 @@ fn launched_rank() -> Option<u64> {
     names.iter().find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// Lets the first of the launched processes print why all of them end. They end together: launchers kill the others, with their
-/// pending output, as soon as one has failed.
+/// Prints on the first of the launched processes. All processes end together, because launchers kill the others, with their pending
+/// output, as soon as one has failed.
 fn print_once(words: impl FnOnce()) {
     let rank = launched_rank();
     if rank.is_none_or(|rank| rank == 0) {
@@ -253,7 +254,7 @@ fn print_error(error: &impl std::error::Error) {
     let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
 }
 
-/// Whether the text begins with `error`, coloured or not.
+/// Whether the text begins with `error`, with or without colour.
 fn says_error(words: &str) -> bool {
     let mut rest = words;
     while let Some(colour) = rest.strip_prefix("\u{1b}[") {
@@ -275,7 +276,7 @@ fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
 }
 
-/// Makes a report on one process; under a launcher the others wait for the outcome, so that all return the same exit code.
+/// Writes a report on one process; under a launcher the others wait for the outcome, so that all return the same exit code.
 fn report_on(folder: &Path) -> Result<Exit> {
     let make = || {
         let made = report(folder)?;

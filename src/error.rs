@@ -1,6 +1,6 @@
-//! What can go wrong, and the exit code each ends with.
+//! Errors and exit codes.
 
-/// How the process ends; the numbers are part of the contract with batch scripts.
+/// Exit codes, which are part of the public interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
@@ -8,11 +8,11 @@ pub enum Exit {
     Done = 0,
     /// The run failed; a state was saved.
     Failed = 1,
-    /// The job, mesh or command line is refused before anything ran.
+    /// The job, mesh or command line is refused before the run.
     Refused = 2,
-    /// Stopped on request with a checkpoint; resubmit to go on.
+    /// Stopped on request with a checkpoint; resubmit the job to continue.
     Stopped = 3,
-    /// A fault of the solver or of a library it stands on.
+    /// A fault of the solver or of a library.
     Internal = 4,
 }
 
@@ -29,43 +29,43 @@ impl Exit {
     }
 }
 
-/// An error with the words the user reads; its kind decides the exit code.
+/// An error with its message; its kind determines the exit code.
 ///
-/// It may be known on one rank alone. Nothing may depend on it but the end of what the rank is doing, so it does not show its kind:
-/// what ranks do next is chosen by an `Agreed` failure, which is the same on all of them.
+/// It may exist on one rank only. Therefore it does not reveal its kind: it only ends the present operation of the rank, and the
+/// further flow depends on an `Agreed` failure, which is the same on all ranks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{words}")]
 pub struct Error {
     exit: Exit,
     words: String,
-    /// Whose words they are, once all ranks know of it.
+    /// The rank of the message, once all ranks have received it.
     rank: Option<usize>,
 }
 
 /// Result with the crate's error.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// The kinds, made as the variants of an enum would be; unlike these, they can't be told apart again.
+/// The constructors, named as the variants of an enum; in contrast to these, the kinds cannot be distinguished afterwards.
 #[allow(non_snake_case)]
 impl Error {
-    /// The job, mesh or command line can't be run: what, where and what to do.
+    /// The job, mesh or command line is refused; the message states what is wrong, where, and what to do.
     pub fn Refused(words: String) -> Self {
         Self { exit: Exit::Refused, words, rank: None }
     }
 
-    /// The run can't go on: what happened, when, and what to try.
+    /// The run cannot continue; the message states what happened, when, and what to try.
     pub fn Failed(words: String) -> Self {
         Self { exit: Exit::Failed, words, rank: None }
     }
 
-    /// A library or the machine failed in a way the user did not cause.
+    /// A library or the machine failed without a fault of the user.
     pub fn Internal(words: String) -> Self {
         Self { exit: Exit::Internal, words, rank: None }
     }
 }
 
 impl Error {
-    /// One that all ranks share.
+    /// An error that all ranks know.
     pub(crate) fn of_all(rank: usize, exit: Exit, words: String) -> Self {
         Self { exit, words, rank: Some(rank) }
     }
@@ -75,17 +75,17 @@ impl Error {
         self.exit == Exit::Internal && self.rank.is_none()
     }
 
-    /// Rank, if all know of it, exit code and words.
+    /// Rank, if all ranks know the error, exit code and message.
     pub(crate) fn into_parts(self) -> (Option<usize>, Exit, String) {
         (self.rank, self.exit, self.words)
     }
 
-    /// A file operation that failed while the job was being read.
+    /// A file operation failed while input was read.
     pub fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Self {
         Self::Refused(format!("cannot read {}: {error}", path.display()))
     }
 
-    /// A file operation that failed while results were being written.
+    /// A file operation failed while output was written.
     pub fn unwritable(path: &std::path::Path, error: impl std::fmt::Display) -> Self {
         Self::Failed(format!("cannot write {}: {error}", path.display()))
     }

@@ -1,4 +1,4 @@
-//! The content of a run's checkpoints, and how it is restored.
+//! The contents of the checkpoints of a run, and their restoration.
 
 use super::{
     checkpoint_file::{self, Checkpoint, RowSet, Table},
@@ -14,13 +14,13 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
-/// Version of the layout; raised whenever older files can't be read any more.
+/// Version of the format; increased when older files can no longer be read.
 const FORMAT: u32 = 3;
 
 /// The data of a checkpoint that are not fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// Version of the layout.
+    /// Version of the format.
     pub format: u32,
     /// Version of the solver that wrote it.
     pub version: String,
@@ -28,7 +28,7 @@ pub struct Header {
     pub ranks: usize,
     /// 2 or 3.
     pub dimension: usize,
-    /// Steps taken.
+    /// Number of steps.
     pub step: u64,
     /// Time in s.
     pub time: f64,
@@ -42,7 +42,7 @@ pub struct Header {
     pub physics: BTreeMap<String, String>,
 }
 
-/// What identifies the problem a checkpoint belongs to.
+/// The data that identify the problem of a checkpoint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
     /// Version of this solver.
@@ -52,7 +52,7 @@ pub struct Identity {
 }
 
 impl Header {
-    /// The header of a state with the sums over the steps up to it.
+    /// The header for a state and the sums over the steps up to it.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         identity: &Identity,
@@ -75,7 +75,7 @@ impl Header {
     }
 }
 
-/// Saves the state under its header. Collective, with the same outcome on all ranks.
+/// Saves the state with its header. Collective, with the same outcome on all ranks.
 pub fn save<const D: usize, const S: usize>(
     session: &Session,
     path: &Path,
@@ -119,8 +119,8 @@ pub fn save<const D: usize, const S: usize>(
     Ok(checkpoint_file::write(path, session.world(), &header, &sets, &tables)?)
 }
 
-/// Reads a saved state into `body` and `state`. Collective, with the same outcome on all ranks; refused if the checkpoint is
-/// damaged or of another problem.
+/// Reads a saved state into `body` and `state`. Refused if the checkpoint is damaged or belongs to another problem. Collective,
+/// with the same outcome on all ranks.
 pub fn restore<const D: usize, const S: usize>(
     session: &Session,
     path: &Path,

@@ -6,8 +6,8 @@
 //! /tables/SET/NAME        a table with a row for each id of the set, attribute checksum
 //! ```
 //!
-//! The file is written under another name, sealed (see [`super::seal`]), brought to the disk and only then renamed: a
-//! file with the final name is whole. It is read on any number of ranks, no rank ever holding more than its share.
+//! The file is written under another name, sealed (see [`super::seal`]), synchronised with the disk and then renamed: a file with
+//! the final name is complete. It can be read on any number of ranks, and no rank reads more than its part.
 
 use super::checksum::table_checksum;
 use super::hyperslab::Rows;
@@ -63,8 +63,8 @@ pub fn write(
             .and_then(|()| File::open(folder_of(path))?.sync_all())
             .map_err(|error| Error::unwritable(path, error)),
         (Err(_), 0) => {
-            // On a full disk what could be written stands in the way of everything else; the file may still be open,
-            // so that removing it alone would not make room.
+            // On a full disk, the incomplete file takes space that other files need. The file may still be open, so that its
+            // removal alone would not free this space.
             let _ = File::create(&part).and_then(|_| remove_file(&part));
             Ok(())
         }
@@ -128,7 +128,7 @@ fn write_content(
     file.create_group("tables")?;
     for set in sets {
         if !are_whole(communicator, set.total, set.ids) {
-            // The redistribution that any reader plans finds what is wrong with them.
+            // The redistribution of the reader finds the error in the ids.
             Redistribution::new(communicator, set.total, set.ids, &[])?;
         }
         let first = file.slab_start(set.ids.len());
@@ -175,7 +175,7 @@ impl Checkpoint {
         &self.header
     }
 
-    /// The names of the tables of a set; none where there is no such set.
+    /// The names of the tables of a set; empty if the set does not exist.
     pub fn tables(&self, set: &str) -> Result<Vec<String>, Agreed> {
         let group = format!("tables/{set}");
         if self.file.contains(&group) { self.file.names(&group) } else { Ok(Vec::new()) }

@@ -9,8 +9,8 @@ pub fn checkpoint_path(folder: &Path, step: u64) -> PathBuf {
     folder.join(format!("checkpoint-{step}.h5"))
 }
 
-/// Steps and files of all checkpoints of a folder, the newest first; none where there is no such folder. Files under other
-/// names, half-written ones among them, do not count.
+/// Steps and files of all checkpoints of a folder, the newest first; empty if the folder does not exist. Files with other names,
+/// such as incomplete ones, are ignored.
 pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
     pass()?;
     let entries = match std::fs::read_dir(folder) {

@@ -1,11 +1,11 @@
-//! Checksums of tables that do not depend on how the rows are spread over the ranks.
+//! Checksums of tables that do not depend on the distribution of the rows over the ranks.
 
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64_with_seed};
 
-/// The checksum of a table whose rows are spread over the ranks, each row known by its id: any order and any
-/// number of ranks give the same number. It covers name, width, ids and values. Collective.
+/// The checksum of a table whose rows, identified by ids, are distributed over the ranks. It is the same for any order and any
+/// number of ranks, and covers name, width, ids and values. Collective.
 pub fn table_checksum(
     communicator: &impl CommunicatorCollectives,
     name: &str,
@@ -19,7 +19,7 @@ pub fn table_checksum(
     sum.wrapping_add(title_checksum(name, width))
 }
 
-/// The part of these rows in the checksum of their table: parts add up, wrapping at 2^64.
+/// The contribution of these rows to the checksum of their table; contributions are added modulo 2^64.
 ///
 /// `values` holds `width` numbers for each of `ids`.
 fn rows_checksum(ids: &[u64], width: usize, values: &[f64]) -> u64 {
@@ -35,7 +35,7 @@ fn rows_checksum(ids: &[u64], width: usize, values: &[f64]) -> u64 {
     sum
 }
 
-/// The part of a table's name and width in its checksum.
+/// The contribution of the name and the width of a table to its checksum.
 fn title_checksum(name: &str, width: usize) -> u64 {
     let mut hash = Xxh3::new();
     hash.update(name.as_bytes());

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Rows reach the disk at least this often.
+/// Longest time between two flushes.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// A CSV file open for appending.
@@ -93,7 +93,7 @@ impl Display for Numbers<'_> {
     }
 }
 
-/// The shortest text that reads back as the same number, with an exponent where that is shorter to read.
+/// The shortest text that is read back as the same number, with an exponent if that is shorter.
 pub(super) struct Number(pub f64);
 
 impl Display for Number {

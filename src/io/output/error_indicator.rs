@@ -1,4 +1,4 @@
-//! Where the mesh is too coarse: an indicator of the error of the stress, cell by cell.
+//! An indicator of the discretisation error of the stress in each cell, which shows where the mesh is too coarse.
 //!
 //! After O. C. Zienkiewicz and J. Z. Zhu, International Journal for Numerical Methods in Engineering 24 (1987) 337-357. At
 //! each node the stresses of the cells around it are averaged, weighted by their volume; between the nodes of a cell the
@@ -8,7 +8,7 @@
 //! eta_K^2 = integral over K of (mean - sigma_K) : E^-1 (mean - sigma_K)
 //! ```
 //!
-//! Means never cross the boundary between two materials, where stresses may jump.
+//! Means are taken over cells of one material only, because stresses may jump between materials.
 
 use super::{
     field::{Place, Shape},
@@ -26,7 +26,7 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The indicator as a field that runs write.
+/// The indicator as an output field.
 pub(super) const FIELD: OutputField = OutputField {
     name: "error_indicator",
     place: Place::Cell,
@@ -67,19 +67,19 @@ pub struct ErrorIndicator<const S: usize> {
     means: DistributedVector,
 }
 
-/// What the indicator says of a state.
+/// The indicator of a state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indicated {
     /// `eta_K` of each cell here, in J^(1/2), in two dimensions (J/m)^(1/2); zero where the material has no elasticity.
     pub cells: Vec<f64>,
     /// The square root of the sum of the squares over all ranks.
     pub total: f64,
-    /// The total over the norm of the stress, error included: about 0.1 means an error of 10 %.
+    /// The total relative to the norm of the stress including the error: about 0.1 means an error of 10 %.
     pub relative: f64,
 }
 
 impl<const S: usize> ErrorIndicator<S> {
-    /// For this body. Collective.
+    /// Creates the indicator for this body. Collective.
     pub fn new<const D: usize>(session: &Session, body: &Body<D, S>) -> Result<Self> {
         let mine = body.geometry.runs.iter().map(|run| run.material + 1).max().unwrap_or(0);
         let count = session.largest([mine as f64])[0] as usize;
@@ -88,7 +88,7 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(Self { elasticity: (0..count).map(of).collect(), means: session.agree(means)? })
     }
 
-    /// The indicator of a stress in Pa, given one a cell. Collective.
+    /// The indicator of a stress in Pa, given for each cell. Collective.
     pub fn of<const D: usize>(
         &mut self,
         session: &Session,
@@ -126,7 +126,7 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(Indicated { cells, total: error.sqrt(), relative })
     }
 
-    /// Sums volumes and stresses times volume of the cells of a material around each node, as far as they are here.
+    /// For each node, adds the volumes and the stresses times volume of the surrounding cells of a material on this rank.
     fn add<const D: usize>(
         &mut self,
         body: &Body<D, S>,
@@ -146,7 +146,7 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(())
     }
 
-    /// Makes means of the sums at the nodes owned here; nodes without a cell of the material keep zero.
+    /// Computes the means at the owned nodes; nodes without a cell of the material keep zero.
     fn divide(&mut self) -> Result<()> {
         for sum in self.means.owned_mut()?.chunks_exact_mut(S + 1).filter(|sum| sum[S] > 0.0) {
             let volume = sum[S];
@@ -156,7 +156,7 @@ impl<const S: usize> ErrorIndicator<S> {
     }
 }
 
-/// The cells here of a material.
+/// The cells of a material on this rank.
 fn of_material<const D: usize, const S: usize>(
     body: &Body<D, S>,
     material: usize,

@@ -1,8 +1,8 @@
-//! A field: its place, its shape and its layout in files.
+//! A field: its location, its shape and its layout in files.
 
 use crate::linear_algebra::tensor::component;
 
-/// What a field has a value for.
+/// The location of the values of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Each node.
@@ -11,10 +11,10 @@ pub enum Place {
     Cell,
 }
 
-/// What a value of a field is.
+/// The shape of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// One number.
+    /// A number.
     Scalar,
     /// `D` numbers; files hold three.
     Vector,
@@ -28,9 +28,9 @@ pub enum Shape {
 pub struct Field<'a> {
     /// Letters, digits and underscores.
     pub name: &'a str,
-    /// What it has a value for.
+    /// The location of its values.
     pub place: Place,
-    /// What a value is.
+    /// The shape of its values.
     pub shape: Shape,
     /// The values of the nodes or cells this rank owns, in the order of the mesh.
     pub values: &'a [f64],
@@ -44,7 +44,7 @@ pub(super) struct FieldKind {
     pub(super) shape: Shape,
 }
 
-/// Numbers a row of a field of this shape has in the file.
+/// Number of values per row of a field of this shape in the file.
 pub(super) fn file_width(shape: Shape) -> usize {
     match shape {
         Shape::Scalar => 1,
@@ -53,7 +53,7 @@ pub(super) fn file_width(shape: Shape) -> usize {
     }
 }
 
-/// Names of the stored components, in their order; none of a scalar. Tensors are stored as XDMF wants them.
+/// Names of the stored components in order; empty for a scalar. Tensors are stored in the order of XDMF.
 pub(super) fn component_names(shape: Shape) -> &'static [&'static str] {
     match shape {
         Shape::Scalar => &[],
@@ -62,7 +62,7 @@ pub(super) fn component_names(shape: Shape) -> &'static [&'static str] {
     }
 }
 
-/// Which stored component each component of VTK is: VTK wants tensors as xx yy zz xy yz xz.
+/// The stored component for each component of VTK, whose order of tensor components is xx yy zz xy yz xz.
 pub(super) fn view_columns(shape: Shape) -> &'static [usize] {
     match shape {
         Shape::Scalar => &[0],

@@ -1,5 +1,5 @@
-//! The fields that runs write, each declared once: field files, restarts, the summary, the log, the report and studies follow this
-//! list. Histories of effects are appended automatically.
+//! The output fields. Field files, restarts, the summary, the log, the report and studies use this list; histories of effects are
+//! appended automatically.
 
 use super::{
     error_indicator,
@@ -8,22 +8,23 @@ use super::{
 };
 use crate::{error::Result, linear_algebra::tensor::von_mises};
 
-/// Computes a field; none where the run has no such field, on all ranks alike. Collective.
+/// Computes a field; `None`, on all ranks, if the run does not have this field. Collective.
 type Compute<const D: usize, const S: usize> =
     for<'a> fn(Converged<'a, D, S>) -> Result<Option<Computed<'a>>>;
 
-/// Makes [`FIELDS`] of a list: the meaning of each field, its name in the program, what it is, and what computes it.
+/// Defines [`FIELDS`] by a list: the meaning of each field, its name in the program, its properties, and the function that computes
+/// it.
 macro_rules! fields {
     ($($(#[$meaning:meta])* $name:ident = $field:expr, |$at:ident| $computed:expr;)*) => {
         $($(#[$meaning])* pub(crate) const $name: OutputField = $field;)*
 
-        /// How many there are.
+        /// Number of fields.
         pub(super) const COUNT: usize = [$(stringify!($name)),*].len();
 
         /// All of them, in the order of field files.
         pub(crate) static FIELDS: [OutputField; COUNT] = [$($name),*];
 
-        /// What computes them, in the same order.
+        /// The functions that compute them, in the same order.
         pub(super) fn computations<const D: usize, const S: usize>() -> [Compute<D, S>; COUNT] {
             [$({
                 fn compute<'a, const D: usize, const S: usize>(
@@ -54,7 +55,7 @@ fields! {
     /// See [`error_indicator`].
     ERROR_INDICATOR = error_indicator::FIELD,
         |at| error_indicator::compute(at)?;
-    /// Traction of contact at the nodes, where it is an unknown of steps.
+    /// Contact traction at the nodes, where it is an unknown of steps.
     CONTACT_TRACTION = OutputField::plain("contact_traction", Place::Node, Shape::Vector, "Pa"),
         |at| match &at.state.contact_traction {
             Some(traction) => Computed::of(traction.owned()?),

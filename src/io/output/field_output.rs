@@ -18,14 +18,14 @@ use std::{collections::BTreeMap, path::Path};
 /// The field file of a run.
 pub(crate) struct FieldOutput<const D: usize> {
     file: FieldFile<D>,
-    /// Which of [`FIELDS`] the run writes if it has them.
+    /// Whether the job requests each of [`FIELDS`].
     is_wanted: [bool; COUNT],
 }
 
 impl<const D: usize> FieldOutput<D> {
-    /// Creates the files in the job's output folder with the mesh, or continues them after this time; files that can't be read are
-    /// renamed and kept. Refused if existing files and the job differ in a field that jobs ask for, and if compression is asked for
-    /// and HDF5 has none. Collective.
+    /// Creates the files in the output folder of the job with the mesh, or continues them after this time. Unreadable files are
+    /// renamed and kept. Refused if existing files and the job differ in a requested field, or if compression is requested and HDF5
+    /// does not support it. Collective.
     pub(crate) fn open<const S: usize>(
         session: &Session,
         job: &Job,
@@ -68,7 +68,7 @@ impl<const D: usize> FieldOutput<D> {
         Ok(Self { file, is_wanted })
     }
 
-    /// Whether writing failed before, so that no step can follow.
+    /// Whether writing has failed, so that no further step can be written.
     pub(crate) fn is_broken(&self) -> bool {
         self.file.is_broken()
     }
@@ -110,7 +110,7 @@ impl<const D: usize> FieldOutput<D> {
         Ok(computed.into_iter().flat_map(named).collect())
     }
 
-    /// Those fields of a state that the run writes and that are chosen. Collective.
+    /// The selected fields of a state among those that the run writes. Collective.
     fn computed<'a, const S: usize>(
         &self,
         at: Converged<'a, D, S>,
@@ -132,8 +132,8 @@ impl<const D: usize> FieldOutput<D> {
     }
 }
 
-/// Refuses a file whose times hold a field that the run does not write, or lack one that it writes. A file without times or one
-/// that can't be read fits.
+/// Refuses a file that contains a field that the run does not write, or lacks a field that the run writes. A file without times and
+/// an unreadable file are accepted.
 fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
     let Ok(file) = hdf5::File::open(path) else { return Ok(()) };
     if !file.link_exists("VTKHDF/Steps") {

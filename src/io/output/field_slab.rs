@@ -7,7 +7,7 @@ use crate::parallel::agreement::{Agreed, agree};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 
-/// Where this rank's rows of a field go.
+/// The position of the rows of this rank in the file.
 pub(super) struct Slab {
     /// Rows this rank owns in the run.
     pub(super) owned: usize,
@@ -15,7 +15,7 @@ pub(super) struct Slab {
     pub(super) total: u64,
     /// First row this rank writes.
     pub(super) first: u64,
-    /// Redistribution from the run's order of rows to the file's, where they differ.
+    /// Redistribution from the order of the run to that of the file, if they differ.
     pub(super) reorder: Option<Redistribution>,
 }
 

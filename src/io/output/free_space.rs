@@ -1,5 +1,5 @@
-//! Room for a file that is to grow. HDF5 leaves ranks waiting for ever for one that could not write its part of a file's own
-//! tables; so ranks ask before they write.
+//! Checks the free space for a growing file. If a rank cannot write its part of the internal tables of a file, HDF5 lets the other
+//! ranks wait forever; therefore ranks check the space before they write.
 
 use rustix::{
     fs::statvfs,
@@ -7,10 +7,11 @@ use rustix::{
 };
 use std::path::Path;
 
-/// Bytes for the tables of HDF5 between two flushes.
+/// Bytes for the internal tables of HDF5 between two flushes.
 pub(super) const TABLES: u64 = 1 << 18;
 
-/// Why a file can't grow by these bytes: the limit of file sizes of this process, or, if it is to look there too, the disk.
+/// Checks whether a file may grow by this number of bytes: the limit of file sizes of this process and, if requested, the free
+/// space on the disk.
 pub(super) fn check_space(path: &Path, more: u64, look_at_disk: bool) -> Result<(), String> {
     let length = std::fs::metadata(path).map_or(0, |data| data.len());
     if let Some(limit) =
@@ -19,7 +20,7 @@ pub(super) fn check_space(path: &Path, more: u64, look_at_disk: bool) -> Result<
         return Err(format!("File too large: no file of this process may have more than {limit} bytes"));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Some file systems don't know how large they are.
+    // Some file systems report no size.
     let disk = statvfs(folder).ok().filter(|disk| look_at_disk && disk.f_blocks > 0);
     let free = disk.map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
     match free.filter(|free| *free < more) {

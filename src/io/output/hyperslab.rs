@@ -47,7 +47,7 @@ impl<'file, T: Element> Rows<'file, T> {
         self.width
     }
 
-    /// Grows or cuts a series to this many rows.
+    /// Sets the number of rows of a series.
     pub fn resize(&self, rows: u64) -> Result<(), Agreed> {
         let rows = rows as usize;
         let done = if self.dataset.ndim() == 1 {
@@ -161,7 +161,7 @@ impl<T> Drop for Rows<'_, T> {
 }
 
 impl ParallelFile {
-    /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would leave the others waiting.
+    /// A dataset that HDF5 does not fill: if one rank could not write the zeros, HDF5 would let the others wait.
     fn new_dataset<T: Element>(&self) -> hdf5::DatasetBuilderEmpty {
         self.file.new_dataset::<T>().alloc_time(Some(AllocTime::Early)).fill_time(FillTime::Never)
     }

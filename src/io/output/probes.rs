@@ -1,4 +1,4 @@
-//! `probes.csv`: displacement and velocity at points of the body, a row a step and probe.
+//! `probes.csv`: displacement and velocity at points of the body, with one row per step and probe.
 
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
 use std::path::Path;
 
-/// Least barycentric coordinate of points that count as inside.
+/// Smallest barycentric coordinate of a point inside a cell, which allows for rounding.
 const INSIDE: f64 = -1e-9;
 
 /// The probes of a job; each is evaluated by one rank.

@@ -1,4 +1,4 @@
-//! `profiles.csv`: values along boundaries, a row a facet node, output time and profile.
+//! `profiles.csv`: values along boundaries, with one row per facet node, output time and profile.
 
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
@@ -21,7 +21,7 @@ struct Profile<const D: usize> {
     name: String,
     facets: Vec<u32>,
     points: Vec<SurfacePoint<D>>,
-    /// The contact of the body that acts here, if one does.
+    /// The contact of the body on this boundary, if there is one.
     contact: Option<usize>,
 }
 
@@ -71,7 +71,7 @@ impl<const D: usize> Profiles<D> {
         Ok(())
     }
 
-    /// Writes the rows of the state, whose stress is given one a cell. Collective.
+    /// Writes the rows of the state, whose stress is given for each cell. Collective.
     pub fn write<const S: usize>(
         &mut self,
         session: &Session,
@@ -106,8 +106,8 @@ impl<const D: usize> Profiles<D> {
 }
 
 impl<const D: usize> Profile<D> {
-    /// Position, normal displacement, normal velocity, contact pressure and, if asked for, friction traction `-sigma_tau` of
-    /// each point here.
+    /// Position, normal displacement, normal velocity, contact pressure and, if requested, friction traction `-sigma_tau` of each
+    /// point on this rank.
     fn rows<const S: usize>(
         &self,
         body: &Body<D, S>,
@@ -173,7 +173,7 @@ impl<const D: usize> Profile<D> {
     }
 }
 
-/// The component of a nodal field along the part of a point's normal that no support holds.
+/// The component of a nodal field along the part of the normal of a point that no support fixes.
 fn free_component<const D: usize, const S: usize>(
     body: &Body<D, S>,
     nodal: &[f64],

@@ -1,6 +1,6 @@
 //! Moves rows identified by global ids from the ranks that hold them to the ranks that need them.
 //!
-//! A directory of all ids is spread over the ranks in equal blocks, so that no rank ever knows more than its share.
+//! A directory of all ids is distributed over the ranks in equal blocks, so that no rank needs more memory than its part.
 
 use crate::error::{Error, Result};
 use crate::parallel::agreement::{Agreed, agree};
@@ -10,7 +10,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// A plan to move rows, made once for a pair of row orders and applied to any number of tables.
+/// A plan for the transfer of rows, computed once for a pair of row orders and applied to any number of tables.
 pub struct Redistribution {
     communicator: SimpleCommunicator,
     send_rows: Vec<usize>,
@@ -87,7 +87,7 @@ fn part_of(total: u64, row: u64, parts: usize) -> usize {
     (u128::from(row) * parts as u128 / u128::from(total)) as usize
 }
 
-/// Who holds which id: this rank's block of the ids.
+/// The holders of the ids: the block of the directory on this rank.
 struct Directory {
     total: u64,
     first: u64,

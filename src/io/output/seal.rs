@@ -1,7 +1,7 @@
-//! The seal in front of a checkpoint or a partitioned mesh: it proves that every byte behind it is what was written.
+//! The seal at the start of a checkpoint or a partitioned mesh, which proves that all following bytes are unchanged.
 //!
-//! The seal fills the first 512 bytes of the file (the user block, which HDF5 skips) and is checked with plain reads before
-//! HDF5 sees the file, so that a damaged file is refused and never parsed:
+//! The seal is the first 512 bytes of the file (the user block, which HDF5 skips). It is checked by plain reads before HDF5 opens
+//! the file, so that a damaged file is refused and never parsed:
 //!
 //! | bytes | content (numbers little endian) |
 //! |---|---|
@@ -12,8 +12,8 @@
 //! | 40..504 | zero |
 //! | 504..512 | XXH3 of bytes 0..504 |
 //!
-//! The digest is the wrapping sum over blocks of 1 MiB of the XXH3 of the block, seeded with its number; ranks share
-//! the blocks.
+//! The digest is the sum modulo 2^64 over blocks of 1 MiB of the XXH3 of the block, seeded with its number. The blocks are
+//! distributed over the ranks.
 
 use super::redistribution::first_of_part;
 use crate::error::{Error, Result};
@@ -25,19 +25,19 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
-/// Bytes in front of the HDF5 content.
+/// Number of bytes before the HDF5 content.
 pub const SEAL_BYTES: u64 = 512;
 
-/// What a sealed file is.
+/// The kind of a sealed file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kind {
     /// Its first bytes.
     pub magic: &'static [u8; 16],
     /// The version of its format that this program writes and reads.
     pub version: u64,
-    /// What it is called.
+    /// Its name in messages.
     pub noun: &'static str,
-    /// What to do without it.
+    /// Advice for a damaged file.
     pub remedy: &'static str,
 }
 
@@ -52,8 +52,8 @@ pub const CHECKPOINT: Kind = Kind {
 const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 const BLOCK_BYTES: u64 = 1 << 20;
 
-/// Seals a closed file whose first [`SEAL_BYTES`] are free, and makes sure that it is on the disk. Collective, with
-/// the same outcome on all ranks.
+/// Seals a closed file whose first [`SEAL_BYTES`] are free, and synchronises it with the disk. Collective, with the same outcome on
+/// all ranks.
 pub fn seal(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<(), Agreed> {
     let length = std::fs::metadata(path).map(|status| status.len());
     let length = agree(communicator, length.map_err(|error| Error::unwritable(path, error)))?;
@@ -62,26 +62,26 @@ pub fn seal(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result
     agree(communicator, done.map_err(|error| Error::unwritable(path, error)))
 }
 
-/// Checks the seal and every byte behind it. Collective, with the same outcome on all ranks.
+/// Checks the seal and all bytes after it. Collective, with the same outcome on all ranks.
 pub fn verify(path: &Path, kind: Kind, communicator: &impl Communicator) -> Result<(), Agreed> {
     let (length, expected) = agree(communicator, read_seal(path, kind))?;
     let found = shared_digest(path, length, communicator)?;
     agree(communicator, compare(path, kind, found, expected))
 }
 
-/// Checks the seal and every byte behind it, in this process alone.
+/// Checks the seal and all bytes after it, in this process only.
 pub fn verify_alone(path: &Path, kind: Kind) -> Result<()> {
     let (length, expected) = read_seal(path, kind)?;
     let found = digest_part(path, length, 0, 1).map_err(|error| Error::unreadable(path, error))?;
     compare(path, kind, found, expected)
 }
 
-/// Whether the file starts like a sealed one of this kind.
+/// Whether the file starts with the seal of this kind.
 pub fn is_sealed(path: &Path, kind: Kind) -> bool {
     starts_with(path, kind.magic)
 }
 
-/// Whether the file starts like one of HDF5 without a seal.
+/// Whether the file is an HDF5 file without a seal.
 pub fn is_hdf5(path: &Path) -> bool {
     starts_with(path, HDF5_SIGNATURE)
 }
@@ -119,7 +119,7 @@ fn stamp(path: &Path, kind: Kind, length: u64, digest: u64) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Length of the whole file and digest behind the seal.
+/// Length of the file and digest of the bytes after the seal.
 fn read_seal(path: &Path, kind: Kind) -> Result<(u64, u64)> {
     let unreadable = |error| Error::unreadable(path, error);
     let mut file = File::open(path).map_err(unreadable)?;

@@ -1,5 +1,5 @@
-//! A virtual dataset that shows tables below each other and grows as tables are added; the safe HDF5 crate cannot map
-//! an unlimited number of tables.
+//! A virtual dataset that shows tables one below the other and grows as tables are added; the safe HDF5 crate cannot map an
+//! unlimited number of tables.
 #![allow(unsafe_code)]
 
 use super::identifier::{Open, check};

@@ -1,4 +1,4 @@
-//! The light XDMF file that refers other readers to the numbers of the field file.
+//! The XDMF file, which describes the numbers in the field file for other readers.
 
 use super::field::{FieldKind, Place, Shape, data_group, file_width};
 use crate::error::{Error, Result};
@@ -26,8 +26,8 @@ pub(super) fn write(path: &Path, mesh: Mesh, kinds: &[FieldKind], times: &[f64])
         .map_err(|error| Error::unwritable(path, error))
 }
 
-/// Adds a step to a file with all those before, so that the cost of a step does not grow with their number. A reader sees the
-/// old or the new file; so it is where the disk is full. On one rank.
+/// Appends a step to the file, so that the cost of a step does not grow with the number of steps. A reader sees either the old or
+/// the new file, also if the disk is full. On one rank.
 pub(super) fn append(path: &Path, mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> Result<()> {
     let add = || -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).open(path)?;

@@ -1,4 +1,4 @@
-//! Makes a partitioned mesh file from a mesh.
+//! Creates a partitioned mesh file from a mesh.
 
 use super::{Header, PartitionedFile, is_meant, write};
 use crate::{
@@ -12,8 +12,8 @@ use crate::{
 use mpi::topology::SimpleCommunicator;
 use std::path::Path;
 
-/// Reads a mesh of Gmsh, or one that was split before, checks it as runs do, splits it into parts and writes them. On one
-/// rank, which needs room for the whole mesh.
+/// Reads a Gmsh file or a partitioned mesh, checks the mesh as a run does, splits it into parts and writes them. On one rank, which
+/// needs memory for the whole mesh.
 pub fn make(source: &Path, parts: usize, target: &Path) -> Result<Header> {
     if parts == 0 {
         return Err(Error::Refused("a mesh can't be split into 0 parts: give -n at least 1".into()));

@@ -1,7 +1,7 @@
 //! Meshes that are stored in parts, so that each rank reads only its own.
 //!
-//! `solver partition` checks a mesh and splits it once; the file holds each table's rows of part 0, then of part 1, and so
-//! on. Nodes between parts stand in each of them. A part is a [`Piece`](crate::mesh::piece::Piece):
+//! `solver partition` checks a mesh and splits it once. Each table in the file contains the rows of part 0, then those of part 1,
+//! and so on. Nodes shared by several parts occur in each of them. A part is a [`Piece`](crate::mesh::piece::Piece):
 //!
 //! ```text
 //! /header              JSON: see [`Header`]
@@ -15,8 +15,8 @@
 //! /named               index into the header's boundaries, position among the part's facets
 //! ```
 //!
-//! A seal ([`crate::io::output::seal`]) proves that every byte is what was written, and the digest of the mesh that ranks find
-//! together is held against the header's.
+//! A seal ([`crate::io::output::seal`]) proves that the file is unchanged, and the ranks compare the digest of the mesh with that
+//! in the header.
 
 mod inspect;
 mod make;
@@ -43,7 +43,7 @@ const MESH: Kind = Kind {
     remedy: "Make it again from the mesh of Gmsh: solver partition MESH.msh -n RANKS -o FILE.h5",
 };
 
-/// Tables of a part that `counts` counts, in its order.
+/// Tables of a part, in the order of `counts`.
 const TABLES: [&str; 4] = ["nodes", "cells", "facets", "named"];
 
 /// The header of a file.
@@ -67,7 +67,7 @@ pub struct Header {
     pub boundary_facets: Vec<usize>,
     /// Facets between parts.
     pub edge_cut: usize,
-    /// Largest number of cells in a part over the mean.
+    /// Ratio of the largest number of cells in a part to the mean.
     pub imbalance: f64,
     /// Digest of the mesh, in hexadecimal digits.
     pub digest: String,
@@ -79,7 +79,7 @@ impl Header {
     }
 }
 
-/// Whether a file is a partitioned mesh, or its name or first bytes say that it was meant to be one, rather than a mesh of Gmsh.
+/// Whether a file is a partitioned mesh, or was meant to be one according to its name or first bytes, rather than a Gmsh file.
 pub fn is_meant(path: &Path) -> bool {
     let known = |extension: &std::ffi::OsStr| extension == "h5" || extension == "hdf5";
     let named = path.extension().is_some_and(known);

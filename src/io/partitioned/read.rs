@@ -28,7 +28,7 @@ pub struct PartitionedFile {
 }
 
 impl PartitionedFile {
-    /// Checks that the file is whole, opens it and reads what all ranks need. Collective, with the same outcome on all ranks.
+    /// Verifies the file, opens it and reads the data that all ranks need. Collective, with the same outcome on all ranks.
     pub fn open(path: &Path, communicator: &impl Communicator) -> Result<Self, Agreed> {
         let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error));
         if !agree(communicator, facts)?.is_file() {
@@ -83,7 +83,7 @@ impl PartitionedFile {
         piece.into_whole(self.header.names()).map_err(|error| contradiction(&self.file, &error.to_string()))
     }
 
-    /// Consecutive parts as one; owners are parts. Collective, with the same outcome on all ranks.
+    /// Consecutive parts merged into one; owners are parts. Collective, with the same outcome on all ranks.
     fn piece<const D: usize>(&self, parts: Range<usize>) -> Result<Piece<D>, Agreed> {
         let ids = self.table::<u32>("nodes/id", 1, &parts)?;
         let owners = self.table::<u32>("nodes/owner", 1, &parts)?;

@@ -17,8 +17,8 @@ use crate::{
 use mpi::traits::Communicator;
 use std::path::{Path, PathBuf};
 
-/// Writes the parts of a mesh to a file; one of this name stays whole until the new one is. On one rank: `alone` is the
-/// communicator of this process only.
+/// Writes the parts of a mesh to a file; an existing file of this name is replaced only when the new one is complete. On one rank:
+/// `alone` is the communicator of this process only.
 pub fn write<const D: usize>(
     path: &Path,
     alone: &impl Communicator,
@@ -31,7 +31,7 @@ pub fn write<const D: usize>(
     let part = PathBuf::from(name);
     let written = write_sealed(&part, alone, mesh, partition, parts);
     if written.is_err() {
-        // What could be written of it is of no use; the error that counts is the first.
+        // A partial file is useless; the first error is the one to report.
         let _ = std::fs::remove_file(&part);
     }
     let header = written?;
