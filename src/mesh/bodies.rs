@@ -15,10 +15,10 @@ use crate::{
 };
 
 impl<const D: usize> Mesh<D> {
-    /// The bodies of the whole mesh, numbered by their first cell, and which of them the cells here belong to. Collective.
+    /// The bodies of the whole mesh, numbered by their first cells, and the body of each cell of this rank. Collective.
     ///
-    /// Each rank finds the connected pieces of its own cells; the owner of a facet's first node finds the pieces that share the facet.
-    /// All ranks then hold one number for each piece.
+    /// Each rank finds the connected pieces of its own cells; the owner of a facet's first node finds the pieces that share the
+    /// facet. Then all ranks store one number for each piece.
     pub fn bodies(&self, session: &Session) -> Result<Bodies, Agreed> {
         let topology = session.agree(self.topology())?;
         let Bodies { count, mut of_cell } = topology.bodies();
@@ -46,7 +46,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// Pieces of bodies that share a facet, two and two: of those whose facets' first nodes this rank owns.
+/// Pairs of pieces that share a facet whose first node this rank owns.
 fn meet<const D: usize>(session: &Session, records: &[Vec<u32>]) -> Result<Vec<u32>, Agreed> {
     let counts: Vec<usize> = records.iter().map(Vec::len).collect();
     let (came, _) = exchange(session.world(), &records.concat(), &counts)?;
@@ -59,7 +59,7 @@ fn meet<const D: usize>(session: &Session, records: &[Vec<u32>]) -> Result<Vec<u
     Ok(pairs.concat())
 }
 
-/// The body of each piece, given the first cell of each and which belong together; and how many bodies there are.
+/// The body of each piece and the number of bodies, given the first cell of each piece and the pairs of connected pieces.
 fn joined(starts: &[u32], pairs: &[u32]) -> (Vec<u32>, usize) {
     fn root(above: &mut [usize], mut piece: usize) -> usize {
         while above[piece] != piece {
@@ -71,7 +71,7 @@ fn joined(starts: &[u32], pairs: &[u32]) -> (Vec<u32>, usize) {
     let mut above: Vec<usize> = (0..starts.len()).collect();
     for pair in pairs.chunks_exact(2) {
         let [a, b] = [pair[0], pair[1]].map(|piece| root(&mut above, piece as usize));
-        // The piece that starts first stays on top.
+        // The piece with the smallest first cell is the root.
         let (upper, lower) = if starts[a] <= starts[b] { (a, b) } else { (b, a) };
         above[lower] = upper;
     }

@@ -1,4 +1,4 @@
-//! What a mesh must satisfy before anything is computed on it.
+//! Checks of a mesh before computation.
 
 use super::hanging::refuse_hanging_nodes;
 use super::shape::{self, longest_edge};
@@ -11,29 +11,30 @@ use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 use crate::parallel::session::Session;
 use serde::Serialize;
 
-/// Cells whose [quality](super::shape::quality) is below this are called poor: they spoil accuracy and conditioning.
+/// Cells whose [quality](super::shape::quality) is smaller are called poor: they reduce the accuracy and the condition of the
+/// matrices.
 pub const POOR_QUALITY: f64 = 0.05;
 
-/// A cell is degenerate below this share of its longest edge to the power `D`.
+/// A cell is degenerate if its measure is below this multiple of its longest edge to the power `D`.
 const DEGENERATE: f64 = 1e-14;
 
-/// Two nodes coincide within this share of the mesh's extent.
+/// Two nodes coincide if their distance is below this multiple of the extent of the mesh.
 const COINCIDENT: f64 = 1e-12;
 
-/// The shape qualities of a mesh in short.
+/// Summary of the shape qualities of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quality {
     /// The smallest quality, in (0, 1].
     pub smallest: f64,
-    /// The cell that has it.
+    /// The cell with this quality.
     pub worst_cell: usize,
     /// Number of cells below [`POOR_QUALITY`].
     #[serde(rename = "poor_cells")]
     pub poor: usize,
 }
 
-/// Refuses a mesh with node ids that do not exist, coordinates that are not finite, degenerate or inverted or
-/// overlapping cells, coincident nodes or hanging nodes; otherwise tells which cells share facets.
+/// Refuses a mesh with node ids that do not exist, coordinates that are not finite, degenerate, inverted or overlapping cells,
+/// coincident nodes or hanging nodes; otherwise returns the cells that share facets.
 #[cfg(test)]
 pub(super) fn validate<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<Topology<D>> {
     cells(mesh, tags)?;
@@ -92,7 +93,7 @@ pub(super) fn nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
     refuse_hanging_nodes(mesh, tags)
 }
 
-/// Sweeps the nodes along a direction in which no grid has two of them at the same place.
+/// Sweeps the nodes along a direction in which no two nodes of a grid have the same position.
 fn refuse_coincident_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
     const SWEEP: [f64; 3] = [0.567_143_290_4, 0.660_161_815_8, 0.492_408_923_6];
     let direction: Vector<D> = std::array::from_fn(|i| SWEEP[i]);

@@ -1,9 +1,9 @@
-//! A number that tells meshes apart, however they are split.
+//! A digest of a mesh that does not depend on its partition.
 
 use super::{Names, piece::Piece};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
-/// Seeds that keep nodes, cells and facets apart.
+/// Different seeds for nodes, cells and facets.
 const NODE: u64 = 1;
 const CELL: u64 = 2;
 const FACET: u64 = 3;
@@ -30,8 +30,8 @@ impl Bytes {
 }
 
 impl<const D: usize> Piece<D> {
-    /// The wrapping sum of the hashes of this part's own nodes (id and place), its cells (ids and region) and named facets (ids
-    /// and name). Of all parts together it is the digest of the mesh.
+    /// The sum modulo 2^64 of the hashes of the owned nodes (id and position), the cells (ids and region) and the named facets (ids
+    /// and name) of this part. The sum over all parts is the digest of the mesh.
     pub fn digest(&self, part: usize, names: &Names) -> u64 {
         let mut sum = 0_u64;
         let own = |node: &usize| self.owners[*node] as usize == part;

@@ -21,12 +21,12 @@ use mpi::{
     traits::Root,
 };
 
-/// The cells of this rank with the nodes they touch: nodes owned here first, then ghosts owned by other ranks.
+/// The cells of this rank with their nodes: owned nodes first, then ghosts, which other ranks own.
 ///
 /// Owned nodes of rank 0 come first in the global numbering, then those of rank 1, and so on.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh<const D: usize> {
-    /// Nodes owned here.
+    /// Number of owned nodes.
     pub owned: usize,
     /// Global number of the first owned node.
     pub first_node: usize,
@@ -40,29 +40,29 @@ pub struct Mesh<const D: usize> {
     pub ghosts: Vec<u32>,
     /// First owned node of each rank, then the total.
     pub node_starts: Vec<usize>,
-    /// Local nodes, `D + 1` a cell.
+    /// Local nodes, `D + 1` per cell.
     pub cells: Vec<u32>,
     /// Original ids of the cells, ascending.
     pub cell_ids: Vec<u32>,
     /// Cells over all ranks.
     pub total_cells: usize,
-    /// Index into `regions`, one a cell.
+    /// Index into `regions` for each cell.
     pub cell_regions: Vec<u16>,
     /// Names of the regions.
     pub regions: Vec<String>,
-    /// Outer facets of the cells here: local nodes, ordered so that the normal points outward.
+    /// Boundary facets of the cells of this rank: local nodes, ordered so that the normal points outward.
     pub facets: Vec<[u32; D]>,
-    /// The local cell behind each facet.
+    /// The local cell of each facet.
     pub facet_cells: Vec<u32>,
-    /// Named parts of the surface, as far as they are here; the same names on every rank.
+    /// The facets of this rank on named parts of the surface; the names are the same on all ranks.
     pub boundaries: Vec<Boundary>,
-    /// Facets between ranks.
+    /// Number of facets between ranks.
     pub edge_cut: usize,
-    /// Largest number of cells on a rank over the mean.
+    /// Ratio of the largest number of cells on a rank to the mean.
     pub imbalance: f64,
     /// Digest of the whole mesh, independent of the partition.
     pub digest: u64,
-    /// Whether rank 0 held the whole mesh at first.
+    /// Whether rank 0 held the whole mesh initially.
     pub handed_out: bool,
 }
 
@@ -72,7 +72,7 @@ impl<const D: usize> Mesh<D> {
         self.cell_ids.len()
     }
 
-    /// Bytes of memory that this rank's part takes.
+    /// Memory of the part of this rank in bytes.
     pub fn bytes(&self) -> usize {
         let named: usize = self.boundaries.iter().map(|b| size_of_val(&b.facets[..])).sum();
         named
@@ -112,7 +112,7 @@ impl<const D: usize> Mesh<D> {
         if local < self.owned { (self.first_node + local) as u32 } else { self.ghosts[local - self.owned] }
     }
 
-    /// Local number of a node owned here, given its global number.
+    /// Local number of an owned node, given its global number.
     pub fn owned_node(&self, global: u32) -> usize {
         global as usize - self.first_node
     }
@@ -122,7 +122,7 @@ impl<const D: usize> Mesh<D> {
         self.node_starts.partition_point(|&start| start <= global as usize) - 1
     }
 
-    /// The facets here of a named boundary.
+    /// The facets of a named boundary on this rank.
     pub fn boundary(&self, name: &str) -> Option<&Boundary> {
         self.boundaries.iter().find(|b| b.name == name)
     }
@@ -147,7 +147,7 @@ impl<const D: usize> Mesh<D> {
             .collect();
         session.agree(countable(node_starts[ranks], session.total(piece.cell_ids.len())))?;
 
-        // By owner, then by id: that is the order of their global numbers.
+        // By owner, then by id, which is the order of their global numbers.
         ghosts.sort_by_key(|&node| piece.owners[node]);
         let mut wanted = vec![0; ranks];
         ghosts.iter().for_each(|&node| wanted[piece.owners[node] as usize] += 1);
@@ -202,7 +202,7 @@ impl<const D: usize> Mesh<D> {
         Ok(topology.facets_without_neighbour() - self.facets.len())
     }
 
-    /// Which of the cells here share facets.
+    /// The cells of this rank that share facets.
     pub fn topology(&self) -> Result<Topology<D>> {
         let topology = Topology::<D>::new(&self.cells, self.nodes.len(), &Tags::default())?;
         if topology.facets_without_neighbour() < self.facets.len() {
@@ -222,7 +222,7 @@ fn countable(nodes: usize, cells: usize) -> Result<()> {
     }
 }
 
-/// Hands the parts of `whole` (on rank 0, `None` elsewhere) out to all ranks; rank 0 frees it. Collective.
+/// Distributes the parts of `whole` (`None` except on rank 0) to all ranks; rank 0 frees it. Collective.
 pub fn distribute<const D: usize>(
     session: &Session,
     whole: Option<(GlobalMesh<D>, Partition)>,
@@ -287,7 +287,7 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// Names one a line: the regions, an empty line, the boundaries.
+/// One name per line: the regions, an empty line, the boundaries.
 fn encode(names: &Names) -> String {
     format!("{}\n\n{}", names.regions.join("\n"), names.boundaries.join("\n"))
 }

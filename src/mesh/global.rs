@@ -4,20 +4,20 @@ use crate::linear_algebra::tensor::Vector;
 
 /// Triangles in the plane (`D = 2`) or tetrahedra in space (`D = 3`), whole, as read or generated on rank 0.
 ///
-/// Ids are positions: node `i` is `nodes[i]`, cell `c` has the nodes `cells[c*(D+1)..(c+1)*(D+1)]`, positively oriented.
+/// Ids are indices: node `i` is `nodes[i]`, cell `c` has the nodes `cells[c*(D+1)..(c+1)*(D+1)]`, positively oriented.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GlobalMesh<const D: usize> {
     /// Coordinates in m, every node used by at least one cell.
     pub nodes: Vec<Vector<D>>,
-    /// Node ids, `D + 1` a cell.
+    /// Node ids, `D + 1` per cell.
     pub cells: Vec<u32>,
-    /// Index into `regions`, one a cell.
+    /// Index into `regions` for each cell.
     pub cell_regions: Vec<u16>,
     /// Names of the regions; a generated mesh has the single region `body`.
     pub regions: Vec<String>,
-    /// Facets on the outer surface, each with its node ids so ordered that the normal points outward.
+    /// Facets on the outer surface, each with its node ids ordered so that the normal points outward.
     pub facets: Vec<[u32; D]>,
-    /// The cell behind each facet.
+    /// The cell of each facet.
     pub facet_cells: Vec<u32>,
     /// Named parts of the surface.
     pub boundaries: Vec<Boundary>,
@@ -34,7 +34,7 @@ impl<const D: usize> GlobalMesh<D> {
 /// A named part of the surface.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Boundary {
-    /// The name jobs refer to.
+    /// Its name in job files.
     pub name: String,
     /// Positions in the mesh's facets, ascending.
     pub facets: Vec<u32>,

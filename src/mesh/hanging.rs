@@ -7,12 +7,12 @@ use super::tree::BoxTree;
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, dot, norm};
 
-/// How near to a facet, as a share of its longest edge, a node lies on it.
+/// Distance from a facet, as a fraction of its longest edge, below which a node lies on the facet.
 const TOUCHING: f64 = 1e-8;
 
-/// Refuses a node in the interior of an outer edge or face it does not belong to.
+/// Refuses a node in the interior of a boundary edge or face to which it does not belong.
 ///
-/// Where cells don't meet facet to facet, both sides count as outer surface, so nothing else needs to be searched.
+/// If cells do not share complete facets, both sides are boundary facets, so that only these need to be searched.
 pub(super) fn refuse_hanging_nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
     let boxes = (0..mesh.facets.len()).map(|facet| {
         let corners = mesh.facet_corners(facet);

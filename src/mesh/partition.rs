@@ -1,4 +1,4 @@
-//! Which rank works on which cell and owns which node.
+//! The assignment of cells and nodes to ranks.
 
 use super::{
     GlobalMesh, Tags,
@@ -6,25 +6,25 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// The assignment of a whole mesh to ranks, made on rank 0.
+/// The assignment of a whole mesh to ranks, computed on rank 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Partition {
     /// Rank of each cell.
     pub cell_ranks: Vec<u32>,
     /// Owner of each node: one of the ranks of the cells around it.
     pub node_ranks: Vec<u32>,
-    /// Facets whose two cells are on different ranks.
+    /// Number of facets whose two cells are on different ranks.
     pub edge_cut: usize,
-    /// Largest number of cells on a rank over the mean.
+    /// Ratio of the largest number of cells on a rank to the mean.
     pub imbalance: f64,
 }
 
-/// How METIS splits.
+/// The method of METIS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Into all parts at once.
     KWay,
-    /// By recursive bisection: consecutive parts are neighbours, so that several of them together are a good part, too.
+    /// Recursive bisection: consecutive parts are neighbours, so that several of them together are also a good part.
     Recursive,
 }
 
@@ -78,7 +78,7 @@ fn split(dual: &DualGraph, cells: usize, ranks: usize, method: Method) -> Result
     Ok(part.into_iter().map(i32::cast_unsigned).collect())
 }
 
-/// METIS may leave parts of very small meshes empty: each gets one cell of the fullest part.
+/// METIS may leave parts of very small meshes empty: each of these receives one cell of the largest part.
 fn fill_empty_parts(cell_ranks: &mut [u32], ranks: usize) {
     let mut sizes = vec![0usize; ranks];
     for &rank in cell_ranks.iter() {
@@ -97,7 +97,8 @@ fn fill_empty_parts(cell_ranks: &mut [u32], ranks: usize) {
     }
 }
 
-/// A node between ranks goes to the lowest or the highest of them in turn, which balances the shares.
+/// Nodes shared by several ranks are assigned alternately to the lowest and the highest of them, which balances the numbers of
+/// nodes.
 fn node_owners<const D: usize>(mesh: &GlobalMesh<D>, cell_ranks: &[u32]) -> Vec<u32> {
     let mut lowest = vec![u32::MAX; mesh.nodes.len()];
     let mut highest = vec![0; mesh.nodes.len()];

@@ -1,4 +1,4 @@
-//! Tetrahedra in a box with its low corner in the origin.
+//! Tetrahedra in a box whose corner with the smallest coordinates is the origin.
 
 use super::limits::{countable, room};
 use super::{Grading, Grid, grading::axis};
@@ -52,7 +52,7 @@ impl Numbering {
         (0..3).map(|a| at[a] as u32 * self.strides[a]).sum()
     }
 
-    /// From the low corner of a brick, the nodes that a walk passes.
+    /// The nodes of a walk from the low corner of a brick.
     fn path(&self, walk: usize) -> [u32; 4] {
         let [a, b, c] = WALKS[walk].map(|axis| self.strides[axis]);
         [0, a, a + b, a + b + c]
@@ -63,8 +63,8 @@ impl Numbering {
         if walk < FIRST_ODD { [p, q, r, s] } else { [p, r, q, s] }
     }
 
-    /// The two triangles of a brick on a side, each with its walk. On the low side a walk stays in the plane until its last leg,
-    /// on the high side from its first leg on.
+    /// The two triangles of a brick on a side, each with the walk of its tetrahedron. On the low side, a walk leaves the plane in
+    /// its last leg; on the high side, it reaches the plane in its first leg.
     fn halves(&self, axis: usize, high: bool) -> Vec<(usize, [u32; 3])> {
         let on_side = (0..6).filter(|&walk| WALKS[walk][if high { 0 } else { 2 }] == axis);
         let triangle = |walk: usize| {
@@ -81,7 +81,7 @@ fn brick_number(at: [usize; 3], bricks: [usize; 3]) -> usize {
 }
 
 impl Cuboid {
-    /// A box of `cells` bricks. Grid planes lie as `grading` says for each axis; a number is a power toward the low end.
+    /// A box of `cells` bricks. `grading` determines the grid planes of each axis; a number is an exponent toward the low end.
     pub fn new(size: [f64; 3], cells: [usize; 3], grading: [impl Into<Grading>; 3]) -> Result<Self> {
         countable(counts(cells), u32::MAX as usize, u32::MAX as usize)?;
         let [x, y, z] = grading.map(Into::into);

@@ -1,9 +1,9 @@
-//! Where the grid lines of a generated mesh lie along an axis.
+//! The grid lines of a generated mesh along an axis.
 
 use super::limits::room;
 use crate::error::{Error, Result};
 
-/// Which ends of an axis cells crowd toward.
+/// The ends of an axis near which cells are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Toward {
     /// The low end.
@@ -14,17 +14,18 @@ pub enum Toward {
     Both,
 }
 
-/// How unevenly cells are spread along an axis.
+/// The grading of the cells along an axis.
 ///
-/// The grid lines of `n` cells lie at `length * (i/n)^power` from the end they crowd toward; toward both ends each half
-/// of the axis is half of such a spread, and the middle cell of an odd number lies across. With a power above 1 cells
-/// grow from that end on, each at most `2^power - 1` times as long as the one before; the longest is at most `power`
-/// times as long as without grading, the shortest `n^(power - 1)` times shorter (toward both ends `(n/2)^(power - 1)`).
+/// With `n` cells, grid line `i` has the distance `length * (i/n)^power` from the end with smaller cells. With both ends, each half
+/// of the axis is graded in this way with `n/2` cells, and an odd number of cells has one cell across the middle. With a power
+/// above 1, cells grow with the distance from this end, each at most `2^power - 1` times as long as the previous one. The longest
+/// cell is at most `power` times as long as without grading, the shortest one `n^(power - 1)` times shorter (with both ends
+/// `(n/2)^(power - 1)`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grading {
-    /// 1 is uniform; above 1 cells crowd toward the ends, below 1 they are thinned there.
+    /// The exponent. 1: uniform cells; above 1: smaller cells near the end; below 1: larger cells near the end.
     pub power: f64,
-    /// Which ends are meant.
+    /// The end or ends.
     pub toward: Toward,
 }
 

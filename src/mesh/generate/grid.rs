@@ -1,4 +1,4 @@
-//! Grids of bricks cut into simplices: whole, or in parts that are each made where they are needed.
+//! Grids of bricks divided into simplices: generated as a whole, or in parts by the ranks that need them.
 
 use super::limits::countable;
 use crate::{
@@ -7,19 +7,19 @@ use crate::{
 };
 use std::ops::Range;
 
-/// A generated mesh before it is made.
+/// The definition of a generated mesh.
 pub trait Grid<const D: usize> {
     /// Bricks along each axis.
     fn bricks(&self) -> [usize; D];
 
-    /// Nodes and cells of the whole, which 32 bits can count.
+    /// Numbers of nodes and cells of the whole mesh, below 2^32.
     fn counts(&self) -> [Option<usize>; 2];
 
     /// Names of the low and the high side of each axis.
     fn sides(&self) -> &'static [&'static str];
 
-    /// The cells of the bricks in `range` with what they touch. `owner` gives the owner of a node at a corner of bricks by its
-    /// place in the grid and its id, and of nodes inside of bricks (`None`).
+    /// The cells of the bricks in `range` with their nodes and facets. `owner` returns the owner of a node at a corner of bricks,
+    /// given its position in the grid and its id, and the owner of nodes inside bricks (`None`).
     fn piece(
         &self,
         range: &[Range<usize>; D],
@@ -32,14 +32,14 @@ pub trait Grid<const D: usize> {
         Names { regions: vec!["body".into()], boundaries }
     }
 
-    /// The whole mesh; refused where METIS could not split it.
+    /// The whole mesh; refused if METIS could not partition it.
     fn whole(&self) -> Result<GlobalMesh<D>> {
         countable(self.counts(), i32::MAX as usize, i32::MAX as usize / (D + 1))?;
         self.piece(&self.bricks().map(|count| 0..count), &|_, _| 0)?.into_whole(self.names())
     }
 
-    /// The part of a rank: a box of bricks, near equal ones for all ranks. A node between parts goes to the lowest or the highest
-    /// of them in turn.
+    /// The part of a rank: a box of bricks, of nearly equal size for all ranks. Nodes shared by several parts are assigned
+    /// alternately to the lowest and the highest of them.
     fn part(&self, rank: usize, ranks: usize) -> Result<Piece<D>> {
         let parts = Bisection::new(self.bricks(), ranks)?;
         let own = parts.range(rank);
@@ -56,14 +56,14 @@ pub trait Grid<const D: usize> {
     }
 }
 
-/// Bricks shared out among parts by cutting the longest side of a box in two again and again.
+/// Distribution of bricks by recursive bisection of the longest side of boxes.
 pub(super) struct Bisection<const D: usize> {
     bricks: [usize; D],
     parts: usize,
 }
 
 impl<const D: usize> Bisection<D> {
-    /// Refused where there are fewer bricks than parts.
+    /// Refused if there are fewer bricks than parts.
     pub(super) fn new(bricks: [usize; D], parts: usize) -> Result<Self> {
         let count: usize = bricks.iter().product();
         if count < parts {
@@ -95,8 +95,8 @@ impl<const D: usize> Bisection<D> {
         })
     }
 
-    /// Follows the cuts to one part and its box; `low` chooses the low side by axis, place of the cut and first part of the high
-    /// side.
+    /// Follows the bisection to one part and its box; `low` selects the low side, given the axis, the position of the cut and the
+    /// first part of the high side.
     fn descend(&self, low: impl Fn(usize, usize, usize) -> bool) -> (usize, [Range<usize>; D]) {
         let mut range = self.bricks.map(|count| 0..count);
         let (mut first, mut parts) = (0, self.parts);
@@ -126,7 +126,7 @@ mod tests {
     use crate::mesh::generate::{Cuboid, Diagonal, Grading, Rectangle, Toward};
     use std::collections::BTreeMap;
 
-    /// Holds the parts of a grid against the whole.
+    /// Compares the parts of a grid with the whole grid.
     fn parts_make_the_whole<const D: usize>(grid: &impl Grid<D>, parts: usize) {
         let whole = grid.whole().unwrap();
         let pieces: Vec<Piece<D>> = (0..parts).map(|rank| grid.part(rank, parts).unwrap()).collect();

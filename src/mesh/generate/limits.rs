@@ -1,8 +1,8 @@
-//! Sizes that ids and memory allow.
+//! Limits of the size of a mesh.
 
 use crate::error::{Error, Result};
 
-/// Refuses numbers of nodes and cells, if they could be counted at all, beyond these limits.
+/// Refuses numbers of nodes and cells above these limits, or too large to be counted.
 pub(super) fn countable(
     [nodes, cells]: [Option<usize>; 2],
     most_nodes: usize,
@@ -20,7 +20,7 @@ pub(super) fn countable(
     )))
 }
 
-/// An empty vector with room for `count` items; refused, not aborted, when memory is not there.
+/// An empty vector with capacity for `count` items; an error if there is not enough memory.
 pub(super) fn room<T>(count: usize) -> Result<Vec<T>> {
     let mut out = Vec::new();
     out.try_reserve_exact(count)

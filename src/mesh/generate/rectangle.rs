@@ -1,4 +1,4 @@
-//! Triangles on a rectangle with its low corner in the origin.
+//! Triangles on a rectangle whose lower left corner is the origin.
 
 use super::limits::{countable, room};
 use super::{Grading, Grid, grading::axis};
@@ -10,8 +10,8 @@ pub use crate::job::Diagonal;
 
 /// A rectangle `[0, size[0]] x [0, size[1]]` (m) of quadrilaterals along x and y, each cut into triangles.
 ///
-/// Nodes are numbered row by row, x fastest; crossed middles follow the row of nodes below them.
-/// The boundaries are `left`, `right`, `bottom` and `top`; the region is `body`.
+/// Nodes are numbered row by row, x fastest; the centre nodes of crossed diagonals follow the row of nodes below them. The
+/// boundaries are `left`, `right`, `bottom` and `top`; the region is `body`.
 #[derive(Debug, Clone)]
 pub struct Rectangle {
     lines: [Vec<f64>; 2],
@@ -64,7 +64,7 @@ impl Numbering {
 impl Rectangle {
     /// A rectangle of `cells` quadrilaterals, each cut by `diagonal`.
     ///
-    /// Grid lines lie as `grading` says for each axis; a number is a power toward the low end.
+    /// `grading` determines the grid lines of each axis; a number is an exponent toward the low end.
     pub fn new(
         size: [f64; 2],
         cells: [usize; 2],
@@ -89,7 +89,7 @@ impl Rectangle {
         }
     }
 
-    /// The triangle of a quadrilateral that holds its left, right, bottom or top edge.
+    /// The triangle of a quadrilateral that contains its left, right, bottom or top edge.
     fn triangle_at_side(&self, side: usize, at: [usize; 2]) -> usize {
         match (self.crossed(), side) {
             (true, LEFT) => 3,

@@ -1,4 +1,4 @@
-//! From the sections of a file to a mesh.
+//! Assembles a mesh from the sections of a file.
 
 use super::document::{Block, Document};
 use crate::error::{Error, Result};
@@ -8,10 +8,10 @@ use crate::mesh::tags::{Tags, place};
 use crate::mesh::{Boundary, GlobalMesh, check, shape};
 use std::collections::BTreeMap;
 
-/// In place of an id: a node without a cell.
+/// Marker, in place of an id, of a node without a cell.
 const UNUSED: u32 = u32::MAX;
 
-/// More boundaries on one entity than anybody needs; each repeats the entity's facets in memory.
+/// Largest number of physical groups of an entity; each copies the facets of the entity in memory.
 const MOST_GROUPS: usize = 64;
 
 /// The mesh of the document's cells of dimension `D`, validated.
@@ -63,9 +63,9 @@ impl Block {
     }
 }
 
-/// Where the node with a tag stands in the file.
+/// The index of the node with a tag in the file.
 enum Positions {
-    /// By tag, from the smallest on; for tags without large holes.
+    /// Array over all tags from the smallest one, for tags without large gaps.
     Dense { smallest: u64, positions: Vec<u32> },
     /// In ascending order of tags.
     Sparse(Vec<(u64, u32)>),
@@ -144,7 +144,7 @@ fn flat<'a>(points: impl Iterator<Item = (u64, &'a [f64; 3])>) -> Result<()> {
     }
 }
 
-/// The name of a physical group: its number where it has none.
+/// The name of a physical group, or its number if it has no name.
 fn name(document: &Document, dimension: usize, group: u32) -> String {
     document.names.get(&(dimension, group)).cloned().unwrap_or_else(|| group.to_string())
 }
@@ -210,7 +210,8 @@ fn name_regions<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -
     Ok(())
 }
 
-/// Turns the cells of an entity round if all of them are negatively oriented: its normal points the other way.
+/// Reverses the orientation of the cells of an entity if all of them are negatively oriented, because its normal points in the
+/// opposite direction.
 fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) {
     let mut first = 0;
     for block in blocks(document, D + 1) {
@@ -233,7 +234,7 @@ fn name_boundaries<const D: usize>(
     let mut surface: Vec<([u32; D], u32)> =
         mesh.facets.iter().zip(0..).map(|(&facet, position)| (sorted(facet).0, position)).collect();
     surface.sort_unstable();
-    // Boundaries stand in the order of their groups' numbers.
+    // Boundaries are in the order of the numbers of their groups.
     let mut boundaries: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for block in blocks(document, D) {
         let groups = document.groups.get(&(D - 1, block.entity)).map_or(&[][..], Vec::as_slice);

@@ -1,19 +1,19 @@
-//! Numbers and lines out of the bytes of a file, ASCII or binary, and where they stood.
+//! Reads numbers and lines from the bytes of a file, ASCII or binary, and records their positions.
 
 use crate::error::{Error, Result};
 
-/// How numbers are written.
+/// The encoding of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
     Binary { big_endian: bool, wide_sizes: bool },
 }
 
-/// A place in the file; every read checks that the bytes are there.
+/// A position in the file; every read checks that the bytes exist.
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the last thing read began.
+    /// The start of the last item read.
     began: usize,
     pub(super) encoding: Encoding,
     /// The section being read, for messages.
@@ -25,7 +25,7 @@ impl<'a> Cursor<'a> {
         Self { bytes, at: 0, began: 0, encoding: Encoding::Ascii, section: String::new() }
     }
 
-    /// A refusal that names the section and the line (ASCII) or byte (binary) of what was read last.
+    /// A refusal with the section and the line (ASCII) or byte (binary) of the last item read.
     pub(super) fn refuse(&self, what: impl std::fmt::Display) -> Error {
         let place = match self.encoding {
             Encoding::Ascii => {
@@ -50,7 +50,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The next word between white space, whatever the encoding.
+    /// The next word between white space, in any encoding.
     pub(super) fn word(&mut self, what: &str) -> Result<&'a str> {
         self.skip_space();
         self.began = self.at;
@@ -73,7 +73,7 @@ impl<'a> Cursor<'a> {
         rest[..length].trim_ascii()
     }
 
-    /// Moves behind the line that is `marker`; false if there is none.
+    /// Moves after the line that is equal to `marker`; false if there is none.
     pub(super) fn skip_past(&mut self, marker: &str) -> bool {
         let mut from = self.at;
         while let Some(found) = find(&self.bytes[from..], marker.as_bytes()) {
@@ -107,7 +107,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Four bytes as they stand.
+    /// The next four bytes.
     pub(super) fn four_bytes(&mut self, what: &str) -> Result<[u8; 4]> {
         self.take(what)
     }
@@ -148,7 +148,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A number of things that follow; refused if the rest of the file is too short to hold them.
+    /// A number of following items; refused if the rest of the file is too short for them.
     pub(super) fn count(&mut self, what: &str, each: Least) -> Result<usize> {
         let count = self.size(what)?;
         let least = match self.encoding {
@@ -157,7 +157,7 @@ impl<'a> Cursor<'a> {
                 4 * each.ints + if wide_sizes { 8 } else { 4 } * each.sizes + 8 * each.doubles
             }
         };
-        // The last word of an ASCII file may lack the white space behind it.
+        // The last word of an ASCII file may have no white space after it.
         let rest = self.bytes.len() - self.at + 1;
         match usize::try_from(count) {
             Ok(count) if count <= rest / least => Ok(count),
@@ -168,7 +168,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// How many numbers of each kind one thing takes in the file at least.
+/// The smallest number of numbers of each kind for an item in the file.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Least {
     pub(super) ints: usize,

@@ -1,10 +1,10 @@
-//! The sections of an MSH 4.1 file as they stand, not yet a mesh.
+//! The sections of an MSH 4.1 file.
 
 use super::cursor::{Cursor, Encoding, Least};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 
-/// What the sections say.
+/// The contents of the sections.
 #[derive(Debug, Default)]
 pub(super) struct Document {
     /// Names of physical groups by dimension and number.
@@ -100,7 +100,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Always in words, also in a binary file.
+    /// Always as text, also in a binary file.
     fn read_names(&mut self, cursor: &mut Cursor) -> Result<()> {
         let encoding = std::mem::replace(&mut cursor.encoding, Encoding::Ascii);
         let count = cursor.count("the number of physical names", Least { ints: 2, ..Least::default() })?;

@@ -1,8 +1,8 @@
 //! Gmsh MSH 4.1 files, ASCII and binary: linear triangles in the plane or tetrahedra in space.
 //!
-//! Physical groups of the cells' dimension name regions, those one dimension below name boundaries. The reader is our
-//! own because the one crate for this format, mshio, leaves out the names of physical groups and can panic on damaged
-//! files; here no count in a file is believed before the bytes behind it are there.
+//! Physical groups of the dimension of the cells name regions, those one dimension below name boundaries. The only crate for this
+//! format, mshio, omits the names of physical groups and can panic on damaged files. This reader uses no count in a file before it
+//! has checked that the file is long enough.
 
 mod assemble;
 mod cursor;
@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use document::Document;
 use std::path::Path;
 
-/// A mesh of whichever dimension its file has.
+/// A mesh of the dimension of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyMesh {
     /// Triangles in a plane of constant z.
@@ -24,8 +24,8 @@ pub enum AnyMesh {
 
 /// Reads and validates a mesh; messages begin with the file's path.
 ///
-/// Tetrahedra make a mesh of space, otherwise triangles one of the plane. Entities whose cells all run the other way
-/// round are reoriented; nodes without a cell are dropped.
+/// Tetrahedra give a mesh in space, otherwise triangles give a mesh in the plane. Entities whose cells are all negatively oriented
+/// are reoriented; nodes without a cell are dropped.
 pub fn read(path: &Path) -> Result<AnyMesh> {
     let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
     if !facts.is_file() && !facts.is_dir() {

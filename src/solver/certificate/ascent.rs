@@ -66,9 +66,9 @@ impl Direction {
 /// Convergence limits.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
-    /// Relative change of the result that ends an ascent when two successive iterations stay below it.
+    /// Relative change of the result; an iteration ends if two successive changes are smaller.
     pub tolerance: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub iterations: usize,
 }
 

@@ -9,7 +9,7 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The step in s below which every cell is stable; `None` where springs on the surface, which belong to no cell, are explicit, too.
+/// The step in s below which every cell is stable; `None` if springs on the surface, which belong to no cell, are explicit, too.
 /// Collective.
 pub(super) fn explicit_step_bound<const D: usize, const S: usize>(
     session: &Session,

@@ -1,8 +1,8 @@
-//! The numbers of the certificates.
+//! The values of the certificates.
 
 use serde::{Deserialize, Serialize};
 
-/// Constants of the problem; null where they have no meaning.
+/// Constants of the problem; null if undefined.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Certificates {
@@ -14,12 +14,13 @@ pub struct Certificates {
     pub viscosity_modulus: Option<f64>,
     /// `m_j` in Pa s/m.
     pub monotonicity_constant: Option<f64>,
-    /// `c0` in Pa and `c1` in Pa s/m with `|-sigma_nu| <= c0 + c1 |v_nu|`, whatever the contact; null where they are infinite.
+    /// `c0` in Pa and `c1` in Pa s/m with `|-sigma_nu| <= c0 + c1 |v_nu|` for all contacts; null if they are infinite.
     pub growth_constants: Option<[f64; 2]>,
-    /// Why there are no growth constants although there is contact, in words.
+    /// The reason why there are no growth constants although there is contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unbounded_growth: Option<String>,
-    /// `|gamma|^2` of the normal trace in m; null where it is infinite: the supports leave a rigid motion against the contact.
+    /// `|gamma|^2` of the normal trace in m; null if it is infinite, because the supports do not prevent a rigid motion against the
+    /// contact.
     pub trace_norm_squared: Option<f64>,
     /// Contact pressure in Pa up to which a step with given pressures has one solution, with the margin, where friction weakens and
     /// the normal law does not bound the pressure; 0: at no pressure.
@@ -33,19 +34,19 @@ pub struct Certificates {
     /// Whether the bound holds only for overstresses up to the yield stress, as with power laws.
     #[serde(skip)]
     pub explicit_bound_follows_stress: bool,
-    /// Step in s below which errors don't grow, however much of the body flows; for the verdict only.
+    /// Step in s below which errors do not grow, however much of the body flows; for the verdict only.
     #[serde(skip)]
     pub flowing_step_bound: Option<f64>,
-    /// Cases that `theta` and `theta_step` do not cover, in words; absent if there are none.
+    /// Descriptions of the cases that `theta` and `theta_step` do not cover; absent if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_covered: Vec<String>,
 }
 
 impl Certificates {
-    /// How far below 1 `theta_step` has to be for steps to count as having one solution: suprema are approached from below.
+    /// Margin by which `theta_step` must be below 1 for the uniqueness of steps, because suprema are approached from below.
     pub const MARGIN: f64 = 1e-3;
 
-    /// Whether `theta_step`, if there is one, says that each step has one solution.
+    /// Whether each step has one solution according to `theta_step`, if it is defined.
     pub fn steps_are_unique(&self) -> bool {
         self.theta_step.is_none_or(|theta| theta < 1.0 - Self::MARGIN)
     }

@@ -3,7 +3,8 @@
 use super::Certificates;
 use crate::fem::{body::Body, effect::Contact};
 
-/// Sentences on effects that depend on the unknown contact pressures, and on effects that may soften the body at the end of a step.
+/// Descriptions of effects that depend on the unknown contact pressures, and of effects that may soften the body at the end of a
+/// step.
 pub(super) fn not_covered<const D: usize, const S: usize>(
     body: &Body<D, S>,
     theta_step: Option<f64>,
@@ -19,7 +20,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     }
     for fall in contacts.iter().filter_map(Contact::decrease_per_pressure) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
-            // Where nothing else falls, theta is proportional to the pressure.
+            // If no other graph decreases, theta is proportional to the pressure.
             let each = match theta_step {
                 Some(0.0) => {
                     let each = (1.0 - Certificates::MARGIN) / bound;

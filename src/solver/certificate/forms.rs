@@ -39,7 +39,7 @@ pub(super) fn add_trace<const D: usize>(
     }
 }
 
-/// `y = F x` with `x` and `y` zero at held components, for a form that adds to nodal forces. Collective.
+/// `y = F x` with `x` and `y` zero at fixed components, for a form that adds to nodal forces. Collective.
 pub(super) fn apply<const D: usize, const S: usize>(
     body: &Body<D, S>,
     x: &mut DistributedVector,
@@ -56,7 +56,7 @@ pub(super) fn apply<const D: usize, const S: usize>(
     clear_fixed_components(body, y)
 }
 
-/// Zeroes the held components.
+/// Sets the fixed components to zero.
 pub(super) fn clear_fixed_components<const D: usize, const S: usize>(
     body: &Body<D, S>,
     y: &mut DistributedVector,

@@ -61,7 +61,7 @@ const SMALL: usize = 10_000;
 const RIGID: f64 = 1e10;
 
 impl Certificates {
-    /// Computes what the body and the scheme, prepared for its step, call for, where no step is longer than `longest` in s.
+    /// Computes the certificates of a body and a scheme that is prepared for its step; no step is longer than `longest` in s.
     /// Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
@@ -119,8 +119,8 @@ impl Certificates {
         Ok(known)
     }
 
-    /// The step at which `theta_step` is below 1 by twice the margin, so that each step up to it has one solution; `None` where
-    /// no step is small enough. Collective.
+    /// The step at which `theta_step` is below 1 by twice the margin, so that each shorter step has one solution; `None` if no step
+    /// is short enough. Collective.
     pub fn unique_step<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,

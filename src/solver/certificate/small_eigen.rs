@@ -1,10 +1,10 @@
-//! The largest eigenvalue of a small symmetric pencil, as subspace iterations need it.
+//! The largest eigenvalue of a small symmetric pencil, for subspace iterations.
 
 /// A symmetric matrix of at most 3 rows.
 pub(super) type Small = [[f64; 3]; 3];
 
-/// Largest `b(y, y) / c(y, y)` over vectors of `n <= 3` components, and the `y` that has it; nothing if `c` is not
-/// positive definite to working accuracy.
+/// Largest `b(y, y) / c(y, y)` over vectors of `n <= 3` components, and its maximiser `y`; `None` if `c` is not positive definite
+/// to working accuracy.
 pub(super) fn largest(b: &Small, c: &Small, n: usize) -> Option<(f64, [f64; 3])> {
     let lower = cholesky(c, n)?;
     let mut m = [[0.0; 3]; 3];

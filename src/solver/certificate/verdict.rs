@@ -1,4 +1,4 @@
-//! What the certificates mean for a run.
+//! The consequences of the certificates for a run.
 
 use super::Certificates;
 use crate::job::Accept;
@@ -6,18 +6,17 @@ use crate::job::Accept;
 /// The outcome.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Verdict {
-    /// One line for each certificate: the number, what it means, what to change.
+    /// One line for each certificate: its value, its meaning, and possible changes.
     pub words: Vec<String>,
-    /// What the user should not overlook.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// Why the run is refused: what is wrong, and what to do.
+    /// Reasons for a refusal of the run: message and advice.
     pub refusals: Vec<(String, String)>,
 }
 
 impl Certificates {
-    /// Holds the certificates against a fixed step of this length. `unique_step` is the largest step with which
-    /// `theta_step` is below 1 by the margin, where it is known; `accepted` is what the job accepts although a certificate speaks
-    /// against it.
+    /// Evaluates the certificates for a fixed step of this length. `unique_step` is the largest step for which `theta_step` is
+    /// below 1 by the margin, if it is known; `accepted` lists the limits that the job may exceed.
     pub fn verdict(&self, step: f64, unique_step: Option<f64>, accepted: &[Accept]) -> Verdict {
         let mut verdict = Verdict::default();
         verdict.words.extend(self.not_covered.iter().map(|words| format!("not covered: {words}")));
@@ -75,7 +74,7 @@ impl Certificates {
         verdict
     }
 
-    /// What is known of the growth of contact pressures with the velocity.
+    /// The verdict on the growth of contact pressures with the velocity.
     fn growth(&self) -> String {
         match (self.growth_constants, &self.unbounded_growth) {
             (Some([rest, slope]), _) => format!(
@@ -88,7 +87,7 @@ impl Certificates {
 }
 
 impl Verdict {
-    /// For a `theta` of a step that is not below 1 by the margin.
+    /// The verdict on a `theta` of a step that is not below 1 by the margin.
     fn uniqueness(&mut self, theta: f64, step: f64, unique_step: Option<f64>, accepted: bool) {
         let found = format!(
             "theta of a step = {} is not below {}: a step of {step} s may have several solutions",

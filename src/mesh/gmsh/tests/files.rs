@@ -1,4 +1,4 @@
-//! What whole files give.
+//! Meshes of complete files.
 
 use super::samples::{SQUARE, Sample, TENT};
 use super::*;

@@ -1,9 +1,9 @@
-//! Every way a file is refused, with the words that say where and why.
+//! All refusals of files, with their positions and messages.
 
 use super::samples::{SQUARE, Sample, TENT};
 use super::*;
 
-/// The refusal of a file must hold all these words.
+/// The refusal of a file must contain all these texts.
 #[track_caller]
 fn refused(text: &str, words: &[&str]) {
     let error = parse(text.as_bytes()).expect_err("this file is wrong").to_string();

@@ -1,4 +1,4 @@
-//! A small file in pieces, to be put together whole or with one piece spoilt.
+//! A small file in sections, which can be combined without change or with one damaged section.
 
 /// The sections of an ASCII file.
 pub struct Sample {
