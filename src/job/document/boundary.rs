@@ -9,10 +9,10 @@ use crate::job::Scalar;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// Names of boundaries.
+    /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
-    /// The components of the displacement that keep their initial values.
+    /// The components of the displacement that keep their initial values: "all", "normal" or a list of axes.
     #[schemars(example = &"all", example = ["x"])]
     pub fix: Fix,
 }
@@ -23,7 +23,7 @@ pub struct Support {
 pub enum Fix {
     /// All components, or the normal one.
     Named(Named),
-    /// A list of axes.
+    /// The components along the listed axes.
     Axes(#[schemars(length(min = 1))] Vec<Axis>),
 }
 
@@ -60,10 +60,11 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
-    /// Names of boundaries.
+    /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["top"])]
     pub on: Vec<String>,
-    /// The vector, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
+    /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
+    /// x, y, z.
     #[schemars(extend("unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
 }
@@ -72,7 +73,8 @@ pub struct Traction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyForce {
-    /// The vector, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
+    /// The force per volume on the body, one component per axis: numbers, or expressions in the time t and the undeformed
+    /// coordinates x, y, z.
     #[schemars(extend("unit" = "N/m^d"), example = [0.0, -9.81])]
     pub value: Vec<Scalar>,
 }
@@ -81,11 +83,12 @@ pub struct BodyForce {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
-    /// The vector, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
+    /// The displacement at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent:
+    /// zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = [0.0, 0.0])]
     pub displacement: Option<Vec<Scalar>>,
-    /// The vector, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
+    /// The velocity at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,

@@ -9,7 +9,7 @@ use crate::laws::contact::{Adhesion, FrictionLaw, Gap, Memory, NormalLaw, Quadra
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// Names of boundaries.
+    /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
     /// The points of a facet at which the contact laws are evaluated.

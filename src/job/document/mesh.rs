@@ -51,7 +51,7 @@ pub enum Partition {
     Auto,
     /// Rank 0 generates the whole mesh, METIS partitions its cells, and rank 0 sends each rank its part.
     Metis,
-    /// Each rank generates the cells of its own box; no rank holds the whole mesh. Use it for large meshes.
+    /// Each rank generates the cells of its own box; no rank holds the whole mesh. Suitable for large meshes.
     Grid,
 }
 

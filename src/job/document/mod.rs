@@ -35,7 +35,7 @@ pub struct Job {
     pub about: Option<About>,
     /// The mesh of the body.
     pub mesh: Mesh,
-    /// The material of all cells that belong to no [[region]].
+    /// The material of all cells that belong to no `[[region]]`.
     pub material: Material,
     /// Parts of the body with another material, named by the physical groups of the mesh.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

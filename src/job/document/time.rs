@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// The time at which the run ends. It starts at time 0.
+    /// The time at which the run ends. Every run starts at time 0.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1.0)]
     pub end: f64,
     /// Length of a step. With [time.adaptive]: length of the first step that is tried.
@@ -18,8 +18,9 @@ pub struct Time {
     /// The time scheme.
     #[serde(default)]
     pub scheme: Scheme,
-    /// Times at which a step must end, in ascending order, above 0 and not after `end`. Use it for sudden changes of loads or gaps.
-    /// A step that would pass such a time is shortened to end there; the next fixed step has its full length again.
+    /// Times at which a step must end, in ascending order, above 0 and not after `end`. Suitable times are those of sudden changes
+    /// of loads or gaps. A step that would pass such a time is shortened to end there; the next fixed step has its full length
+    /// again.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "s"), example = [0.25, 0.6])]
     pub land_on: Vec<f64>,
@@ -69,11 +70,11 @@ schemes! {
     /// prints.
     #[default]
     LaggedEuler = "lagged_euler" { order: 1, is_implicit: false, is_two_step: false }
-    /// First order in time: all stresses are taken at the end of the step. No stability bound on the step. Use it for large steps
-    /// and impacts.
+    /// First order in time: all stresses are taken at the end of the step. The step has no stability bound. Suitable for large
+    /// steps and impacts.
     ImplicitEuler = "implicit_euler" { order: 1, is_implicit: true, is_two_step: false }
-    /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. No stability
-    /// bound on the step. Use it for smooth motions; where velocities jump (impacts, sudden loads), it may overshoot.
+    /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. The step has
+    /// no stability bound. Suitable for smooth motions; where velocities jump (impacts, sudden loads), the solution may overshoot.
     Bdf2 = "bdf2" { order: 2, is_implicit: true, is_two_step: true }
 }
 
@@ -87,7 +88,7 @@ pub struct Adaptive {
     #[serde(default = "adaptive_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
-    /// Shortest step. A step of this length is accepted whatever its error; if it cannot be solved, the run fails.
+    /// Shortest step. A step of this length is accepted with any error; if the step cannot be solved, the run fails.
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1e-5)]
     pub smallest_step: f64,
     /// Longest step. The steps are `step` times powers of two, except those shortened to end at a given time.
@@ -122,7 +123,8 @@ pub struct Solver {
     pub max_newton_iterations: u32,
     /// How the dependence of friction bounds on the contact pressure is solved (laws coulomb and slip_weakening).
     pub friction: FrictionIteration,
-    /// Limits of the certificates that the job may exceed. Without an entry here, such a job is refused.
+    /// Limits of the certificates, which `solver check` prints, that the job may exceed. Without an entry in this list, such a job
+    /// is refused.
     pub accept: Vec<Accept>,
     /// Number of additional start velocities of the contact boundary from which each step is solved, to search for other solutions.
     /// There may be several if theta_step is not below 1 (accepted as "uniqueness"). The log and summary.json give the number of
