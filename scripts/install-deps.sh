@@ -68,7 +68,7 @@ as_root() {
 
 refresh_lists() {
     say "reading the package lists"
-    as_root apt-get update -qq || say "the package lists could not all be read; going on with those that are there" >&2
+    as_root apt-get update -qq || say "the package lists could not all be read; continuing with the available ones" >&2
 }
 
 install_packages() {

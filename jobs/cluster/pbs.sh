@@ -1,5 +1,5 @@
 #!/bin/bash
-# Runs a job under PBS (OpenPBS, PBS Professional) and, when the time limit comes first, submits itself again to go on
+# Runs a job under PBS (OpenPBS, PBS Professional) and, when the time limit comes first, submits itself again to continue
 # from the checkpoint.
 #
 #   qsub -v JOB=job.toml jobs/cluster/pbs.sh
@@ -10,7 +10,7 @@
 #   LAUNCHER   what starts the ranks (default: mpirun; where Open MPI was built without PBS support,
 #              "mpirun --hostfile $PBS_NODEFILE", already expanded)
 #   OUTPUT     the job's output folder (default: what `solver check` says, which sets the problem up once more)
-#   RESTART    yes: go on from a checkpoint (set by the resubmission)
+#   RESTART    yes: continue from a checkpoint (set by the resubmission)
 #   SCRIPT     this file, for the resubmission (default: jobs/cluster/pbs.sh)
 #   MARGIN     seconds before the limit at which the ranks are asked to stop (default: 120)
 #
