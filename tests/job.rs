@@ -238,7 +238,7 @@ fn a_run_may_land_on_its_end() {
 }
 
 #[test]
-fn a_mesh_file_is_held_against_the_job_once_it_is_read() {
+fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
     let names = ["a", "b", "c", "d", "e"];
     let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[] };
     let mut loaded = load(RICH, &[]);

@@ -80,7 +80,7 @@ impl<const D: usize> Topology<D> {
                         neighbours[place(a)] = b[D - 1] >> 3;
                         neighbours[place(b)] = a[D - 1] >> 3;
                     }
-                    _ => return Err(crowded(same, tags)),
+                    _ => return Err(too_many_cells(same, tags)),
                 }
             }
         }
@@ -160,7 +160,7 @@ pub(super) fn sorted<const D: usize>(mut facet: [u32; D]) -> ([u32; D], bool) {
     (facet, odd)
 }
 
-fn crowded<const D: usize>(same: &[[u32; D]], tags: &Tags) -> Error {
+fn too_many_cells<const D: usize>(same: &[[u32; D]], tags: &Tags) -> Error {
     let name = if D == 2 { "edge" } else { "triangle" };
     let cells: Vec<String> = same.iter().take(4).map(|e| tags.cell((e[D - 1] >> 3) as usize)).collect();
     if same.len() == 2 {

@@ -7,7 +7,7 @@ use crate::{
 use std::fs;
 
 #[test]
-fn a_checkpoint_with_a_flipped_bit_or_cut_off_is_passed_over_for_the_one_before() {
+fn a_checkpoint_with_a_flipped_bit_or_cut_off_is_skipped_for_the_one_before() {
     let (straight, case) = undisturbed();
     let newest = straight.path("checkpoint-16.h5");
     let (good, history) = (fs::read(&newest).expect("read"), straight.text("history.csv"));

@@ -40,7 +40,7 @@ fn assert_says_why(outcome: &Outcome, what: &str) {
 }
 
 #[test]
-fn a_file_that_may_not_grow_ends_the_run_with_its_name_and_the_rest_goes_on_to_the_same_result() {
+fn a_file_that_may_not_grow_ends_the_run_with_its_name_and_the_rest_continues_to_the_same_result() {
     let (straight, _kept) = undisturbed();
     let all = [1, 2, 40, 150, 300, 420, 500, 600, 700, 800, 1000, 1200];
     let sample = [2, 420];
@@ -81,7 +81,7 @@ fn on_small_disk(case: &Case, size: &str, script: &str) -> Option<Outcome> {
 const LAUNCH: &str = "mpirun --oversubscribe --bind-to none -n 2";
 
 #[test]
-fn a_full_disk_ends_the_run_and_with_more_room_it_goes_on_to_the_same_result() {
+fn a_full_disk_ends_the_run_and_with_more_room_it_continues_to_the_same_result() {
     let (straight, _kept) = undisturbed();
     let all =
         ["60k", "200k", "300k", "350k", "450k", "500k", "550k", "600k", "700k", "800k", "900k", "1100k"];

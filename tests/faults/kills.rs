@@ -31,7 +31,7 @@ fn kill(case: &Case, running: &mut Running, moment: Moment, whole: Duration, ran
         Moment::Saving => {
             let step = 1 + random.below(16);
             let part = case.folder().join(format!("out/checkpoint-{step}.h5.part"));
-            while !part.exists() && began.elapsed() < 3 * whole && running.goes_on() {
+            while !part.exists() && began.elapsed() < 3 * whole && running.is_running() {
                 std::thread::sleep(Duration::from_micros(200));
             }
             std::thread::sleep(Duration::from_micros(random.below(4000)));
@@ -68,7 +68,7 @@ fn run_and_kill(case: &Case, whole: Duration, random: &mut Random, counts: &mut 
 }
 
 #[test]
-fn a_run_killed_at_any_moment_goes_on_to_the_same_result() {
+fn a_run_killed_at_any_moment_continues_to_the_same_result() {
     let began = Instant::now();
     let (straight, _kept) = undisturbed();
     let whole = began.elapsed();

@@ -116,7 +116,7 @@ pub fn scenario(name: &str, folder: &Path) {
             let left = Results::of(beside(job, &written_by(writers)));
             let steps = left.checkpoints();
             let half = left.path(&format!("checkpoint-{}.h5", steps[steps.len() / 2]));
-            take(&session, job, &gone_on(writers, ranks), &Start::From(half));
+            take(&session, job, &continued(writers, ranks), &Start::From(half));
         }
     }
 }
@@ -132,7 +132,7 @@ fn written_by(ranks: usize) -> String {
     format!("on{ranks}")
 }
 
-fn gone_on(writers: usize, readers: usize) -> String {
+fn continued(writers: usize, readers: usize) -> String {
     format!("from{writers}on{readers}")
 }
 
@@ -168,7 +168,7 @@ fn compare(combination: Combination, job: &Path) {
                 "{}, {}, adaptive {adaptive}, from {writers} to {readers} ranks",
                 EFFECTS[effect].0, SCHEMES[scheme]
             );
-            let went_on = Results::of(beside(job, &gone_on(writers, readers)));
+            let went_on = Results::of(beside(job, &continued(writers, readers)));
             assert_eq!(went_on.checkpoints()[0], last, "{what}: other steps");
             let share = if readers == writers { 0.0 } else { 1e-8 };
             assert_same(&tables(&straight), &tables(&went_on), share, &what);

@@ -245,7 +245,7 @@ fn the_steps_of_a_run_that_died_can_be_read() {
 }
 
 #[test]
-fn a_restarted_run_drops_later_steps_and_goes_on_with_any_number_of_ranks() {
+fn a_restarted_run_drops_later_steps_and_continues_with_any_number_of_ranks() {
     for (before, after) in [(1, 4), (4, 1), (3, 2)] {
         let folder = tempfile::tempdir().expect("folder");
         mpirun::run(before, "fields_write", folder.path());

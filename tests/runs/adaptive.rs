@@ -79,7 +79,7 @@ fn rejected_steps_leave_no_trace() {
 }
 
 #[test]
-fn an_adaptive_run_that_goes_on_is_the_straight_run_to_the_last_bit() {
+fn an_adaptive_run_that_continues_is_the_straight_run_to_the_last_bit() {
     for ranks in [1, 3] {
         let case = adaptive(6, "bdf2", 0.05).set("checkpoint.every", "10").set("checkpoint.keep", "20");
         let straight = case.run(ranks);

@@ -78,7 +78,7 @@ impl Submission {
 }
 
 #[test]
-fn a_requeued_job_goes_on_from_the_folder_that_it_names_however_it_spells_it() {
+fn a_requeued_job_continues_from_the_folder_that_it_names_however_it_spells_it() {
     for (before, behind, option, folder) in SPELLINGS {
         let submission = Submission::new(before, behind);
         let mut arguments = vec!["job.toml"];
@@ -104,7 +104,7 @@ fn a_requeued_job_goes_on_from_the_folder_that_it_names_however_it_spells_it() {
 }
 
 #[test]
-fn a_job_that_is_submitted_to_pbs_again_goes_on_from_the_folder_that_it_names() {
+fn a_job_that_is_submitted_to_pbs_again_continues_from_the_folder_that_it_names() {
     for (before, behind, _, folder) in SPELLINGS.into_iter().filter(|spelling| spelling.2.is_none()) {
         let submission = Submission::new(before, behind);
         let here = submission.case.folder().display().to_string();

@@ -131,7 +131,7 @@ fn slip_weakening_is_certified_up_to_a_pressure_or_with_the_pressure_of_the_law(
 }
 
 #[test]
-fn a_run_is_held_against_the_pressure_that_slip_weakening_is_certified_for() {
+fn a_run_is_compared_with_the_pressure_that_slip_weakening_is_certified_for() {
     for (step, beyond) in [("0.01", false), ("0.25", true)] {
         let case = Case::of("slip_weakening_block").set("time.step", step).set("time.end", "0.5");
         let results = case.run(2);

@@ -155,7 +155,7 @@ fn friction_and_another_contact_share_an_edge() {
 }
 
 #[test]
-fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_goes_on_to_the_last_bit() {
+fn a_belt_pulls_a_block_along_until_it_rides_and_a_restart_continues_to_the_last_bit() {
     let make = || Case::of("conveyor_belt").set("output.fields", "{ every = 10 }");
     let straight = make().run_and_keep(2);
     let rubbing = straight.results().table("profiles.csv");

@@ -167,7 +167,7 @@ impl Running {
 
     /// Whether the run has not ended; for the tests of faults.
     #[allow(dead_code)]
-    pub fn goes_on(&mut self) -> bool {
+    pub fn is_running(&mut self) -> bool {
         self.launcher.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
@@ -176,7 +176,7 @@ impl Running {
     #[allow(dead_code)]
     pub fn end_launcher_without_ranks(&mut self) -> bool {
         let mut deserted = Instant::now();
-        while self.goes_on() {
+        while self.is_running() {
             if self.processes().into_iter().any(runs_solver) {
                 deserted = Instant::now();
             }

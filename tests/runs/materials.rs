@@ -110,7 +110,7 @@ fn accumulated_strain_is_kept_where_the_material_hardens_only() {
 }
 
 #[test]
-fn a_hardening_run_that_goes_on_is_the_straight_run_to_the_last_bit() {
+fn a_hardening_run_that_continues_is_the_straight_run_to_the_last_bit() {
     let make = || square("plane_strain").set(LAW, LAWS[2].1).set("checkpoint.every", "8");
     let straight = make();
     let straight = (straight.run(2), straight);

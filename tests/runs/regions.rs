@@ -74,7 +74,7 @@ fn an_effect_may_be_in_one_region_only() {
 }
 
 #[test]
-fn a_run_with_regions_goes_on_on_another_number_of_ranks() {
+fn a_run_with_regions_continues_on_another_number_of_ranks() {
     let straight = wheel().set("solver.tolerance", "1e-13");
     let straight = (straight.run(1), straight);
     for (writers, readers) in [(1, 2), (2, 3), (3, 1)] {

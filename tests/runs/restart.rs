@@ -21,7 +21,7 @@ fn interrupt(case: &Case, ranks: usize) {
 }
 
 #[track_caller]
-fn go_on(case: &Case, ranks: usize) -> Results {
+fn continue_run(case: &Case, ranks: usize) -> Results {
     case.run_with(ranks, &["--restart"])
         .expect(0)
         .says("continuing from")
@@ -75,7 +75,7 @@ fn compare_with_straight(make: impl Fn() -> Case, ranks: usize, what: &str) {
     let (straight, stopped) = (make(), make());
     straight.run(ranks);
     interrupt(&stopped, ranks);
-    assert_identical(&straight.results(), &go_on(&stopped, ranks), &what);
+    assert_identical(&straight.results(), &continue_run(&stopped, ranks), &what);
 }
 
 #[test]
@@ -142,9 +142,9 @@ fn a_restarted_run_with_damage_and_adhesion_is_the_straight_run_to_the_last_bit(
 }
 
 #[test]
-fn a_run_with_damage_and_adhesion_goes_on_on_any_number_of_ranks() {
+fn a_run_with_damage_and_adhesion_continues_on_any_number_of_ranks() {
     for writers in [1, 3] {
-        go_on_on_other_ranks(weakened(), writers, &["damage", "bonding"]);
+        continue_on_other_ranks(weakened(), writers, &["damage", "bonding"]);
     }
 }
 
@@ -154,11 +154,11 @@ fn remembering() -> Case {
 }
 
 #[test]
-fn a_run_with_contact_memory_goes_on_to_the_last_bit_and_on_any_number_of_ranks() {
+fn a_run_with_contact_memory_continues_to_the_last_bit_and_on_any_number_of_ranks() {
     for ranks in [1, 2] {
         compare_with_straight(remembering, ranks, "contact memory");
     }
-    go_on_on_other_ranks(remembering(), 2, &["memory_pressure"]);
+    continue_on_other_ranks(remembering(), 2, &["memory_pressure"]);
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
 }
 
 /// Saves on some number of ranks and continues on 1, 2, 3 and 4; the last state must be that of an uninterrupted run.
-fn go_on_on_other_ranks(case: Case, writers: usize, histories: &[&str]) {
+fn continue_on_other_ranks(case: Case, writers: usize, histories: &[&str]) {
     // With a tighter tolerance than the default, so that the residual does not hide errors of the restart.
     let case = case.set("solver.tolerance", "1e-13");
     case.run_with(1, &["--set", "output.folder='straight'"]).expect(0);
@@ -225,30 +225,30 @@ fn go_on_on_other_ranks(case: Case, writers: usize, histories: &[&str]) {
 }
 
 #[test]
-fn a_run_saved_on_one_rank_goes_on_on_any_number() {
-    go_on_on_other_ranks(saving(), 1, &[]);
+fn a_run_saved_on_one_rank_continues_on_any_number() {
+    continue_on_other_ranks(saving(), 1, &[]);
 }
 
 #[test]
-fn a_run_saved_on_two_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(saving(), 2, &[]);
+fn a_run_saved_on_two_ranks_continues_on_any_number() {
+    continue_on_other_ranks(saving(), 2, &[]);
 }
 
 #[test]
-fn a_run_saved_on_three_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(saving(), 3, &[]);
+fn a_run_saved_on_three_ranks_continues_on_any_number() {
+    continue_on_other_ranks(saving(), 3, &[]);
 }
 
 #[test]
-fn a_run_of_each_scheme_saved_on_three_ranks_goes_on_on_any_number() {
+fn a_run_of_each_scheme_saved_on_three_ranks_continues_on_any_number() {
     for scheme in ["'implicit_euler'", "'bdf2'"] {
-        go_on_on_other_ranks(saving().set("time.scheme", scheme), 3, &[]);
+        continue_on_other_ranks(saving().set("time.scheme", scheme), 3, &[]);
     }
 }
 
 #[test]
-fn a_run_saved_on_four_ranks_goes_on_on_any_number() {
-    go_on_on_other_ranks(saving(), 4, &[]);
+fn a_run_saved_on_four_ranks_continues_on_any_number() {
+    continue_on_other_ranks(saving(), 4, &[]);
 }
 
 /// Continues from a checkpoint without taking a step, so that the restored state is written to the field file.
@@ -289,7 +289,7 @@ fn flip_a_bit(file: &Path) {
 }
 
 #[test]
-fn a_damaged_checkpoint_is_passed_over_with_a_warning() {
+fn a_damaged_checkpoint_is_skipped_with_a_warning() {
     let straight = saving();
     let straight = (straight.run(2), straight);
     for damage in [truncate, flip_a_bit] {
@@ -326,7 +326,7 @@ fn a_run_is_refused_where_there_is_no_checkpoint() {
 }
 
 /// Interrupts the run and continues with another value of a key.
-fn go_on_with(change: &str) -> (Outcome, Case) {
+fn continue_with(change: &str) -> (Outcome, Case) {
     let case = saving();
     interrupt(&case, 1);
     (case.run_with(2, &["--restart", "--set", change]), case)
@@ -341,7 +341,7 @@ fn a_checkpoint_of_another_problem_is_refused_and_the_key_is_named() {
         ("mesh.rectangle.diagonal=left", "mesh.rectangle.diagonal"),
         ("traction.0.value=[0, '-10*t']", "traction.0.value"),
     ] {
-        go_on_with(change).0.expect(2).says("belongs to another problem").says(key);
+        continue_with(change).0.expect(2).says("belongs to another problem").says(key);
     }
 }
 
@@ -355,7 +355,7 @@ fn what_is_written_and_how_it_is_solved_may_change_on_the_way() {
         "solver.preconditioner=gamg",
         "about.title=another",
     ] {
-        let (outcome, case) = go_on_with(change);
+        let (outcome, case) = continue_with(change);
         outcome.expect(0);
         assert_eq!(case.results().number("steps"), 16.0, "{change}");
         assert_eq!(case.results().table("history.csv").rows.len(), 16, "{change}");
@@ -376,7 +376,7 @@ fn a_completed_run_that_is_restarted_has_nothing_left_to_do() {
 }
 
 #[test]
-fn a_completed_run_goes_on_to_a_later_end() {
+fn a_completed_run_continues_to_a_later_end() {
     let longer = saving().set("time.end", "1.5");
     let longer = (longer.run(2), longer);
     let case = saving();

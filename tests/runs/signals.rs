@@ -38,7 +38,7 @@ fn assert_saved(results: &Results, reason: &str) -> u64 {
 }
 
 /// Continues for a few steps and compares the result with an uninterrupted run.
-fn assert_goes_on(case: &Case, ranks: usize, steps: u64) {
+fn assert_continues(case: &Case, ranks: usize, steps: u64) {
     let end = format!("time.end={}", (steps + 8) as f64 / 1024.0);
     case.run_with(ranks, &["--restart", "--set", &end]).expect(0);
     case.run_with(ranks, &["--set", "output.folder='straight'", "--set", &end]).expect(0);
@@ -49,26 +49,26 @@ fn assert_goes_on(case: &Case, ranks: usize, steps: u64) {
     assert_eq!(case.results().summary()["status"], "completed");
 }
 
-fn stop_and_go_on(ranks: usize, signal: &str, target: Target) {
+fn stop_and_continue(ranks: usize, signal: &str, target: Target) {
     let case = endless();
     stop(&case, ranks, signal, target).expect(3);
     let steps = assert_saved(&case.results(), &format!("SIG{signal}"));
-    assert_goes_on(&case, ranks, steps);
+    assert_continues(&case, ranks, steps);
 }
 
 #[test]
-fn a_run_that_a_batch_system_warns_saves_its_state_and_goes_on() {
-    stop_and_go_on(2, "USR1", Target::Launcher);
+fn a_run_that_a_batch_system_warns_saves_its_state_and_continues() {
+    stop_and_continue(2, "USR1", Target::Launcher);
 }
 
 #[test]
 fn a_signal_to_one_rank_stops_all_of_them() {
-    stop_and_go_on(3, "TERM", Target::OneRank);
-    stop_and_go_on(1, "INT", Target::OneRank);
+    stop_and_continue(3, "TERM", Target::OneRank);
+    stop_and_continue(1, "INT", Target::OneRank);
 }
 
 #[test]
-fn a_run_that_is_killed_goes_on_from_its_last_checkpoint() {
+fn a_run_that_is_killed_continues_from_its_last_checkpoint() {
     for (signal, target) in [("TERM", Target::Launcher), ("INT", Target::Launcher), ("KILL", Target::OneRank)]
     {
         let case = endless().set("checkpoint.every", "8");
@@ -76,12 +76,12 @@ fn a_run_that_is_killed_goes_on_from_its_last_checkpoint() {
         assert_ne!(outcome.code, 0);
         let steps = case.results().checkpoints()[0];
         assert!((24..8192).contains(&steps), "{steps}");
-        assert_goes_on(&case, 2, steps);
+        assert_continues(&case, 2, steps);
     }
 }
 
 #[test]
-fn a_run_stops_before_its_wall_time_is_over_and_goes_on() {
+fn a_run_stops_before_its_wall_time_is_over_and_continues() {
     let case = endless().set("time.end", "256").set("checkpoint.wall_limit", "1.5");
     case.run_with(2, &[]).expect(3).says("stopping on the wall-time limit of 1.5 s; continue with --restart");
     let steps = case.results().checkpoints()[0];

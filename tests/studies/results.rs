@@ -116,7 +116,7 @@ fn failed_runs_are_listed_with_their_words_and_the_others_compared() {
 }
 
 #[test]
-fn a_looser_tolerance_is_held_against_the_tightest() {
+fn a_looser_tolerance_is_compared_with_the_tightest() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
     let scene = Scene::new("", "");
     let study = format!(

@@ -141,7 +141,7 @@ fn grading_above_one_concentrates_cells_at_the_low_end() {
 }
 
 #[test]
-fn cells_crowd_toward_the_corners_that_are_asked_for() {
+fn cells_are_smaller_near_the_corners_that_are_asked_for() {
     let square = |cells, power| {
         let grading = [Grading::from(power), Grading { power, toward: Toward::Both }];
         rectangle([1.0, 1.0], [cells; 2], Diagonal::Right, grading).expect("mesh")

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_last_row_is_passed_over_and_any_other_fault_is_named_with_its_line() {
+    fn a_cut_last_row_is_skipped_and_any_other_fault_is_named_with_its_line() {
         assert_eq!(Table::parse("step,time\n1,0.5\n2", "").expect("table").len(), 1);
         let fault = Table::parse("step,time\n1,half\n2,1\n", "").expect_err("fault");
         assert!(fault.contains("line 2") && fault.contains("half"), "{fault}");

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_refined_in_mesh_and_step_are_held_against_the_one_before() {
+    fn runs_refined_in_mesh_and_step_are_compared_with_the_one_before() {
         let sizes = [size("a", 4.0, 0.5), size("a", 8.0, 0.25), None, size("a", 16.0, 0.0625)];
         let found = refinements(&sizes);
         assert_eq!(found[0], []);

@@ -179,7 +179,7 @@ fn comments_and_foreign_sections_are_skipped() {
 }
 
 #[test]
-fn parametric_coordinates_are_passed_over() {
+fn parametric_coordinates_are_skipped() {
     let sample = Sample {
         nodes: "2 5 1 9\n2 1 1 4\n1\n2\n3\n4\n0 0 0 5 5\n1 0 0 5 5\n1 1 0 5 5\n0 1 0 5 5\n0 1 1 1\n9\n7 7 7\n",
         ..SQUARE
