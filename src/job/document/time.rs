@@ -115,8 +115,8 @@ pub struct Solver {
     pub method: Method,
     /// The preconditioner of the linear systems.
     pub preconditioner: Preconditioner,
-    /// The precision of the matrix factor for steps with contact, where each rank factors the whole matrix: on one rank, or with
-    /// preconditioner cholesky and at most 50,000 unknowns.
+    /// The precision of the matrix factor for steps with contact. It applies with preconditioner cholesky on one rank, and on
+    /// several ranks with at most 50,000 velocity components; otherwise factors are in double precision.
     pub factor_precision: FactorPrecision,
     /// Number of Newton iterations after which a step fails.
     #[schemars(range(min = 1))]
@@ -169,8 +169,8 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioner {
-    /// "cholesky" or "gamg", whichever is estimated to be faster for the problem size, the number of steps and the number of ranks.
-    /// The log gives the reason.
+    /// "gamg" if the factor would take more than 4 GB of memory, or on several ranks with more than 50,000 velocity components;
+    /// otherwise "cholesky" or "gamg", whichever is estimated to be faster. The log gives the reason.
     #[default]
     Auto,
     /// Sparse Cholesky factorisation. Fast if the factor fits in memory and serves many steps.
@@ -181,7 +181,7 @@ pub enum Preconditioner {
     Boomeramg,
 }
 
-/// The precision of the matrix factor for steps with contact, where each rank factors the whole matrix.
+/// The precision of the matrix factor for steps with contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FactorPrecision {

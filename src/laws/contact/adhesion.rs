@@ -86,7 +86,7 @@ impl Adhesion {
         let most = (self.stiffness + self.tangential_stiffness()) * length * length;
         (most <= energy && most > 0.0).then(|| {
             format!(
-                "no bond ever breaks: the elastic energy of bonds is at most {most} J/m^2, their energy of adhesion {energy}"
+                "no bond ever breaks: the driving force of debonding is at most {most} J/m^2 and never exceeds the energy of adhesion {energy} J/m^2"
             )
         })
     }
