@@ -59,7 +59,10 @@ impl<const D: usize> FieldOutput<D> {
             Ok(resumed) => resumed,
             Err(error) => {
                 let aside = folder.join("fields.damaged.vtkhdf");
-                log.warning(format!("{error}; the file is kept as {}, and a new one is started", aside.display()));
+                log.warning(format!(
+                    "{error}; the file is kept as {}, and a new one is started",
+                    aside.display()
+                ));
                 let moved = || std::fs::rename(&path, &aside).map_err(|e| Error::unwritable(&aside, e));
                 session.on_first(moved)?;
                 create()?
