@@ -95,8 +95,8 @@ bench: deps
 	cargo bench --locked --bench output -- $(ARGS)
 	cargo --config "target.'cfg(all())'.runner='mpirun -n 2'" bench --locked --bench output -- $(ARGS)
 
-# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' holds them against another program,
-# --write puts the tables into docs/speed.md.
+# Whole runs against the memory bandwidth of this machine; ARGS='--peer "COMMAND"' compares them with another program,
+# '--ranks 2' with two processes; --write puts the tables into docs/speed.md and docs/scaling.md.
 bench-runs: deps
 	cargo bench --locked --bench whole_runs -- $(ARGS)
 

@@ -1,16 +1,18 @@
 //! Whole runs against the memory bandwidth of the same machine:
-//! `cargo bench --bench whole_runs -- [--quick] [--peer "COMMAND"] [--write]`.
+//! `cargo bench --bench whole_runs -- [--quick] [--ranks N] [--peer "COMMAND"] [--write]`.
 //!
 //! Runs the solver on the problem of Wang and Cheng (2022) in the plane and in space, on one process, and takes seconds and bytes
 //! by phase from `summary.json`. The bytes are those that have to be moved at the least if nothing stays in cache; a triad before
 //! and after each run tells what the memory gives. Their ratio is how near to the memory bound a run is. Steps are solved to a
 //! residual of 1e-8 of the forces.
 //!
-//! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps
-//! and the preconditioner (cholesky or gamg), and prints the seconds that a step took as its last word. Its whole run is timed and its largest resident memory read
+//! With `--ranks N` the same problems are run on one process and on N instead, in turn, three times, and the medians compared.
+//!
+//! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps,
+//! the preconditioner (cholesky or gamg) and the number of processes, and prints the seconds that a step took as its last word. Its whole run is timed and its largest resident memory read
 //! from outside.
 //!
-//! `--write` puts the tables into docs/speed.md.
+//! `--write` puts the tables into docs/speed.md, those of ranks into docs/scaling.md.
 
 mod table;
 mod triad;
@@ -64,10 +66,25 @@ const CASES: [Case; 9] = [
     case(3, 32, 16, "gamg", false),
 ];
 
+/// Problems to compare on one process and on several.
+const ON_RANKS: [Case; 6] = [
+    case(2, 128, 64, "auto", true),
+    case(2, 256, 32, "auto", true),
+    case(2, 512, 16, "auto", false),
+    case(3, 16, 16, "auto", true),
+    case(3, 32, 16, "auto", false),
+    case(3, 48, 16, "auto", false),
+];
+/// How often each is run.
+const REPETITIONS: usize = 3;
+/// Where the table of ranks stands.
+const RANKS_PAGE: &str = "docs/scaling.md";
+
 /// What the command line asks for.
 #[derive(Default)]
 struct Wanted {
     quick: bool,
+    ranks: Option<u32>,
     peer: Option<String>,
     write: bool,
 }
@@ -81,15 +98,19 @@ fn wanted() -> Wanted {
             "--bench" => {}
             "--quick" => wanted.quick = true,
             "--write" => wanted.write = true,
+            "--ranks" => {
+                let count = words.next().and_then(|word| word.parse().ok()).filter(|count| *count > 1);
+                wanted.ranks = Some(count.expect("a number above 1 behind --ranks"));
+            }
             "--peer" => wanted.peer = Some(words.next().expect("a command behind --peer")),
-            other => panic!("{other}: known are --quick, --write and --peer \"COMMAND\""),
+            other => panic!("{other}: known are --quick, --write, --ranks N and --peer \"COMMAND\""),
         }
     }
     wanted
 }
 
-/// Runs the solver; gives its `summary.json`.
-fn run(case: &Case) -> Value {
+/// Runs the solver on this many processes; gives its `summary.json`.
+fn run(case: &Case, ranks: u32) -> Value {
     let (job, cells) = match case.dimension {
         2 => ("wang_cheng_2022.toml", format!("mesh.rectangle.cells=[{0},{0}]", case.cells)),
         _ => ("wang_cheng_cube.toml", format!("mesh.box.cells=[{0},{0},{0}]", case.cells)),
@@ -105,7 +126,12 @@ fn run(case: &Case) -> Value {
         "output.fields={every=1000000}".into(),
         "checkpoint.every=1000000".into(),
     ];
-    let output = Command::new(env!("CARGO_BIN_EXE_solver"))
+    let solver = env!("CARGO_BIN_EXE_solver");
+    let mut command = Command::new(if ranks == 1 { solver } else { "mpirun" });
+    if ranks > 1 {
+        command.args(["-n", &ranks.to_string(), solver]);
+    }
+    let output = command
         .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job))
         .args(settings.iter().flat_map(|setting| ["--set", setting]))
         .output()
@@ -124,8 +150,9 @@ struct Cost {
 }
 
 /// What another program costs.
-fn peer(command: &str, case: &Case, preconditioner: &str) -> Cost {
-    let words = format!("exec {command} {} {} {} {preconditioner}", case.dimension, case.cells, case.steps);
+fn peer(command: &str, case: &Case, preconditioner: &str, ranks: u32) -> Cost {
+    let Case { dimension, cells, steps, .. } = case;
+    let words = format!("exec {command} {dimension} {cells} {steps} {preconditioner} {ranks}");
     let start = Instant::now();
     let mut child = Command::new("sh").args(["-c", &words]).stdout(Stdio::piped()).spawn().expect("sh");
     let status = format!("/proc/{}/status", child.id());
@@ -169,8 +196,84 @@ fn row(head: &str, phase: &str, steps: f64, seconds: f64, bytes: Option<f64>, me
     format!("{head:<50} {phase:<8} {time:>9.2} {counted}")
 }
 
+/// What a run of the solver has cost.
+fn cost(case: &Case, summary: &Value) -> Cost {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let step: f64 = PHASES.iter().map(|phase| number(&summary["wall_seconds"][phase])).sum();
+    Cost {
+        step: step / f64::from(case.steps),
+        run: number(&summary["wall_seconds"]["total"]),
+        memory: number(&summary["peak_memory_bytes"]),
+    }
+}
+
+/// The problem of a run, in words.
+fn head(case: &Case, summary: &Value) -> String {
+    let shape = if case.dimension == 2 { "square" } else { "cube" };
+    let preconditioner = summary["preconditioner"].as_str().unwrap_or("?");
+    let single = if summary["factor_precision"] == "single" { " single" } else { "" };
+    format!("{shape} {}, {}, {preconditioner}{single}, {}", case.cells, summary["unknowns"], case.steps)
+}
+
+/// The median of each of these costs.
+fn median(costs: &[Cost]) -> Cost {
+    let of = |pick: fn(&Cost) -> f64| {
+        let mut values: Vec<f64> = costs.iter().map(pick).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    Cost { step: of(|cost| cost.step), run: of(|cost| cost.run), memory: of(|cost| cost.memory) }
+}
+
+/// Compares runs on one process and on several, and on several with those of another program.
+fn on_ranks(wanted: &Wanted, ranks: u32) {
+    let mut triad = Triad::new();
+    let bandwidth = BYTES as f64 / fastest(&mut || triad.run());
+    let peer_head = if wanted.peer.is_some() {
+        format!(" ms a step of the other on {ranks} | ratio |")
+    } else {
+        String::new()
+    };
+    let mut table = format!(
+        "| problem, unknowns, preconditioner, steps | ms a step: 1, {ranks} | ratio | whole run, s: 1, {ranks} | ratio | memory of \
+         all ranks, MB: 1, {ranks} | ratio |{peer_head}\n|---|---|---|---|---|---|---|{}\n",
+        if wanted.peer.is_some() { "---|---|" } else { "" }
+    );
+    print!("{table}");
+    for case in ON_RANKS.iter().filter(|case| case.quick || !wanted.quick) {
+        let mut costs = [Vec::new(), Vec::new(), Vec::new()];
+        let mut words = String::new();
+        for _ in 0..REPETITIONS {
+            for (count, costs) in [1, ranks].into_iter().zip(&mut costs) {
+                let summary = run(case, count);
+                costs.push(cost(case, &summary));
+                words = head(case, &summary);
+            }
+            if let Some(command) = &wanted.peer {
+                costs[2].push(peer(command, case, "cholesky", ranks));
+            }
+        }
+        let [one, several] = [&costs[0], &costs[1]].map(|costs| median(costs));
+        let mut line = against(&words, one, several);
+        if wanted.peer.is_some() {
+            let other = median(&costs[2]).step;
+            write!(line, " {:.1} | {:.2} |", 1e3 * other, several.step / other).expect("text");
+        }
+        println!("{line}");
+        writeln!(table, "{line}").expect("text");
+    }
+    if wanted.write {
+        let command = format!("make bench-runs ARGS='--ranks {ranks} --write'");
+        table::write(RANKS_PAGE, "ranks", &command, bandwidth, &table);
+    }
+}
+
 fn main() {
     let wanted = wanted();
+    if let Some(ranks) = wanted.ranks {
+        on_ranks(&wanted, ranks);
+        return;
+    }
     let mut triad = Triad::new();
     let mut memory = || BYTES as f64 / fastest(&mut || triad.run());
     let (mut phases, mut peers, mut bandwidth) = (String::new(), String::new(), 0.0_f64);
@@ -184,15 +287,12 @@ fn main() {
     ));
     for case in CASES.iter().filter(|case| case.quick || !wanted.quick) {
         let before = memory();
-        let summary = run(case);
+        let summary = run(case, 1);
         let memory = before.max(memory());
         bandwidth = bandwidth.max(memory);
         let steps = f64::from(case.steps);
-        let shape = if case.dimension == 2 { "square" } else { "cube" };
         let preconditioner = summary["preconditioner"].as_str().unwrap_or("?");
-        let single = if summary["factor_precision"] == "single" { " single" } else { "" };
-        let head =
-            format!("{shape} {}, {}, {preconditioner}{single}, {steps}", case.cells, summary["unknowns"]);
+        let head = head(case, &summary);
         let (mut seconds, mut bytes) = (0.0, Some(0.0));
         for (at, phase) in PHASES.iter().enumerate() {
             let spent = summary["wall_seconds"][phase].as_f64().expect("seconds");
@@ -204,13 +304,7 @@ fn main() {
         let triad = format!("  triad {:.1} GB/s", memory / 1e9);
         tell(row(&triad, "step", steps, seconds, bytes, memory));
         if let Some(command) = &wanted.peer {
-            let number = |value: &Value| value.as_f64().expect("a number");
-            let this = Cost {
-                step: seconds / steps,
-                run: number(&summary["wall_seconds"]["total"]),
-                memory: number(&summary["peak_memory_bytes"]),
-            };
-            let line = against(&head, peer(command, case, preconditioner), this);
+            let line = against(&head, peer(command, case, preconditioner, 1), cost(case, &summary));
             println!("{line}");
             writeln!(peers, "{line}").expect("text");
         }

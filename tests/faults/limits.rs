@@ -80,7 +80,7 @@ fn a_margin_longer_than_what_is_left_ends_the_run_after_a_step() {
 fn an_end_that_is_over_or_no_time_stops_nothing() {
     let short = || endless().set("time.end", "0.01");
     let outcome = with_end(&short(), &(now() - 1000).to_string(), 0).expect(0);
-    outcome.says("warning: SLURM_JOB_END_TIME is over");
+    outcome.says("s in the past and is ignored");
     with_end(&short(), "UNLIMITED", 0).expect(0).says("completed");
 }
 

@@ -2,12 +2,12 @@ use super::{
     DistributedVector, Matrix, c_string, check, index,
     levels::{self, Level},
     library::communicator,
-    own_preconditioner::Own,
+    own_preconditioner::{self, Own, OwnPreconditioner},
     reference::Reference,
     sys,
 };
 use crate::error::Result;
-use std::{ffi::CStr, ptr};
+use std::{cell::RefCell, ffi::CStr, ptr};
 
 /// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
 /// before it decreases, and the condition number of a body supported by contact alone is large.
@@ -137,6 +137,17 @@ impl Ksp {
         Ok(())
     }
 
+    /// Uses a preconditioner that is not PETSc's, unless options of the user choose another.
+    pub fn precondition_by(&mut self, own: Box<dyn OwnPreconditioner>) -> Result<()> {
+        self.set_preconditioner("shell", None)?;
+        let own = Box::new(RefCell::new(own));
+        // SAFETY: a shell preconditioner; its context stays in its box for as long as this solver and those that share its
+        // preconditioner.
+        unsafe { own_preconditioner::attach(self.preconditioner()?, &own)? };
+        self.own = Some(own);
+        Ok(())
+    }
+
     /// Stops at `relative * |b|` or at `absolute`, whichever is larger, or after this many iterations.
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         let iterations = index(iterations, "linear iterations")?;
@@ -169,8 +180,11 @@ impl Ksp {
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
         levels::give_back(pc, &self.levels)?;
-        if is_type(pc, c"shell")? {
-            self.set_up_own()?;
+        if let Some(own) = &self.own
+            && is_type(pc, c"shell")?
+        {
+            // SAFETY: the preconditioner of this solver, whose matrices are set.
+            unsafe { own_preconditioner::set_up(pc, own)? };
         }
         // SAFETY: live object.
         check(unsafe { sys::KSPSetUp(self.raw.get()) })?;
@@ -222,7 +236,7 @@ impl Ksp {
 }
 
 /// Whether a preconditioner has this type.
-pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
+fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
     let mut kind = ptr::null();
     // SAFETY: live preconditioner; PETSc's names are NUL-terminated and live as long as their object.
     unsafe {

@@ -1,7 +1,7 @@
 //! Preconditioners that are not PETSc's.
 
 use super::{
-    BlockRows, DistributedVector, Ksp,
+    BlockRows, DistributedVector,
     callback::{USER_ERROR, context_of_preconditioner},
     check,
     reduced::block_rows,
@@ -26,35 +26,34 @@ pub trait OwnPreconditioner: Debug {
 /// The context of a shell preconditioner.
 pub(super) type Own = RefCell<Box<dyn OwnPreconditioner>>;
 
-impl Ksp {
-    /// Uses this preconditioner, unless options of the user choose another.
-    pub fn precondition_by(&mut self, own: Box<dyn OwnPreconditioner>) -> Result<()> {
-        self.set_preconditioner("shell", None)?;
-        let own = Box::new(RefCell::new(own));
-        let context = ptr::from_ref::<Own>(&own).cast_mut().cast();
-        self.own = Some(own);
-        // SAFETY: the context stays in its box for as long as this solver and those that share its preconditioner.
-        unsafe {
-            check(sys::PCShellSetContext(self.preconditioner()?, context))?;
-            check(sys::PCShellSetApply(self.preconditioner()?, Some(apply)))
-        }
-    }
-
-    /// Prepares the own preconditioner, if there is one, for the matrix that PETSc would build one from. Collective.
-    pub(super) fn set_up_own(&self) -> Result<()> {
-        let Some(own) = &self.own else { return Ok(()) };
-        let mut raw = ptr::null_mut();
-        // SAFETY: live objects; PETSc counts a reference to the matrix, which is given back.
-        let matrix = unsafe {
-            check(sys::PCGetOperators(self.preconditioner()?, ptr::null_mut(), &mut raw))?;
-            Reference::to(raw)?
-        };
-        own.borrow_mut().set_up(&block_rows(matrix.get())?)
+/// Lets a shell preconditioner apply this one.
+///
+/// # Safety
+/// `pc` is a live shell preconditioner; `own` is neither moved nor dropped while it is applied.
+pub(super) unsafe fn attach(pc: sys::PC, own: &Own) -> Result<()> {
+    // SAFETY: the caller's promises.
+    unsafe {
+        check(sys::PCShellSetContext(pc, ptr::from_ref(own).cast_mut().cast()))?;
+        check(sys::PCShellSetApply(pc, Some(apply)))
     }
 }
 
+/// Prepares the preconditioner for the matrix from which PETSc would build one. Collective.
+///
+/// # Safety
+/// `pc` is a live preconditioner with matrices.
+pub(super) unsafe fn set_up(pc: sys::PC, own: &Own) -> Result<()> {
+    let mut raw = ptr::null_mut();
+    // SAFETY: the caller's promise; the matrix is shared while its rows are read.
+    let matrix = unsafe {
+        check(sys::PCGetOperators(pc, ptr::null_mut(), &mut raw))?;
+        Reference::to(raw)?
+    };
+    own.borrow_mut().set_up(&block_rows(matrix.get())?)
+}
+
 unsafe extern "C" fn apply(pc: sys::PC, r: sys::Vec, z: sys::Vec) -> sys::PetscErrorCode {
-    // SAFETY: a live shell preconditioner, whose context `precondition_by` set; PETSc's vectors live for the call and differ.
+    // SAFETY: a live shell preconditioner, whose context `attach` set; PETSc's vectors live for the call and differ.
     let (own, r, z) = unsafe {
         let own = context_of_preconditioner(pc).cast::<Own>().as_ref();
         (own, DistributedVector::view(r), DistributedVector::view(z))

@@ -45,17 +45,6 @@ impl<'a> Supernodes<'a> {
     pub(super) fn panel(self, node: usize) -> Range<usize> {
         self.values_at[node] as usize..self.values_at[node + 1] as usize
     }
-
-    /// Number of entries of the factor, without those above the diagonal in the panels, and sum of the rows of all supernodes.
-    pub(super) fn counts(self) -> [u64; 2] {
-        let mut counts = [0; 2];
-        for node in 0..self.len() {
-            let (columns, rows) = (self.columns(node).len() as u64, self.rows(node).len() as u64);
-            counts[0] += columns * rows - columns * (columns - 1) / 2;
-            counts[1] += rows;
-        }
-        counts
-    }
 }
 
 /// Whether these unknowns are distinct and below `size`.

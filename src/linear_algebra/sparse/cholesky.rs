@@ -1,18 +1,16 @@
 use super::{
-    BlockRows,
-    analysis::Analysis,
-    double_factor::DoubleFactor,
-    lower_half::Lower,
-    supernodal::{SupernodalFactor, last_columns},
+    BlockRows, analysis::Analysis, lower_half::Lower, panel::not_positive_definite,
+    supernodal::SupernodalFactor,
 };
 use crate::error::{Error, Result};
 
-/// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last: by CHOLMOD, or
-/// in single precision after CHOLMOD's symbolic analysis.
+/// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last, or not at all: in
+/// double or single precision after CHOLMOD's symbolic analysis.
 ///
 /// A solve is a [`forward`](Self::forward) and a [`backward`](Self::backward) substitution; between them the part of the vector that
 /// belongs to the last unknowns can be read and replaced. PETSc's own interface to CHOLMOD offers neither separate substitutions
-/// nor a given order of elimination.
+/// nor a given order of elimination. Where the last unknowns `l` are not eliminated, `K_ff = L L^T` is the factor of the others, `f`:
+/// the forward substitution leaves `b_l - K_lf K_ff^-1 b_f` for the last unknowns, and the backward substitution starts with their solution.
 #[derive(Debug)]
 pub struct Cholesky {
     analysis: Analysis,
@@ -22,8 +20,18 @@ pub struct Cholesky {
 
 #[derive(Debug)]
 enum Numbers {
-    Double(DoubleFactor),
+    Double(SupernodalFactor<f64>),
     Single(SupernodalFactor<f32>),
+}
+
+/// The same expression for the factor of either precision.
+macro_rules! of_numbers {
+    ($numbers:expr, $factor:ident => $body:expr) => {
+        match $numbers {
+            Numbers::Double($factor) => $body,
+            Numbers::Single($factor) => $body,
+        }
+    };
 }
 
 /// Precision of the entries of a factor.
@@ -56,17 +64,45 @@ impl Cholesky {
         known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Option<Self>> {
+        Self::of(block, rows, last, known, (precision, false))
+    }
+
+    /// As [`new`](Self::new) for all unknowns but the last ones, which are not eliminated. Of the entries between two of these only
+    /// the diagonal is used, as a scale: it must be positive.
+    pub fn partial(
+        block: usize,
+        rows: &BlockRows,
+        last: &[usize],
+        known: Option<&[u32]>,
+        precision: Precision,
+    ) -> Result<Self> {
+        let moved =
+            || Error::Internal("unknowns of an interface are not last in the order of elimination".into());
+        Self::of(block, rows, last, known, (precision, true))?.ok_or_else(moved)
+    }
+
+    fn of(
+        block: usize,
+        rows: &BlockRows,
+        last: &[usize],
+        known: Option<&[u32]>,
+        (precision, partial): (Precision, bool),
+    ) -> Result<Option<Self>> {
         rows.check(block, rows.offsets.len().saturating_sub(1))?;
-        let mut lower = Lower::of(block, rows, &[])?;
+        let stored = if partial { couplings(block, rows, last) } else { Vec::new() };
+        let mut lower = Lower::of(block, rows, &stored)?;
         let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
-        let Some(mut analysis) = analysed else { return Ok(None) };
+        let Some(analysis) = analysed else { return Ok(None) };
         let single = match precision {
-            Precision::Single => SupernodalFactor::new(&analysis, &lower, last.len(), false),
+            Precision::Single => SupernodalFactor::new(&analysis, &lower, last.len(), partial)?,
             Precision::Double => None,
         };
         let numbers = match single {
             Some(single) => Numbers::Single(single),
-            None => Numbers::Double(DoubleFactor::new(&mut analysis, &mut lower.view())?),
+            None => {
+                let double = SupernodalFactor::new(&analysis, &lower, last.len(), partial)?;
+                Numbers::Double(double.ok_or_else(not_positive_definite)?)
+            }
         };
         Ok(Some(Self { analysis, numbers, last: last.len() }))
     }
@@ -82,22 +118,14 @@ impl Cholesky {
     /// Forward substitution: solves `L y = b`.
     pub fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
         self.fits(right_hand_side)?;
-        match &mut self.numbers {
-            Numbers::Double(factor) => factor.forward(&mut self.analysis, right_hand_side),
-            Numbers::Single(factor) => {
-                factor.forward(&self.analysis, right_hand_side);
-                Ok(())
-            }
-        }
+        of_numbers!(&mut self.numbers, factor => factor.forward(&self.analysis, right_hand_side));
+        Ok(())
     }
 
-    /// The part of `y` of the last unknowns, in the order of [`last_unknowns`](Self::last_unknowns).
+    /// The values of the last unknowns, in the order of [`last_unknowns`](Self::last_unknowns): after the forward substitution their part
+    /// of `y`, or of the right-hand side that is left if they are not eliminated.
     pub fn last_mut(&mut self) -> &mut [f64] {
-        let first = self.order().len() - self.last;
-        match &mut self.numbers {
-            Numbers::Double(factor) => factor.tail_mut(&self.analysis, first),
-            Numbers::Single(factor) => &mut factor.last,
-        }
+        of_numbers!(&mut self.numbers, factor => &mut factor.last)
     }
 
     /// The order of elimination.
@@ -113,13 +141,8 @@ impl Cholesky {
     /// Backward substitution: solves `L^T x = y`.
     pub fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
         self.fits(solution)?;
-        match &mut self.numbers {
-            Numbers::Double(factor) => factor.backward(&mut self.analysis, solution),
-            Numbers::Single(factor) => {
-                factor.backward(&self.analysis, solution);
-                Ok(())
-            }
-        }
+        of_numbers!(&mut self.numbers, factor => factor.backward(&self.analysis, solution));
+        Ok(())
     }
 
     fn fits(&self, values: &[f64]) -> Result<()> {
@@ -131,7 +154,7 @@ impl Cholesky {
 
     /// Least number of bytes that one substitution reads: the entries of the factor, and the row indices of each supernode once.
     pub fn bytes(&self) -> u64 {
-        let [entries, rows] = self.analysis.supernodes().counts();
+        let [entries, rows] = of_numbers!(&self.numbers, factor => factor.counts(&self.analysis));
         let number = match self.precision() {
             Precision::Double => size_of::<f64>(),
             Precision::Single => size_of::<f32>(),
@@ -139,25 +162,49 @@ impl Cholesky {
         number as u64 * entries + size_of::<super::sys::PetscInt>() as u64 * rows
     }
 
-    /// The diagonal block `L_c` of the last unknowns, whose product `L_c L_c^T` is their Schur complement: column after column, each
-    /// from the diagonal down.
-    pub fn last_factor(&self) -> Vec<f64> {
-        match &self.numbers {
-            Numbers::Double(_) => {
-                let values = DoubleFactor::values(&self.analysis);
-                last_columns(&self.analysis, self.order().len() - self.last, |at, _, _| values[at])
-            }
-            Numbers::Single(factor) => factor.last_columns(&self.analysis),
-        }
+    /// The diagonal block of the last unknowns, column after column, each from the diagonal down: `L_c`, whose product `L_c L_c^T` is
+    /// their Schur complement. If they are not eliminated, `-K_lf K_ff^-1 K_fl`, the contribution of the others to the Schur complement.
+    pub fn last_block(&self) -> Vec<f64> {
+        of_numbers!(&self.numbers, factor => factor.last_columns(&self.analysis))
+    }
+
+    /// As [`last_block`](Self::last_block); frees the memory of the block, if the last unknowns are not eliminated.
+    pub fn take_last_block(&mut self) -> Vec<f64> {
+        of_numbers!(&mut self.numbers, factor => factor.take_last_columns(&self.analysis))
     }
 }
 
-impl Drop for Cholesky {
-    fn drop(&mut self) {
-        if let Numbers::Double(factor) = &mut self.numbers {
-            factor.free(&mut self.analysis.common);
+/// Pairs of unknowns whose entries keep the last unknowns last in any postorder of the elimination tree: each with the next, and
+/// the first of them with every connected set of the others. Ascending, each pair as well.
+fn couplings(block: usize, rows: &BlockRows, last: &[usize]) -> Vec<(usize, usize)> {
+    let Some(&first) = last.first() else { return Vec::new() };
+    let size = (rows.offsets.len() - 1) * block;
+    let mut is_seen = vec![false; size];
+    last.iter().filter(|&&unknown| unknown < size).for_each(|&unknown| is_seen[unknown] = true);
+    let mut pairs: Vec<(usize, usize)> = last.windows(2).map(|pair| (pair[0], pair[1])).collect();
+    let mut open = Vec::new();
+    for start in 0..size {
+        if std::mem::replace(&mut is_seen[start], true) {
+            continue;
+        }
+        pairs.push((start, first));
+        open.push(start);
+        while let Some(unknown) = open.pop() {
+            let (node, i) = (unknown / block, unknown % block);
+            for at in rows.offsets[node]..rows.offsets[node + 1] {
+                for j in 0..block {
+                    let other = rows.columns[at] as usize * block + j;
+                    let value = rows.values[(at * block + i) * block + j];
+                    if value != 0.0 && !std::mem::replace(&mut is_seen[other], true) {
+                        open.push(other);
+                    }
+                }
+            }
         }
     }
+    pairs.iter_mut().for_each(|pair| *pair = (pair.0.min(pair.1), pair.0.max(pair.1)));
+    pairs.sort_unstable();
+    pairs
 }
 
 #[cfg(test)]
@@ -266,7 +313,7 @@ mod tests {
         for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
             let cholesky = Cholesky::new(1, &rows, &[0, 2], None, precision).unwrap().unwrap();
             // Without the middle: 2 - 1/2 on the diagonal, -1/2 beside it.
-            let l = cholesky.last_factor();
+            let l = cholesky.last_block();
             let schur = [l[0] * l[0], l[0] * l[1], l[1] * l[1] + l[2] * l[2]];
             for (found, known) in schur.iter().zip([1.5, -0.5, 1.5]) {
                 assert!((found - known).abs() < error, "{schur:?}");
@@ -280,7 +327,7 @@ mod tests {
         for (precision, error) in [(Double, 1e-14), (Single, 1e-6)] {
             let mut cholesky = Cholesky::new(1, &rows, &[2], None, precision).unwrap().unwrap();
             cholesky.forward(&[0.0; 3]).unwrap();
-            let along = cholesky.last_factor()[0];
+            let along = cholesky.last_block()[0];
             cholesky.last_mut()[0] = 3.0 * along;
             let mut x = [0.0; 3];
             cholesky.backward(&mut x).unwrap();
@@ -337,7 +384,7 @@ mod tests {
         let b: Vec<f64> = (0..3600).map(|i| 1e30 * f64::from(i % 17 - 8)).collect();
         let [double, single] = [Double, Single].map(|precision| {
             let mut cholesky = Cholesky::new(1, &rows, &last, None, precision).unwrap().unwrap();
-            (solve(&mut cholesky, &b), cholesky.last_factor(), cholesky.order().to_vec())
+            (solve(&mut cholesky, &b), cholesky.last_block(), cholesky.order().to_vec())
         });
         assert_eq!(double.2, single.2);
         let worst = |a: &[f64], b: &[f64]| {
@@ -372,5 +419,110 @@ mod tests {
             BlockRows { offsets: vec![0, 2, 4], columns: vec![0, 1, 0, 1], values: vec![1.0, off, off, 1.0] };
         let cholesky = Cholesky::new(1, &rows, &[0], None, Single).unwrap().unwrap();
         assert_eq!(cholesky.precision(), Double);
+    }
+
+    /// Springs between the nodes of two separate square grids, each node also held a little.
+    fn grids(length: usize) -> BlockRows {
+        let mut rows = BlockRows { offsets: vec![0], ..BlockRows::default() };
+        let place = |node: usize| (node / (length * length), node / length % length, node % length);
+        let size = 2 * length * length;
+        for node in 0..size {
+            let (grid, y, x) = place(node);
+            let is_near = |other: &usize| {
+                let (other_grid, other_y, other_x) = place(*other);
+                grid == other_grid && y.abs_diff(other_y) + x.abs_diff(other_x) <= 1
+            };
+            let others: Vec<usize> = (0..size).filter(is_near).collect();
+            let held = others.len() as f64 - 0.9;
+            rows.values.extend(others.iter().map(|&other| if other == node { held } else { -1.0 }));
+            rows.columns.extend(others.iter().map(|&other| other as u32));
+            rows.offsets.push(rows.columns.len());
+        }
+        rows
+    }
+
+    fn dense(rows: &BlockRows) -> Vec<Vec<f64>> {
+        let size = rows.offsets.len() - 1;
+        let mut dense = vec![vec![0.0; size]; size];
+        for row in 0..size {
+            for at in rows.offsets[row]..rows.offsets[row + 1] {
+                dense[row][rows.columns[at] as usize] = rows.values[at];
+            }
+        }
+        dense
+    }
+
+    /// Eliminates all but the last unknowns from a dense matrix beside a right-hand side.
+    fn eliminate(matrix: &mut [Vec<f64>], b: &mut [f64], last: &[usize]) {
+        let size = b.len();
+        for pivot in (0..size).filter(|at| !last.contains(at)) {
+            for row in (0..size).filter(|&row| last.contains(&row) || row > pivot) {
+                let factor = matrix[row][pivot] / matrix[pivot][pivot];
+                for column in 0..size {
+                    matrix[row][column] -= factor * matrix[pivot][column];
+                }
+                b[row] -= factor * b[pivot];
+            }
+        }
+    }
+
+    #[test]
+    fn the_schur_complement_and_what_is_left_are_those_of_elimination() {
+        let rows = grids(7);
+        let size = rows.offsets.len() - 1;
+        // Interfaces within both grids, and a node whose neighbours are all last.
+        let last: Vec<usize> = vec![0, 1, 7, 21, 22, 23, 24, 25, 49 + 3, 49 + 10, 49 + 17, 97];
+        let b: Vec<f64> = (0..size).map(|i| (i % 5) as f64 - 2.0).collect();
+        for (precision, error) in [(Double, 1e-13), (Single, 1e-5)] {
+            let mut factor = Cholesky::partial(1, &rows, &last, None, precision).unwrap();
+            assert_eq!(factor.precision(), precision);
+            let (mut reduced, mut left) = (dense(&rows), b.clone());
+            eliminate(&mut reduced, &mut left, &last);
+            let whole = dense(&rows);
+            let order: Vec<usize> = factor.last_unknowns().iter().map(|&unknown| unknown as usize).collect();
+            let mut entries = factor.take_last_block().into_iter();
+            for (at, &column) in order.iter().enumerate() {
+                for &row in &order[at..] {
+                    let known = reduced[row][column] - whole[row][column];
+                    let found = entries.next().unwrap();
+                    assert!(
+                        (found - known).abs() < error,
+                        "{precision:?} ({row}, {column}): {found}, {known}"
+                    );
+                }
+            }
+            factor.forward(&b).unwrap();
+            for (&unknown, value) in order.iter().zip(factor.last_mut()) {
+                assert!((*value - left[unknown]).abs() < error, "{precision:?} {unknown}");
+            }
+            // With the solution of the last unknowns, the others follow: any values do, for instance 1.
+            factor.last_mut().fill(1.0);
+            let mut x = vec![0.0; size];
+            factor.backward(&mut x).unwrap();
+            for row in (0..size).filter(|row| !last.contains(row)) {
+                let product: f64 = whole[row].iter().zip(&x).map(|(a, b)| a * b).sum();
+                assert!((product - b[row]).abs() < 10.0 * error, "{precision:?} row {row}");
+            }
+            assert!(last.iter().all(|&unknown| (x[unknown] - 1.0).abs() < error));
+        }
+    }
+
+    #[test]
+    fn a_known_order_is_kept() {
+        let rows = grids(6);
+        let last = [3, 9, 15, 40];
+        let order = Cholesky::partial(1, &rows, &last, None, Double).unwrap().order().to_vec();
+        let again = Cholesky::partial(1, &rows, &last, Some(&order), Double).unwrap();
+        assert_eq!(again.order(), order);
+    }
+
+    #[test]
+    fn an_indefinite_interior_is_an_error_in_words() {
+        let mut rows = grids(3);
+        rows.values[0] = -2.0;
+        for precision in [Double, Single] {
+            let error = Cholesky::partial(1, &rows, &[8], None, precision).unwrap_err();
+            assert!(error.to_string().contains("not positive definite"));
+        }
     }
 }

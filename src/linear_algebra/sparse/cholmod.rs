@@ -5,16 +5,13 @@ use std::ffi::c_int;
 
 #[cfg(not(petsc_64bit))]
 pub(super) use sys::{
-    cholmod_allocate_dense, cholmod_amd, cholmod_analyze_p, cholmod_change_factor, cholmod_factorize,
-    cholmod_finish, cholmod_free_dense, cholmod_free_factor, cholmod_metis, cholmod_solve2, cholmod_start,
+    cholmod_amd, cholmod_analyze_p, cholmod_finish, cholmod_free_factor, cholmod_metis, cholmod_start,
 };
 #[cfg(petsc_64bit)]
 pub(super) use sys::{
-    cholmod_l_allocate_dense as cholmod_allocate_dense, cholmod_l_amd as cholmod_amd,
-    cholmod_l_analyze_p as cholmod_analyze_p, cholmod_l_change_factor as cholmod_change_factor,
-    cholmod_l_factorize as cholmod_factorize, cholmod_l_finish as cholmod_finish,
-    cholmod_l_free_dense as cholmod_free_dense, cholmod_l_free_factor as cholmod_free_factor,
-    cholmod_l_metis as cholmod_metis, cholmod_l_solve2 as cholmod_solve2, cholmod_l_start as cholmod_start,
+    cholmod_l_amd as cholmod_amd, cholmod_l_analyze_p as cholmod_analyze_p,
+    cholmod_l_finish as cholmod_finish, cholmod_l_free_factor as cholmod_free_factor,
+    cholmod_l_metis as cholmod_metis, cholmod_l_start as cholmod_start,
 };
 
 /// How CHOLMOD's structs name these indices.

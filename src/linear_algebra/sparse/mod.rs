@@ -1,5 +1,5 @@
-//! Sparse matrices on one rank: symmetric and rectangular matrices of small dense blocks and their products, Cholesky factors by
-//! CHOLMOD in double precision and on its analysis in single precision.
+//! Sparse matrices on one rank: symmetric and rectangular matrices of small dense blocks and their products, Cholesky factors
+//! on CHOLMOD's analysis.
 #![allow(unsafe_code)]
 
 mod analysis;
@@ -7,11 +7,9 @@ mod block_rows;
 mod cholesky;
 mod cholmod;
 mod dense_factor;
-mod double_factor;
 mod large_pages;
 mod lower_half;
 mod panel;
-mod partial_cholesky;
 mod rectangular_blocks;
 mod supernodal;
 mod symmetric_blocks;
@@ -20,8 +18,7 @@ mod threads;
 pub(crate) use block_rows::index;
 pub use block_rows::{BlockRows, INDEX_BITS};
 pub use cholesky::{Cholesky, Precision};
-pub use dense_factor::DenseFactor;
-pub use partial_cholesky::PartialCholesky;
+pub use dense_factor::{DenseFactor, DensePanels};
 pub(crate) use rectangular_blocks::{Transfer, transfer};
 pub(crate) use symmetric_blocks::{Product, ScalarRows, Stored, product};
 pub(crate) use threads::one_unless_chosen;

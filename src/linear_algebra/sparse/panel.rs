@@ -4,6 +4,7 @@
 //! Solves read a panel once, column after column, beside a vector that stays in the fastest cache.
 
 use super::sys;
+use crate::error::Error;
 use multiversion::multiversion;
 use std::{
     ffi::{c_char, c_int},
@@ -167,6 +168,13 @@ macro_rules! real {
 
 real!(f32, 16, spotrf_, cblas_strsm, cblas_ssyrk, cblas_sgemm, single);
 real!(f64, 8, dpotrf_, cblas_dtrsm, cblas_dsyrk, cblas_dgemm, double);
+
+/// The failure of a factorisation.
+pub(super) fn not_positive_definite() -> Error {
+    Error::Failed(
+        "the matrix of the step is not positive definite: check densities, viscosities and moduli".into(),
+    )
+}
 
 #[cfg(test)]
 mod tests {

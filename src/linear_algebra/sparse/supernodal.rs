@@ -5,6 +5,7 @@ use super::{
     panel::Real,
     sys,
 };
+use crate::error::{Error, Result};
 use std::ops::Range;
 
 /// A supernodal factor on CHOLMOD's symbolic analysis, in single precision with half the memory and half the traffic of one in double
@@ -35,15 +36,30 @@ impl<R: Real> SupernodalFactor<R> {
     /// Factors the matrix that was analysed; `None` where it is not positive definite in this precision. With `partial`, the last
     /// unknowns are not eliminated, and the entries between two of them count as zero: their panels hold `-K_lf K_ff^-1 K_fl`, the
     /// contribution of the other unknowns to their Schur complement.
-    pub(super) fn new(analysis: &Analysis, lower: &Lower, last: usize, partial: bool) -> Option<Self> {
+    pub(super) fn new(
+        analysis: &Analysis,
+        lower: &Lower,
+        last: usize,
+        partial: bool,
+    ) -> Result<Option<Self>> {
         let (order, nodes) = (&analysis.order, analysis.supernodes());
         let end = if partial { order.len() - last } else { order.len() };
-        let columns = Columns::<R>::of(order, lower)?;
-        let mut values = vec![R::default(); (0..nodes.len()).map(|node| nodes.panel(node).len()).sum()];
+        let Some(columns) = Columns::<R>::of(order, lower) else { return Ok(None) };
+        let count = (0..nodes.len()).map(|node| nodes.panel(node).len()).sum();
+        let no_memory = |_| {
+            Error::Failed(
+                "not enough memory for the factors: use [solver] preconditioner = \"gamg\", or more memory"
+                    .into(),
+            )
+        };
+        Vec::<R>::new().try_reserve_exact(count).map_err(no_memory)?;
+        let mut values = vec![R::default(); count];
         large_pages::put(&values);
-        factor(nodes, &columns, end, &mut values)?;
+        if factor(nodes, &columns, end, &mut values).is_none() {
+            return Ok(None);
+        }
         let longest = (0..nodes.len()).map(|node| nodes.rows(node).len()).max();
-        Some(Self {
+        Ok(Some(Self {
             values,
             scales: columns.scales,
             end,
@@ -51,17 +67,57 @@ impl<R: Real> SupernodalFactor<R> {
             size: 1.0,
             values_there: vec![R::default(); longest.unwrap_or(0)],
             last: vec![0.0; last],
-        })
+        }))
     }
 
-    /// The entries in the columns of the last unknowns, unscaled if these were not eliminated: column after column, each from the
-    /// diagonal down.
+    /// Number of entries that a substitution reads, and sum of the rows of all supernodes.
+    pub(super) fn counts(&self, analysis: &Analysis) -> [u64; 2] {
+        let nodes = analysis.supernodes();
+        let mut counts = [0; 2];
+        for node in 0..nodes.len() {
+            let columns = eliminated(nodes.columns(node), self.end).len() as u64;
+            let rows = nodes.rows(node).len() as u64;
+            if columns > 0 {
+                counts[0] += columns * rows - columns * (columns - 1) / 2;
+                counts[1] += rows;
+            }
+        }
+        counts
+    }
+
+    /// The entries in the columns of the last unknowns, unscaled: column after column, each from the diagonal down.
     pub(super) fn last_columns(&self, analysis: &Analysis) -> Vec<f64> {
-        let (first, is_partial) = (self.scales.len() - self.last.len(), self.end < self.scales.len());
-        last_columns(analysis, first, |at, row, column| {
-            let scale = if is_partial { self.scales[row] * self.scales[column] } else { self.scales[row] };
-            self.values[at].exact() / scale
-        })
+        let last = self.last.len();
+        let (first, is_partial) = (self.scales.len() - last, self.end < self.scales.len());
+        let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
+        let mut columns = vec![0.0; last * (last + 1) / 2];
+        let nodes = analysis.supernodes();
+        for node in (0..nodes.len()).rev() {
+            let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
+            if own.end <= first {
+                break;
+            }
+            for column in own.clone().filter(|&column| column >= first) {
+                let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
+                let scale_of_column = if is_partial { self.scales[column] } else { 1.0 };
+                for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
+                    let scale = self.scales[row as usize] * scale_of_column;
+                    columns[to + row as usize - column] = self.values[from + at].exact() / scale;
+                }
+            }
+        }
+        columns
+    }
+
+    /// As [`last_columns`](Self::last_columns); frees the memory of the columns that were not eliminated.
+    pub(super) fn take_last_columns(&mut self, analysis: &Analysis) -> Vec<f64> {
+        let columns = self.last_columns(analysis);
+        let nodes = analysis.supernodes();
+        if let Some(node) = (0..nodes.len()).find(|&node| nodes.columns(node).start >= self.end) {
+            self.values.truncate(nodes.panel(node).start);
+            self.values.shrink_to_fit();
+        }
+        columns
     }
 
     /// Solves `L y = b` for the unknowns that were eliminated; what is left of `b` for the others stands in `last`.
@@ -134,32 +190,6 @@ impl<R: Real> SupernodalFactor<R> {
             solution[unknown as usize] = self.size * scale * value.exact();
         }
     }
-}
-
-/// The entries of a factor in the columns from position `first` on: column after column, each from the diagonal down. `value` gives
-/// them by their index in the panels, row and column.
-pub(super) fn last_columns(
-    analysis: &Analysis,
-    first: usize,
-    value: impl Fn(usize, usize, usize) -> f64,
-) -> Vec<f64> {
-    let last = analysis.order.len() - first;
-    let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
-    let mut columns = vec![0.0; last * (last + 1) / 2];
-    let nodes = analysis.supernodes();
-    for node in (0..nodes.len()).rev() {
-        let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
-        if own.end <= first {
-            break;
-        }
-        for column in own.clone().filter(|&column| column >= first) {
-            let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
-            for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
-                columns[to + row as usize - column] = value(from + at, row as usize, column);
-            }
-        }
-    }
-    columns
 }
 
 /// The columns of a supernode that are eliminated, if substitutions end at this position.

@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn a_step_that_is_stable_while_little_flows_is_warned_of() {
         let verdict = paper().verdict(0.1, None, &[]);
-        assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("beyond 8.0000e-2 s"));
+        assert!(verdict.refusals.is_empty() && verdict.warnings[0].contains("exceeds 8.0000e-2 s"));
         assert!(paper().verdict(0.079, None, &[]).warnings.is_empty());
     }
 

@@ -143,7 +143,7 @@ impl ProblemSize {
             let interface = self.interface as f64;
             return Cost {
                 memory: ranks * (part.memory + 4.0 * interface.powi(2)),
-                set_up: part.set_up + 1.5e-11 * interface.powi(3),
+                set_up: part.set_up + 1.5e-11 * interface.powi(3) / ranks,
                 step: part.step + 1.0e-9 * interface.powi(2) + STEP_MESSAGES,
             };
         }

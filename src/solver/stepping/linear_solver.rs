@@ -220,7 +220,7 @@ mod tests {
         }
         assert_eq!(precision_of(problem(3, 100_000, 2, 16)), Precision::Single);
         let crowded = ProblemSize { interface: 20_000, ..problem(2, 500_000, 2, 64) };
-        assert_eq!(chosen(crowded), Preconditioner::Gamg, "MUMPS is slower");
+        assert!(problem(2, 500_000, 2, 64).is_condensed() && !crowded.is_condensed());
         for steps in [1, 8, 1000] {
             assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
         }

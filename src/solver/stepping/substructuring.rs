@@ -4,15 +4,13 @@
 //! The interface consists of the nodes that cells of several ranks touch: without them, subdomains are not coupled. With the
 //! interface and the contact unknowns of a rank ordered last, its rows give `-K_lf K_ff^-1 K_fl`, and the sum over all ranks,
 //! beside the entries of the matrix between these unknowns, is the Schur complement of interface and contact. It is small and
-//! dense; each rank factors it with the contact unknowns of all ranks last. All sums are in the order of the ranks, so that runs on
+//! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps the whole factor. All sums are in the order of the ranks, so that runs on
 //! the same number of ranks repeat each bit.
 
 use super::frames::Frames;
 use crate::{
     error::{Error, Result},
-    linear_algebra::petsc::{
-        BlockRows, Cholesky, DenseFactor, OwnPreconditioner, PartialCholesky, Precision,
-    },
+    linear_algebra::petsc::{BlockRows, Cholesky, DenseFactor, DensePanels, OwnPreconditioner, Precision},
     mesh::Mesh,
     parallel::{
         agreement::{Agreed, agree},
@@ -197,7 +195,7 @@ pub(super) enum Factors {
 /// The factors of the interior of each subdomain, and of the interface.
 #[derive(Debug)]
 pub(super) struct Shared {
-    interior: PartialCholesky,
+    interior: Cholesky,
     /// The numbers of the unknowns that are left of all ranks, in the order in which ranks gather them.
     numbers: Vec<u32>,
     gathering: Gathering,
@@ -229,7 +227,7 @@ impl Factors {
         }
         let skeleton = substructures.skeleton(world, rows)?;
         let local = substructures.local_rows(rows, &skeleton);
-        let factor = |precision| PartialCholesky::new(d, &local, &substructures.last, known, precision);
+        let factor = |precision| Cholesky::partial(d, &local, &substructures.last, known, precision);
         let mut interior = agree(world, factor(precision))?;
         // The choice may differ between processors.
         let is_double = gather(world, &[u8::from(interior.precision() == Precision::Double)])?;
@@ -279,7 +277,7 @@ impl Factors {
     /// The diagonal block of the contact unknowns: column after column, each from the diagonal down.
     pub(super) fn last_factor(&self) -> Vec<f64> {
         match self {
-            Self::Whole(factor) => factor.last_factor(),
+            Self::Whole(factor) => factor.last_block(),
             Self::Shared(shared) => shared.interface.last_columns(shared.values.len() - shared.contact),
         }
     }
@@ -304,10 +302,7 @@ impl Factors {
     pub(super) fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
         match self {
             Self::Whole(factor) => factor.backward(solution),
-            Self::Shared(shared) => {
-                shared.backward(solution);
-                Ok(())
-            }
+            Self::Shared(shared) => shared.backward(solution),
         }
     }
 
@@ -325,7 +320,7 @@ impl Shared {
     fn new(
         world: &SimpleCommunicator,
         substructures: &Substructures,
-        interior: PartialCholesky,
+        mut interior: Cholesky,
         skeleton: &BlockRows,
     ) -> Result<Self, Agreed> {
         let total = substructures.total;
@@ -333,15 +328,19 @@ impl Shared {
             interior.last_unknowns().iter().map(|&unknown| substructures.number(unknown as usize)).collect();
         let gathering = Gathering::new(world, own.len())?;
         let numbers = gather(world, &own)?;
-        let mut matrix = vec![0.0; total * total];
+        let mut matrix = DensePanels::zeros(total, world.rank() as usize, world.size() as usize);
         let d = substructures.dimension;
         for (row, range) in skeleton.offsets.windows(2).enumerate() {
             for at in range[0]..range[1] {
                 let column = skeleton.columns[at] as usize;
                 for k in 0..d * d {
                     let [i, j] = [row * d + k / d, column * d + k % d].map(|at| substructures.numbers[at]);
-                    if i != NONE && j != NONE && i >= j {
-                        matrix[j as usize * total + i as usize] = skeleton.values[at * d * d + k];
+                    if i != NONE
+                        && j != NONE
+                        && i >= j
+                        && let Some(entry) = matrix.entry_mut(i as usize, j as usize)
+                    {
+                        *entry = skeleton.values[at * d * d + k];
                     }
                 }
             }
@@ -349,7 +348,7 @@ impl Shared {
         for rank in 0..world.size() {
             let numbers = &numbers[gathering.range(rank as usize)];
             let mut schur = if rank == world.rank() {
-                interior.schur_complement()
+                interior.take_last_block()
             } else {
                 vec![0.0; numbers.len() * (numbers.len() + 1) / 2]
             };
@@ -357,11 +356,17 @@ impl Shared {
             let mut entries = schur.iter();
             for (at, &column) in numbers.iter().enumerate() {
                 for (&row, value) in numbers[at..].iter().zip(&mut entries) {
-                    matrix[column.min(row) as usize * total + column.max(row) as usize] += value;
+                    let (column, row) = (column.min(row) as usize, column.max(row) as usize);
+                    if let Some(entry) = matrix.entry_mut(row, column) {
+                        *entry += value;
+                    }
                 }
             }
         }
-        let interface = agree(world, DenseFactor::new(total, matrix))?;
+        let factored = matrix.factor(|panel, values| {
+            world.process_at_rank(panel as i32 % world.size()).broadcast_into(values);
+        });
+        let interface = agree(world, factored)?;
         Ok(Self {
             gathered: vec![0.0; gathering.total()],
             own: gathering.range(world.rank() as usize),
@@ -382,25 +387,25 @@ impl Shared {
         let (own, ghosts) = self.local.split_at_mut(right_hand_side.len());
         own.copy_from_slice(right_hand_side);
         ghosts.fill(0.0);
-        self.interior.forward(&self.local);
+        self.interior.forward(&self.local)?;
         self.gathering.gather(&SimpleCommunicator::world(), self.interior.last_mut(), &mut self.gathered);
         self.values.fill(0.0);
         for (&number, value) in self.numbers.iter().zip(&self.gathered) {
             self.values[number as usize] += value;
         }
-        self.interface.forward(&mut self.values);
-        Ok(())
+        self.interface.forward(&mut self.values)
     }
 
-    fn backward(&mut self, solution: &mut [f64]) {
-        self.interface.backward(&mut self.values);
+    fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
+        self.interface.backward(&mut self.values)?;
         let numbers = &self.numbers[self.own.clone()];
         for (last, &number) in self.interior.last_mut().iter_mut().zip(numbers) {
             *last = self.values[number as usize];
         }
-        self.interior.backward(&mut self.local);
+        self.interior.backward(&mut self.local)?;
         let count = solution.len();
         solution.copy_from_slice(&self.local[..count]);
+        Ok(())
     }
 }
 

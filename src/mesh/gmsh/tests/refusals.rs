@@ -60,9 +60,9 @@ fn counts_beyond_the_file_are_refused_before_memory_is_taken() {
 
 #[test]
 fn blocks_that_disagree_with_the_announced_number_are_refused() {
-    refused(&SQUARE.text().replace("1 5 1 9", "1 6 1 9"), &["hold 5 nodes, 6 are announced"]);
+    refused(&SQUARE.text().replace("1 5 1 9", "1 6 1 9"), &["contain 5 nodes, 6 are announced"]);
     refused(&SQUARE.text().replace("1 5 1 9", "1 4 1 9"), &["more nodes than the 4 announced"]);
-    refused(&SQUARE.text().replace("3 4 1 4\n", "3 5 1 4\n"), &["hold 4 elements, 5 are announced"]);
+    refused(&SQUARE.text().replace("3 4 1 4\n", "3 5 1 4\n"), &["contain 4 elements, 5 are announced"]);
 }
 
 #[test]
