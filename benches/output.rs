@@ -35,7 +35,7 @@ use triad::{BYTES, Triad};
 /// Squares along a side, two triangles each.
 const SQUARES: u64 = 707;
 /// The same of a mesh so small that its numbers cost nothing.
-const FEW_SQUARES: u64 = 8;
+const FEW_SQUARES: u64 = 19;
 const REPETITIONS: usize = 7;
 /// Times in the file of the small mesh.
 const MANY_TIMES: usize = 2000;
@@ -248,7 +248,7 @@ fn fields(session: &Session, folder: &Path, part: &Part) {
     }
 }
 
-/// What a time costs by itself, and whether that grows with the times before.
+/// What a time of a small mesh costs beside its bytes in a plain file, and whether that grows with the times before.
 fn many_times(session: &Session, folder: &Path) {
     let part = Part::new(session, FEW_SQUARES);
     with_fields(session, folder, &part, 0, |file, fields| {
@@ -256,16 +256,25 @@ fn many_times(session: &Session, folder: &Path) {
         let mut tenths = vec![0.0];
         for time in 1..=MANY_TIMES {
             file.write_step(time as f64, fields).expect("step");
+            file.write_out_if_due().expect("step");
             if time.is_multiple_of(MANY_TIMES / 10) {
+                file.write_out().expect("steps");
                 tenths.push(start.elapsed().as_secs_f64());
             }
         }
+        let bytes: usize = fields.iter().map(|field| 8 * field.values.len()).sum();
+        let plain = Instant::now();
+        let mut copy = File::create(folder.join(format!("plain-{}", session.rank()))).expect("plain");
+        (0..MANY_TIMES).for_each(|_| copy.write_all(&vec![0; bytes]).expect("plain"));
+        let plain = session.largest([plain.elapsed().as_secs_f64()])[0];
         let each = |n: usize| 1e4 * (tenths[n] - tenths[n - 1]) / MANY_TIMES as f64;
         on_first(session, || {
             println!(
-                "a time of {MANY_TIMES}, small mesh: {:.2} ms at first, {:.2} ms at last",
+                "a time of {MANY_TIMES} on {} nodes: {:.2} ms at first, {:.2} ms at last, {:.0} times a plain write",
+                part.nodes,
                 each(1),
-                each(10)
+                each(10),
+                tenths[10] / plain
             );
         });
     });

@@ -121,6 +121,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         if due(self.every, state) {
             self.write_fields(session, body, state)?;
         }
+        self.fields.write_out_if_due()?;
         self.spent += start.elapsed();
         Ok(())
     }
@@ -137,6 +138,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
             self.write_fields(session, body, state)?;
         }
+        self.fields.write_out()?;
         session.agree(self.flush())?;
         self.spent += start.elapsed();
         Ok(())
@@ -169,6 +171,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         totals: &Totals,
     ) -> Result<PathBuf> {
         let start = Instant::now();
+        // A run that goes on from here continues the files: nothing up to here may be missing in them.
+        self.fields.write_out()?;
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);
         let header = Header::new(session, &self.identity, body, state, totals);

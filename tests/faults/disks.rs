@@ -4,7 +4,7 @@ use crate::{
     case::Case,
     launch::{Outcome, Running},
     trials,
-    undisturbed::{RANKS, finish, saving, undisturbed},
+    undisturbed::{RANKS, assert_same_fields, finish, saving, undisturbed},
 };
 use std::process::Command;
 
@@ -60,6 +60,21 @@ fn a_file_that_may_not_grow_ends_the_run_with_its_name_and_the_rest_continues_to
     }
     println!("{ended} of {} runs could not write", 3 * tried.len());
     assert!(ended > tried.len());
+}
+
+#[test]
+fn times_that_wait_in_memory_reach_a_file_that_has_room_for_them_only() {
+    let make = || Case::square(16).set("output.fields", "{every = 1}");
+    let straight = make();
+    let expected = straight.run(RANKS);
+    for (blocks, only) in [(1500, None), (1500, Some(0)), (2000, Some(1))] {
+        let case = make();
+        let what = format!("{blocks} blocks on {only:?}");
+        assert_says_why(&limited(&case, blocks, only), &what);
+        case.run_with(RANKS, &["--restart"]).expect(0);
+        assert!(!assert_same_fields(&expected, &case.results(), &what), "{what}: put aside");
+        assert_eq!(expected.text("profiles.csv"), case.results().text("profiles.csv"), "{what}");
+    }
 }
 
 /// Runs a script in a separate mount namespace, in which a small disk is mounted on a folder; `None` if that is not permitted.

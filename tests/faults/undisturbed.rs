@@ -46,8 +46,10 @@ fn assert_same(straight: &Results, results: &Results, what: &str) -> bool {
     assert_same_fields(straight, results, what)
 }
 
-/// All steps in the field file must be equal to those of the undisturbed run, and the last one must be among them.
-fn assert_same_fields(straight: &Results, results: &Results, what: &str) -> bool {
+/// All steps in the field file must be equal to those of the undisturbed run, and the last one must be among them. Returns whether
+/// the field file had to be put aside.
+#[track_caller]
+pub fn assert_same_fields(straight: &Results, results: &Results, what: &str) -> bool {
     let put_aside = results.path("fields.damaged.vtkhdf").exists();
     let [one, other] = [straight, results].map(|r| NumberFile::open(&r.path("fields.vtkhdf")));
     let (all, there) = (one.times(), other.times());

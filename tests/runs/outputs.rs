@@ -251,6 +251,26 @@ fn profiles_run_along_the_boundary_and_hold_the_law() {
 }
 
 #[test]
+fn fields_of_every_step_are_all_in_the_file() {
+    let written = |every: &str, ranks| {
+        let case = Case::square(8).set("time.step", "0.0078125").set("output.fields", every);
+        let results = case.run(ranks);
+        (NumberFile::open(&results.path("fields.vtkhdf")), results.text("fields.xdmf"), case)
+    };
+    for ranks in [1, 2] {
+        let (all, xdmf, _kept) = written("{every = 1}", ranks);
+        let (some, _, _kept) = written("{every = 64}", ranks);
+        assert_eq!(all.times(), (0..=128).map(|step| f64::from(step) / 128.0).collect::<Vec<_>>());
+        assert_eq!(xdmf.matches("<Time ").count(), 129);
+        for (step, of_some) in [(0, 0), (64, 1), (128, 2)] {
+            for name in ["velocity", "stress"] {
+                assert!(all.field(name, step) == some.field(name, of_some), "{name} of step {step}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_effective_job_gives_the_same_run_again() {
     let case = Case::square(6);
     let first = case.run(2);

@@ -10,8 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Longest time between two flushes.
-const FLUSH_EVERY: Duration = Duration::from_secs(1);
+/// Longest time between two flushes of rows, and between two writes of waiting times of fields.
+pub(super) const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// A CSV file open for appending.
 #[derive(Debug)]

@@ -76,12 +76,12 @@ impl<const D: usize> FieldOutput<D> {
         self.file.is_broken()
     }
 
-    /// The last time written, if any.
+    /// The last time appended, if any.
     pub(crate) fn last_time(&self) -> Option<f64> {
         self.file.times().last().copied()
     }
 
-    /// Appends a state. Collective.
+    /// Appends a state, which may wait in memory until others are written with it. Collective.
     pub(crate) fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
         let computed = self.computed(at, |_| true)?;
         let mut fields = Vec::new();
@@ -127,6 +127,16 @@ impl<const D: usize> FieldOutput<D> {
             }
         }
         Ok(found)
+    }
+
+    /// Writes out the states that wait in memory, if the last time was a second ago. Collective.
+    pub(crate) fn write_out_if_due(&mut self) -> Result<(), Agreed> {
+        self.file.write_out_if_due()
+    }
+
+    /// Writes out the states that wait in memory. Collective.
+    pub(crate) fn write_out(&mut self) -> Result<(), Agreed> {
+        self.file.write_out()
     }
 
     /// Closes the files. Collective.

@@ -14,9 +14,11 @@
 //! /VTKHDF/Steps            times and offsets; attribute NSteps
 //! ```
 //!
-//! A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file of a run that dies holds
-//! all steps before.
+//! Steps of small meshes wait in memory until some can be written together, because opening, flushing and describing tables takes
+//! far longer than their numbers. A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file
+//! of a run that dies holds all steps that were written out before.
 
+use super::csv::FLUSH_EVERY;
 use super::field::{
     FieldKind, component_names, data_group, file_width, kind_of, list, pad, place_word, shape_word, spread,
     view_columns,
@@ -28,13 +30,18 @@ use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::Vector;
 use crate::parallel::agreement::{Agreed, agree};
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::Communicator;
+use mpi::traits::{Communicator, Root};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 pub use super::field::{Field, Place, Shape};
 
 /// Rows a chunk of the small tables of steps holds.
 const STEPS_PER_CHUNK: usize = 256;
+/// Bytes that may wait to be written, over all ranks.
+const WAITING_BYTES: u64 = 1 << 24;
+/// Bytes in the file of a table besides its numbers, at most.
+const TABLE_BYTES: u64 = 1 << 10;
 /// The tables of offsets that stay zero because the mesh does not change.
 const STATIC_OFFSETS: [&str; 4] = ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
 
@@ -59,7 +66,12 @@ pub struct FieldFile<const D: usize> {
     points: Slab,
     cells: Slab,
     kinds: Vec<FieldKind>,
+    /// Times of all steps, the waiting ones included.
     times: Vec<f64>,
+    /// The numbers of the last steps, which are not in the file yet: for each step this rank's rows of each field.
+    waiting: Vec<Vec<Vec<f64>>>,
+    /// When steps were last written out.
+    written: Instant,
     compression: u8,
 }
 
@@ -81,8 +93,18 @@ impl<const D: usize> FieldFile<D> {
         let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
         let points = Slab::new(&file, &communicator, mesh.points.len());
         let cells = Slab::new(&file, &communicator, mesh.cell_ids.len());
-        let (kinds, times, xdmf) = (Vec::new(), Vec::new(), folder.join("fields.xdmf"));
-        let created = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
+        let created = Self {
+            file,
+            communicator,
+            xdmf: folder.join("fields.xdmf"),
+            points,
+            cells,
+            kinds: Vec::new(),
+            times: Vec::new(),
+            waiting: Vec::new(),
+            written: Instant::now(),
+            compression,
+        };
         created.write_mesh(&mesh)?;
         created.file.flush()?;
         let stale = created.communicator.rank() == 0 && created.xdmf.exists();
@@ -112,9 +134,10 @@ impl<const D: usize> FieldFile<D> {
             times.retain(|kept| *kept <= time);
             cut(&file, &kinds, times.len())?;
         }
-        let xdmf = folder.join("fields.xdmf");
-        let resumed = Self { file, communicator, xdmf, points, cells, kinds, times, compression };
-        resumed.write_xdmf(false)?;
+        let (waiting, written, xdmf) = (Vec::new(), Instant::now(), folder.join("fields.xdmf"));
+        let resumed =
+            Self { file, communicator, xdmf, points, cells, kinds, times, waiting, written, compression };
+        resumed.write_xdmf(0)?;
         Ok(resumed)
     }
 
@@ -123,45 +146,127 @@ impl<const D: usize> FieldFile<D> {
         self.file.is_broken()
     }
 
-    /// Times of the steps in the file, in s.
+    /// Times of the steps in s, those included that are not written out yet.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// Appends a step at `time` (s), later than those before. All steps have the same fields.
+    /// Appends a step at `time` (s), later than those before. All steps have the same fields. The first step and large ones are
+    /// written out at once, others by [`Self::write_out`] or as soon as many wait.
     pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<(), Agreed> {
         agree(&self.communicator, self.check(time, fields))?;
         let step = self.times.len();
         if self.kinds.is_empty() {
             self.add_fields(fields)?;
         }
-        for field in fields {
-            let slab = self.slab(field.place);
-            let mut values = spread::<D>(field, slab.owned);
-            let width = file_width(field.shape);
-            if let Some(reorder) = &slab.reorder {
-                values = reorder.apply(width, &values)?;
+        let bytes = self.step_bytes();
+        if bytes > WAITING_BYTES {
+            for (field, kind) in fields.iter().zip(&self.kinds) {
+                self.write_table(kind, step, &self.rows_of(field)?)?;
             }
-            let name = format!("Fields/{}/{step}", field.name);
-            let rows = self.file.create_packed_rows::<f64>(&name, slab.total, width, self.compression)?;
-            rows.write(slab.first, &values)?;
-            self.append(&offsets_name(field.place, field.name), step, step as i64 * slab.total as i64)?;
+            self.times.push(time);
+            return self.count_steps(step);
         }
-        for name in STATIC_OFFSETS {
-            self.append(&format!("VTKHDF/Steps/{name}"), step, 0_i64)?;
+        // Steps that wait have room in the file; where this one has none, they are saved before it fails.
+        if self.file.has_space(bytes * (self.waiting.len() as u64 + 1)).is_err() {
+            self.write_out()?;
+            self.file.require_space(bytes)?;
         }
-        self.append("VTKHDF/Steps/NumberOfParts", step, 1_i64)?;
-        self.append("VTKHDF/Steps/Values", step, time)?;
-        self.file.flush()?;
-        self.file.set_number("VTKHDF/Steps", "NSteps", step as i64 + 1)?;
-        self.file.flush()?;
+        let rows = fields.iter().map(|field| self.rows_of(field)).collect::<Result<_, _>>()?;
+        self.waiting.push(rows);
         self.times.push(time);
-        self.write_xdmf(true)
+        let is_full = bytes * (self.waiting.len() as u64 + 1) > WAITING_BYTES;
+        if step == 0 || is_full { self.write_out() } else { Ok(()) }
     }
 
-    /// Closes the files.
-    pub fn close(self) -> Result<(), Agreed> {
+    /// Writes out the steps that wait, if the last time steps were written out is a second ago.
+    pub fn write_out_if_due(&mut self) -> Result<(), Agreed> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        // The clocks of the ranks differ.
+        let mut is_due = self.written.elapsed() >= FLUSH_EVERY;
+        self.communicator.process_at_rank(0).broadcast_into(&mut is_due);
+        if is_due { self.write_out() } else { Ok(()) }
+    }
+
+    /// Writes out all steps that wait: then the file holds them even if the run dies.
+    pub fn write_out(&mut self) -> Result<(), Agreed> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        let first = self.times.len() - self.waiting.len();
+        if self.is_broken() {
+            let lost = format!("{}: the steps from {first} on cannot be written", self.file.path().display());
+            return agree(&self.communicator, Err(Error::Failed(lost)));
+        }
+        for (number, kind) in self.kinds.iter().enumerate() {
+            let tables = self.waiting.iter().map(|fields| &fields[number][..]);
+            if self.compression > 0 {
+                for (step, rows) in (first..).zip(tables) {
+                    self.write_table(kind, step, rows)?;
+                }
+            } else {
+                let (slab, folder) = (self.slab(kind.place), format!("Fields/{}", kind.name));
+                let shape = (slab.total, file_width(kind.shape));
+                self.file.write_tables(&folder, first, shape, slab.first, tables)?;
+            }
+        }
+        self.count_steps(first)?;
+        self.waiting.clear();
+        Ok(())
+    }
+
+    /// Writes out all steps and closes the files.
+    pub fn close(mut self) -> Result<(), Agreed> {
+        if !self.is_broken() {
+            self.write_out()?;
+        }
         self.file.close()
+    }
+
+    /// Bytes of a step over all ranks.
+    fn step_bytes(&self) -> u64 {
+        let table = |kind: &FieldKind| self.slab(kind.place).total * file_width(kind.shape) as u64 * 8;
+        self.kinds.iter().map(|kind| table(kind).saturating_add(TABLE_BYTES)).fold(0, u64::saturating_add)
+    }
+
+    /// The rows of a field that this rank writes.
+    fn rows_of(&self, field: &Field) -> Result<Vec<f64>, Agreed> {
+        let slab = self.slab(field.place);
+        let values = spread::<D>(field, slab.owned);
+        match &slab.reorder {
+            Some(reorder) => reorder.apply(file_width(field.shape), &values),
+            None => Ok(values),
+        }
+    }
+
+    fn write_table(&self, kind: &FieldKind, step: usize, rows: &[f64]) -> Result<(), Agreed> {
+        let (slab, width) = (self.slab(kind.place), file_width(kind.shape));
+        let name = format!("Fields/{}/{step}", kind.name);
+        let table = self.file.create_packed_rows::<f64>(&name, slab.total, width, self.compression)?;
+        table.write(slab.first, rows)
+    }
+
+    /// Counts the steps from `first` on, whose tables are there.
+    fn count_steps(&mut self, first: usize) -> Result<(), Agreed> {
+        let steps = self.times.len();
+        for kind in &self.kinds {
+            let rows = self.slab(kind.place).total as i64;
+            let offsets: Vec<i64> = (first..steps).map(|step| step as i64 * rows).collect();
+            self.append(&offsets_name(kind.place, &kind.name), first, &offsets)?;
+        }
+        let repeated = |number: i64| vec![number; steps - first];
+        for name in STATIC_OFFSETS {
+            self.append(&format!("VTKHDF/Steps/{name}"), first, &repeated(0))?;
+        }
+        self.append("VTKHDF/Steps/NumberOfParts", first, &repeated(1))?;
+        self.append("VTKHDF/Steps/Values", first, &self.times[first..])?;
+        self.file.flush()?;
+        self.file.set_number("VTKHDF/Steps", "NSteps", steps as i64)?;
+        self.file.flush()?;
+        self.written = Instant::now();
+        self.write_xdmf(first)
     }
 
     fn write_mesh(&self, mesh: &FieldMesh<D>) -> Result<(), Agreed> {
@@ -283,22 +388,22 @@ impl<const D: usize> FieldFile<D> {
         Ok(())
     }
 
-    fn append<T: Element>(&self, name: &str, step: usize, value: T) -> Result<(), Agreed> {
+    /// Appends numbers, the same on all ranks, to a table of steps that has `first`.
+    fn append<T: Element>(&self, name: &str, first: usize, values: &[T]) -> Result<(), Agreed> {
         let series = self.file.rows::<T>(name)?;
-        series.resize(step as u64 + 1)?;
-        let own = [value];
-        series.write(step as u64, if self.communicator.rank() == 0 { &own } else { &[] })
+        series.resize((first + values.len()) as u64)?;
+        series.write(first as u64, if self.communicator.rank() == 0 { values } else { &[] })
     }
 
-    /// Writes the file anew, or adds the last step to it if it has `grown` by that.
-    fn write_xdmf(&self, grown: bool) -> Result<(), Agreed> {
+    /// Adds the steps from `first` on to the file that has those before; writes it anew where it is missing or has none.
+    fn write_xdmf(&self, first: usize) -> Result<(), Agreed> {
         let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
-        let written = match self.times.split_last() {
-            _ if self.communicator.rank() != 0 => Ok(()),
-            Some((time, before)) if grown && !before.is_empty() && self.xdmf.exists() => {
-                xdmf::append(&self.xdmf, mesh, &self.kinds, before.len(), *time)
-            }
-            _ => xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times),
+        let written = if self.communicator.rank() != 0 {
+            Ok(())
+        } else if first > 0 && self.xdmf.exists() {
+            xdmf::append(&self.xdmf, mesh, &self.kinds, &self.times, first)
+        } else {
+            xdmf::write(&self.xdmf, mesh, &self.kinds, &self.times)
         };
         agree(&self.communicator, written)
     }

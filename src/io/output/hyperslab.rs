@@ -9,16 +9,21 @@ use crate::parallel::agreement::Agreed;
 use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::{Dataset, Datatype, Extent, Selection};
 use hdf5_sys::h5::hsize_t;
-use hdf5_sys::h5d::{H5Dget_space, H5Dread, H5Dwrite};
+use hdf5_sys::h5d::{
+    H5D_alloc_time_t::H5D_ALLOC_TIME_EARLY, H5D_fill_time_t::H5D_FILL_TIME_NEVER, H5Dclose, H5Dcreate2,
+    H5Dget_space, H5Dread, H5Dwrite,
+};
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5p::{
-    H5FD_mpio_xfer_t::H5FD_MPIO_COLLECTIVE, H5P_CLS_DATASET_XFER, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio,
+    H5FD_mpio_xfer_t::H5FD_MPIO_COLLECTIVE, H5P_CLS_DATASET_CREATE, H5P_CLS_DATASET_XFER, H5P_DEFAULT,
+    H5Pclose, H5Pcreate, H5Pset_alloc_time, H5Pset_dxpl_mpio, H5Pset_fill_time,
 };
 use hdf5_sys::h5s::{
     H5S_seloper_t::H5S_SELECT_SET, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none,
 };
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use std::ffi::CString;
 use std::marker::PhantomData;
 
 /// Bytes of a chunk of a compressed dataset before it is compressed.
@@ -123,30 +128,19 @@ impl<'file, T: Element> Rows<'file, T> {
 
     /// The memory and file spaces of `rows` rows from `first` on; nothing is selected where there are none.
     fn select(&self, first: u64, rows: usize) -> hdf5::Result<(Open, Open)> {
-        let start: [hsize_t; 2] = [first, 0];
-        let count: [hsize_t; 2] = [rows as hsize_t, self.width as hsize_t];
-        let dimensions = self.dataset.ndim().min(2);
-        // SAFETY: the arrays hold at least `dimensions` numbers; the identifiers are closed on drop.
-        unsafe {
-            let file = Open(H5Dget_space(self.dataset.id()), H5Sclose);
-            let memory =
-                Open(H5Screate_simple(dimensions as i32, count.as_ptr(), std::ptr::null()), H5Sclose);
-            if rows == 0 {
-                check(H5Sselect_none(file.0))?;
-                check(H5Sselect_none(memory.0))?;
-            } else {
-                let none = std::ptr::null();
-                check(H5Sselect_hyperslab(
-                    file.0,
-                    H5S_SELECT_SET,
-                    start.as_ptr(),
-                    none,
-                    count.as_ptr(),
-                    none,
-                ))?;
-            }
-            Ok((memory, file))
+        let part = [rows as hsize_t, self.width as hsize_t];
+        let memory = table_space(self.dataset.ndim().min(2) as i32, part);
+        // SAFETY: the dataset is open; the identifier is closed on drop.
+        let file = unsafe { Open(H5Dget_space(self.dataset.id()), H5Sclose) };
+        if rows > 0 {
+            select_rows(&file, first, part)?;
+            return Ok((memory, file));
         }
+        for space in [&memory, &file] {
+            // SAFETY: the call checks the identifier.
+            check(unsafe { H5Sselect_none(space.0) })?;
+        }
+        Ok((memory, file))
     }
 
     fn agreed<R>(&self, doing: &str, result: hdf5::Result<R>) -> Result<R, Agreed> {
@@ -180,6 +174,58 @@ impl ParallelFile {
             if width == 1 { empty.shape(rows).create(name) } else { empty.shape((rows, width)).create(name) };
         let dataset = self.written(&format!("make dataset {name}"), made)?;
         Ok(Rows::new(self, dataset, width))
+    }
+
+    /// Makes the tables `{folder}/{first}`, `{folder}/{first + 1}`, ... of `rows x width` numbers and writes this rank's rows of
+    /// each, from row `start` on. For many small tables: the ranks exchange nothing but the outcome, once.
+    pub(super) fn write_tables<'a>(
+        &self,
+        folder: &str,
+        first: usize,
+        (rows, width): (u64, usize),
+        start: u64,
+        tables: impl Iterator<Item = &'a [f64]>,
+    ) -> Result<(), Agreed> {
+        let written = self.file.group(folder).and_then(|group| {
+            let number = Datatype::from_type::<f64>()?;
+            hdf5::sync::sync(|| {
+                let shape = [rows, width as hsize_t];
+                let dimensions = if width == 1 { 1 } else { 2 };
+                // SAFETY: makes a property list of a predefined class; the identifier is closed on drop.
+                let list = unsafe { Open(H5Pcreate(*H5P_CLS_DATASET_CREATE), H5Pclose) };
+                // SAFETY: the list is one for making datasets; the calls check the identifier.
+                check(unsafe { H5Pset_alloc_time(list.0, H5D_ALLOC_TIME_EARLY) })?;
+                // SAFETY: as above.
+                check(unsafe { H5Pset_fill_time(list.0, H5D_FILL_TIME_NEVER) })?;
+                let space = table_space(dimensions, shape);
+                let mut outcome = Ok(());
+                // A rank that could not write its rows goes on to make tables with the others.
+                for (name, values) in (first..).zip(tables) {
+                    let name = CString::new(name.to_string()).map_err(|error| error.to_string())?;
+                    let (group, default) = (group.id(), H5P_DEFAULT);
+                    let made =
+                        // SAFETY: the name ends with a zero, the identifiers are open; the new one is closed on drop.
+                        unsafe { H5Dcreate2(group, name.as_ptr(), number.id(), space.0, default, list.0, default) };
+                    let table = Open(made, H5Dclose);
+                    check(if table.0 < 0 { -1 } else { 0 })?;
+                    let own = values.len() / width;
+                    if own == 0 {
+                        continue;
+                    }
+                    let part = [own as hsize_t, width as hsize_t];
+                    let memory = table_space(dimensions, part);
+                    select_rows(&space, start, part)?;
+                    let source = values.as_ptr().cast();
+                    // SAFETY: the memory space spans exactly the numbers of `values`; all identifiers are open.
+                    let done = check(unsafe {
+                        H5Dwrite(table.0, number.id(), memory.0, space.0, default, source)
+                    });
+                    outcome = outcome.and(done);
+                }
+                outcome
+            })
+        });
+        self.written(&format!("write dataset /{folder}/{first} and those after it"), written)
     }
 
     /// As [`Self::create_rows`], compressed (bytes shuffled, then deflated) at a level from 1 to 9, in chunks of some
@@ -276,6 +322,20 @@ impl ParallelFile {
         let (dataset, width) = self.agreed(&format!("open dataset {name}"), opened)?;
         Ok(Rows::new(self, dataset, width))
     }
+}
+
+/// A space of `rows x width` numbers, or of `rows` numbers in one dimension.
+fn table_space(dimensions: i32, shape: [hsize_t; 2]) -> Open {
+    // SAFETY: the array holds two numbers, of which HDF5 reads one or two; the identifier is closed on drop.
+    unsafe { Open(H5Screate_simple(dimensions, shape.as_ptr(), std::ptr::null()), H5Sclose) }
+}
+
+/// Selects `rows x width` numbers of a space from row `first` on.
+fn select_rows(space: &Open, first: u64, count: [hsize_t; 2]) -> hdf5::Result<()> {
+    let (start, none) = ([first, 0], std::ptr::null());
+    let (start, count) = (start.as_ptr(), count.as_ptr());
+    // SAFETY: the arrays hold two numbers, of which HDF5 reads as many as the space, which it checks, has dimensions.
+    check(unsafe { H5Sselect_hyperslab(space.0, H5S_SELECT_SET, start, none, count, none) })
 }
 
 fn collective_transfer() -> hdf5::Result<Open> {

@@ -123,11 +123,19 @@ impl ParallelFile {
         self.broken.get()
     }
 
-    /// Makes sure on all ranks that the file may grow by these bytes and its own tables.
+    /// Makes sure on all ranks that the file may grow by these bytes and its own tables; a file that can't is broken.
     pub(super) fn require_space(&self, bytes: u64) -> Result<(), Agreed> {
+        self.written(&format!("write {bytes} bytes more"), self.space(bytes))
+    }
+
+    /// Whether the file may grow by these bytes and its own tables, with the same outcome on all ranks.
+    pub(super) fn has_space(&self, bytes: u64) -> Result<(), Agreed> {
+        self.agreed(&format!("write {bytes} bytes more"), self.space(bytes))
+    }
+
+    fn space(&self, bytes: u64) -> hdf5::Result<()> {
         let more = bytes.saturating_add(free_space::TABLES);
-        let lacks = free_space::check_space(&self.path, more, self.communicator.rank() == 0);
-        self.written(&format!("write {more} bytes more"), lacks.map_err(Into::into))
+        free_space::check_space(&self.path, more, self.communicator.rank() == 0).map_err(Into::into)
     }
 
     /// Hands everything written so far to the operating system.

@@ -26,13 +26,19 @@ pub(super) fn write(path: &Path, mesh: Mesh, kinds: &[FieldKind], times: &[f64])
         .map_err(|error| Error::unwritable(path, error))
 }
 
-/// Appends a step to the file, so that the cost of a step does not grow with the number of steps. A reader sees either the old or
-/// the new file, also if the disk is full. On one rank.
-pub(super) fn append(path: &Path, mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> Result<()> {
+/// Appends the steps from `first` on to a file with all those before, so that the cost of a step does not grow with the number of
+/// steps. A reader sees either the old or the new file, also if the disk is full. On one rank.
+pub(super) fn append(
+    path: &Path,
+    mesh: Mesh,
+    kinds: &[FieldKind],
+    times: &[f64],
+    first: usize,
+) -> Result<()> {
     let add = || -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).open(path)?;
         let end = file.seek(SeekFrom::End(-(END.len() as i64)))?;
-        let text = grid(mesh, kinds, step, time) + END;
+        let text = grids(mesh, kinds, times, first) + END;
         file.write_all(text.as_bytes()).or_else(|error| {
             file.seek(SeekFrom::Start(end))?;
             file.write_all(END.as_bytes())?;
@@ -48,11 +54,14 @@ fn document(mesh: Mesh, kinds: &[FieldKind], times: &[f64]) -> String {
         "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n\
          <Grid Name=\"fields\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
     );
-    for (step, time) in times.iter().enumerate() {
-        text.push_str(&grid(mesh, kinds, step, *time));
-    }
+    text.push_str(&grids(mesh, kinds, times, 0));
     text.push_str(END);
     text
+}
+
+/// The steps from `first` on.
+fn grids(mesh: Mesh, kinds: &[FieldKind], times: &[f64], first: usize) -> String {
+    times.iter().enumerate().skip(first).map(|(step, time)| grid(mesh, kinds, step, *time)).collect()
 }
 
 fn grid(mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> String {
@@ -126,11 +135,12 @@ mod tests {
         let kinds = [FieldKind { name: "velocity".into(), place: Place::Node, shape: Shape::Vector }];
         let mesh = Mesh { dimension: 2, points: 3, cells: 1 };
         write(&path, mesh, &kinds, &[0.0]).expect("written");
-        for (step, time) in [(1, 0.5), (2, 0.75)] {
-            append(&path, mesh, &kinds, step, time).expect("added");
+        let times = [0.0, 0.5, 0.75, 1.0];
+        for (first, end) in [(1, 2), (2, 4)] {
+            append(&path, mesh, &kinds, &times[..end], first).expect("added");
         }
         let grown = std::fs::read_to_string(&path).expect("text");
-        assert_eq!(grown, document(mesh, &kinds, &[0.0, 0.5, 0.75]));
+        assert_eq!(grown, document(mesh, &kinds, &times));
     }
 
     #[test]
