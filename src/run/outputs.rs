@@ -33,6 +33,10 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     profiles: Profiles<D>,
     fields: FieldOutput<D>,
     every: Option<Every>,
+    /// When profiles are written, unless with the fields.
+    profiles_every: Option<Every>,
+    /// The last time in s whose profiles are written, if there is one.
+    profiled: Option<f64>,
     keep: usize,
     /// Bytes of the growing files when the run opened them, on rank 0.
     before: u64,
@@ -71,14 +75,18 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
         let fields = FieldOutput::open(session, job, body, time, log)?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
-        let every = job.output.fields;
+        let (every, profiles_every) = (job.output.fields, job.output.profiles);
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
-        let profiles_after =
-            time.map(|time| if due(every, state) && !is_there { time.next_down() } else { time });
+        let rewrites = if profiles_every.is_some() {
+            due(profiles_every, state)
+        } else {
+            due(every, state) && !is_there
+        };
+        let profiled = time.map(|time| if rewrites { time.next_down() } else { time });
         let tables = || {
             write_whole(&folder.join("job.toml"), &job.to_toml()?)?;
             probes.open(&folder, step)?;
-            profiles.open(&folder, profiles_after)?;
+            profiles.open(&folder, profiled)?;
             History::open(&folder, step)
         };
         let history = session.on_first(tables)?;
@@ -93,6 +101,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             profiles,
             fields,
             every,
+            profiles_every,
+            profiled,
             keep,
             before,
             checkpoints,
@@ -118,36 +128,60 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         if !self.probes.is_empty() {
             session.agree(self.probes.write(session, &body.mesh, state))?;
         }
-        if due(self.every, state) {
-            self.write_fields(session, body, state)?;
-        }
+        self.write_state(session, body, state, [due(self.every, state), due(self.profiles_every, state)])?;
         self.fields.write_out_if_due()?;
         self.spent += start.elapsed();
         Ok(())
     }
 
-    /// Writes the fields of the initial state, if they are due and not in the file yet. Collective.
+    /// Writes the fields and profiles of the initial state, if they are due and not in their files yet. Collective.
     pub(super) fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
-        let missing = self.fields.last_time().is_none_or(|time| time < state.time);
-        if missing && due(self.every, state) { self.write_fields(session, body, state) } else { Ok(()) }
+        let fields = self.lacks_fields(state) && due(self.every, state);
+        let profiles = self.lacks_profiles(state) && due(self.profiles_every, state);
+        self.write_state(session, body, state, [fields, profiles])
     }
 
-    /// Writes the fields of the last state unless the file has them, and flushes all tables. Collective.
+    /// Writes the fields and profiles of the last state unless their files have them, and flushes all tables. Collective.
     pub(super) fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
-        if !self.fields.is_broken() && self.fields.last_time().is_none_or(|time| time < state.time) {
-            self.write_fields(session, body, state)?;
-        }
+        let fields = !self.fields.is_broken() && self.lacks_fields(state);
+        let profiles = self.profiles_every.is_some() && self.lacks_profiles(state);
+        self.write_state(session, body, state, [fields, profiles])?;
         self.fields.write_out()?;
         session.agree(self.flush())?;
         self.spent += start.elapsed();
         Ok(())
     }
 
-    fn write_fields(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
+    fn lacks_fields(&self, state: &State) -> bool {
+        self.fields.last_time().is_none_or(|time| time < state.time)
+    }
+
+    fn lacks_profiles(&self, state: &State) -> bool {
+        self.profiled.is_none_or(|time| time < state.time)
+    }
+
+    /// Writes fields and profiles of a state; without times of their own, profiles go with the fields. Collective.
+    fn write_state(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        [fields, profiles]: [bool; 2],
+    ) -> Result<()> {
+        let profiles = !self.profiles.is_empty() && (profiles || fields && self.profiles_every.is_none());
+        if !fields && !profiles {
+            return Ok(());
+        }
         let stress = session.agree(body.stress(state))?;
-        self.fields.write(Converged { session, body, state, stress: &stress })?;
-        Ok(self.profiles.write(session, body, state, &stress)?)
+        if fields {
+            self.fields.write(Converged { session, body, state, stress: &stress })?;
+        }
+        if profiles {
+            self.profiles.write(session, body, state, &stress)?;
+            self.profiled = Some(state.time);
+        }
+        Ok(())
     }
 
     /// Numbers that sum up the fields of a state, by their names in `summary.json`. Collective.
@@ -209,7 +243,7 @@ fn length(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |file| file.len())
 }
 
-/// Whether the fields of this state are due; those of the initial state always are, if the job has `[output] fields`.
+/// Whether output of this state is due; that of the initial state always is, if the job says when.
 fn due(every: Option<Every>, state: &State) -> bool {
     every.is_some_and(|every| is_due(every, state.step, [state.time - state.step_length, state.time]))
 }

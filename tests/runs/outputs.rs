@@ -251,6 +251,21 @@ fn profiles_run_along_the_boundary_and_hold_the_law() {
 }
 
 #[test]
+fn profiles_have_times_of_their_own_without_fields() {
+    let case = Case::square(8).set("output.profiles", "{every = 1}").without("output.fields");
+    let results = case.run(2);
+    let mut found = results.table("profiles.csv").numbers("time");
+    found.dedup();
+    assert_eq!(found, (0..=16).map(|step| f64::from(step) / 16.0).collect::<Vec<_>>());
+    assert_eq!(NumberFile::open(&results.path("fields.vtkhdf")).times(), [1.0], "the last state only");
+    let fields_too = Case::square(8).set("output.fields", "{every = 4}");
+    let with_fields = fields_too.run(2);
+    let at_half =
+        |results: &Results| results.table("profiles.csv").only("time", "0.5").numbers("contact_pressure");
+    assert_eq!(at_half(&results), at_half(&with_fields));
+}
+
+#[test]
 fn fields_of_every_step_are_all_in_the_file() {
     let written = |every: &str, ranks| {
         let case = Case::square(8).set("time.step", "0.0078125").set("output.fields", every);

@@ -86,6 +86,13 @@ fn a_restarted_run_is_the_straight_run_to_the_last_bit() {
 }
 
 #[test]
+fn a_restarted_run_with_profiles_at_times_of_their_own_is_the_straight_run_to_the_last_bit() {
+    for every in ["{every = 1}", "{every = 8}", "{interval = 0.25}"] {
+        compare_with_straight(|| saving().set("output.profiles", every), 2, every);
+    }
+}
+
+#[test]
 fn a_restarted_run_under_gamg_is_the_straight_run_to_the_last_bit() {
     for ranks in [1, 2, 3, 4] {
         compare_with_straight(|| saving().set("solver.preconditioner", "'gamg'"), ranks, "gamg");

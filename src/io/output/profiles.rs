@@ -54,6 +54,11 @@ impl<const D: usize> Profiles<D> {
         })
     }
 
+    /// Whether there are no profiles.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.profiles.is_empty()
+    }
+
     /// Opens the file on rank 0, if there are profiles; continues it after this time if one is given.
     pub fn open(&mut self, folder: &Path, goes_on_after: Option<f64>) -> Result<()> {
         if self.profiles.is_empty() {

@@ -28,9 +28,14 @@ pub struct Output {
     /// Points whose displacement and velocity are written to probes.csv in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub probe: Vec<Probe>,
-    /// Boundaries whose displacements, velocities and pressures are written to profiles.csv whenever fields are written.
+    /// Boundaries whose displacements, velocities and pressures are written to profiles.csv at the times of profiles.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<Profile>,
+    /// When profiles are written, for example in every step without fields. The last state is always written. Adaptive steps do not
+    /// end on these times. Default: whenever fields are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = serde_json::json!({ "every": 1 }), example = serde_json::json!({ "interval": 0.01 }))]
+    pub profiles: Option<Every>,
 }
 
 /// The interval between two outputs.
@@ -55,7 +60,7 @@ pub struct Probe {
     pub point: Vec<f64>,
 }
 
-/// A boundary whose displacements, velocities and pressures are written to profiles.csv whenever fields are written.
+/// A boundary whose displacements, velocities and pressures are written to profiles.csv.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {

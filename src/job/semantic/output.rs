@@ -9,6 +9,10 @@ use crate::job::source::Value;
 pub(super) fn check(findings: &mut Findings<'_>) {
     check_unique(findings, "output.probe", "name", "probes are called");
     check_unique(findings, "output.profile", "on", "profiles are along");
+    if findings.root.find("output.profiles").is_some() && findings.root.count("output.profile") == 0 {
+        let help = "name a boundary with [[output.profile]] on = \"...\", or leave the key out";
+        findings.fault_at_key("output.profiles", "there are no profiles to write", help);
+    }
     check_expected(findings);
     check_indicator(findings);
 }

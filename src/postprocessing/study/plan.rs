@@ -285,6 +285,7 @@ fn cells_name(cells: &[u32]) -> String {
 pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
     job.output.profile.clear();
+    job.output.profiles = None;
     job.checkpoint = None;
     job.check.clear();
 }
