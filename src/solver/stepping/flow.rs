@@ -11,7 +11,14 @@ use crate::{
 pub(super) struct Flow {
     values: DistributedVector,
     forces: DistributedVector,
+    /// The derivatives of the forces at the point of linearisation.
     tangents: Tangents,
+    /// The velocity of the last forces, and their derivatives there: Newton's method linearises where it has just evaluated, and the
+    /// return mapping costs far more than its derivative.
+    evaluated: DistributedVector,
+    evaluated_tangents: Tangents,
+    /// Whether they belong to this step and are not in use yet.
+    is_fresh: bool,
 }
 
 /// The displacement at the end of a step is `displacement + length v_n`.
@@ -34,7 +41,14 @@ pub(super) struct FlowForces<'a, const D: usize, const S: usize> {
 impl Flow {
     /// Vectors with the layout of `like`.
     pub(super) fn new(like: &DistributedVector) -> Result<Self> {
-        Ok(Self { values: like.like()?, forces: like.like()?, tangents: Tangents::default() })
+        Ok(Self {
+            values: like.like()?,
+            forces: like.like()?,
+            tangents: Tangents::default(),
+            evaluated: like.like()?,
+            evaluated_tangents: Tangents::default(),
+            is_fresh: false,
+        })
     }
 
     /// For a step of these cells.
@@ -44,6 +58,7 @@ impl Flow {
         start: FlowStart<'a>,
     ) -> FlowForces<'a, D, S> {
         let symmetric = cells.has_symmetric_tangent();
+        self.is_fresh = false;
         FlowForces { flow: self, cells, start, symmetric }
     }
 
@@ -69,25 +84,33 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
         Ok(())
     }
 
-    fn evaluate(&mut self, wants_tangents: bool) -> Result<()> {
-        let Flow { values, forces, tangents } = &mut *self.flow;
+    /// Evaluates the forces at a velocity with their derivatives.
+    fn evaluate(&mut self, velocity: &DistributedVector) -> Result<()> {
+        self.displace(velocity)?;
+        let Flow { values, forces, evaluated, evaluated_tangents, is_fresh, .. } = &mut *self.flow;
+        evaluated.copy_from(velocity)?;
+        *is_fresh = true;
         let (values, mut forces) = (values.local()?, forces.local_mut()?);
         forces.fill(0.0);
-        self.cells.add_flow(&values, wants_tangents.then_some(tangents), &mut forces);
+        self.cells.add_flow(&values, Some(evaluated_tangents), &mut forces);
         Ok(())
     }
 }
 
 impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
-        self.displace(velocity)?;
-        self.evaluate(false)?;
+        self.evaluate(velocity)?;
         self.flow.add_sum_to(self.cells.fixed, forces)
     }
 
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
-        self.displace(velocity)?;
-        self.evaluate(true)
+        if !self.flow.is_fresh || !self.flow.evaluated.equals(velocity)? {
+            self.evaluate(velocity)?;
+        }
+        let Flow { tangents, evaluated_tangents, is_fresh, .. } = &mut *self.flow;
+        std::mem::swap(tangents, evaluated_tangents);
+        *is_fresh = false;
+        Ok(())
     }
 
     fn is_symmetric(&self) -> bool {
