@@ -46,6 +46,8 @@ pub struct Body<const D: usize, const S: usize> {
     evaluation: Evaluation,
     /// The step being taken, if laws are evaluated at its end.
     step: Step,
+    /// The displacement with ghosts of which the cells have their trial histories at the end of the step; empty: of none.
+    evaluated: Vec<f64>,
     /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
     fastest_flow: f64,
 }
@@ -70,6 +72,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             fixed,
             evaluation,
             step: Step::default(),
+            evaluated: Vec::new(),
             fastest_flow: 0.0,
         }
     }
@@ -115,6 +118,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if let Evaluation::Start(blend) = at {
             (self.evaluation, self.step) = (Evaluation::End(blend), step);
         }
+        self.evaluated.clear();
         let (mut outcome, mut squares) = (Outcome::default(), 0.0);
         for effect in &mut self.surface_effects {
             effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);

@@ -23,14 +23,15 @@ pub struct Cells<'a, const D: usize, const S: usize> {
     pub fixed: &'a [bool],
     evaluation: Evaluation,
     step: Step,
+    evaluated: &'a mut Vec<f64>,
 }
 
 impl<const D: usize, const S: usize> Body<D, S> {
     /// Cells and contacts, borrowed at the same time.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
-        let Self { mesh, geometry, effects, surface_effects, fixed, contacts, .. } = self;
+        let Self { mesh, geometry, effects, surface_effects, fixed, contacts, evaluated, .. } = self;
         let (evaluation, step) = (self.evaluation, self.step);
-        (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step }, contacts)
+        (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step, evaluated }, contacts)
     }
 
     /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
@@ -45,7 +46,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         cells.chain(surface.map(|e| e.name()))
     }
 
-    /// Energies of a solved step that is not yet committed; writes trial histories.
+    /// Energies of a solved step that is not yet committed; writes trial histories, unless they are those of this displacement.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let evaluation = self.evaluation;
         for effect in &mut self.surface_effects {
@@ -53,6 +54,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         let (mut cells, _) = self.cells_and_contacts();
         let (called, needs) = cells.flowing();
+        // Energies of damage need the stresses of the evaluation as well.
+        let is_evaluated = !needs.elastic_stress && cells.evaluated[..] == *nodal.displacement;
         let needs = Needs { strain_before: true, strain_rate: true, ..needs };
         let mut outcome = Outcome::default();
         Batch::for_all(cells.mesh, cells.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
@@ -62,7 +65,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 std::mem::swap(&mut batch.strain, &mut batch.strain_before);
                 batch.elastic_stress_before = std::mem::replace(&mut batch.elastic_stress, Pack::ZERO);
             }
-            cells.evaluate(called, needs, batch, &mut outcome);
+            if !is_evaluated {
+                cells.evaluate(called, needs, batch, &mut outcome);
+            }
             let effects = cells.effects.iter();
             effects.for_each(|effect| effect.add_step_energy(evaluation, step, batch, energy));
         });
@@ -126,6 +131,8 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
                 batch.scatter(mesh, forces);
             }
         });
+        self.evaluated.clear();
+        self.evaluated.extend_from_slice(displacement);
     }
 
     /// Adds the change of the forces of flow with a velocity to `forces` (both with ghosts).
