@@ -107,7 +107,6 @@ impl Preconditioner {
         let ranks = session.ranks();
         ksp.set_method("cg")?;
         match self {
-            Self::Auto | Self::Cholesky if ranks == 1 => ksp.set_preconditioner("cholesky", Some("cholmod")),
             Self::Auto | Self::Cholesky => {
                 if let Some(shared) = SharedFactor::new(session, mesh)? {
                     return ksp.precondition_by(Box::new(shared));

@@ -419,10 +419,9 @@ pub(super) struct SharedFactor {
 }
 
 impl SharedFactor {
-    /// For matrices on the nodes of a mesh; `None` on one rank, and where the dense matrix of the interface would be too large.
-    /// Collective.
+    /// For matrices on the nodes of a mesh; `None` where the dense matrix of the interface would be too large. Collective.
     pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Option<Self>> {
-        if session.ranks() == 1 || interface_nodes(session, mesh)?.len() * D > MOST_ON_INTERFACE {
+        if interface_nodes(session, mesh)?.len() * D > MOST_ON_INTERFACE {
             return Ok(None);
         }
         let substructures = Substructures::new(session, mesh, &Frames::new::<D>(session, mesh, &[])?)?;
