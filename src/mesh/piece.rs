@@ -271,6 +271,6 @@ mod tests {
         assert!(fault(|piece| piece.facets[1] = [0, 1000]).contains("node"));
         assert!(fault(|piece| piece.facet_cells[0] = 1000).contains("facet lies"));
         assert!(fault(|piece| piece.cell_regions[0] = 1).contains("a name belongs to a region"));
-        assert!(fault(|piece| piece.named[0] = [4, 0]).contains("named"));
+        assert!(fault(|piece| piece.named[0] = [4, 0]).contains("a name belongs to"));
     }
 }

@@ -59,6 +59,20 @@ fn assert_same_problem(alone: &Results, results: &Results, ranks: usize) {
     assert!((1.0..1.5).contains(&imbalance), "{partition}");
 }
 
+#[test]
+fn subdomains_of_one_or_two_cells_give_the_results_of_one_rank() {
+    for scheme in ["lagged_euler", "bdf2"] {
+        let make = || Case::square(2).set("time.scheme", &format!("'{scheme}'"));
+        let alone = make();
+        let alone = (alone.run(1), alone);
+        // Every node is on the interface.
+        for ranks in [4, 7, 8] {
+            let case = make();
+            assert_same_answer(&alone.0, &case.run(ranks), SHARE, &format!("{scheme} on {ranks} ranks"));
+        }
+    }
+}
+
 fn square(preconditioner: &str, quadrature: &str) {
     let make = || {
         Case::square(12)

@@ -157,7 +157,7 @@ impl ProblemSize {
             Precision::Double => [
                 8.0,
                 self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 0.9e-9 * n * n),
-                self.pick(2.4e-9, 1.2e-9),
+                self.pick(1.8e-9, 1.2e-9),
             ],
             Precision::Single => [
                 4.0,

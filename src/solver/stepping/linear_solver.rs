@@ -223,7 +223,7 @@ mod tests {
         for steps in [1, 8, 1000] {
             assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
         }
-        let (_, why) = Preconditioner::Auto.resolve(problem(2, 300, 7, 64));
+        let (_, why) = Preconditioner::Auto.resolve(problem(2, 100, 7, 64));
         assert!(why.ends_with("; 7 ranks are no faster than 1 here"), "{why}");
         let (asked, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
         assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));

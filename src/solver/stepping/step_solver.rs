@@ -26,6 +26,10 @@ pub(super) struct Lengths {
     pub cached: f64,
 }
 
+/// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
+/// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
+const SHARE_OF_ROUNDING: f64 = 0.1;
+
 /// The matrix for steps of one length, and its solver.
 pub(super) struct StepSolver {
     settings: SolverSettings,
@@ -350,7 +354,10 @@ impl StepSolver {
             motion += session.sum([mine])[0].sqrt();
         }
         let product = f64::EPSILON * self.matrix_norm * motion;
-        Ok((self.settings.tolerance * norm).max(f64::MIN_POSITIVE).max(*rounding).max(product))
+        Ok((self.settings.tolerance * norm)
+            .max(f64::MIN_POSITIVE)
+            .max(SHARE_OF_ROUNDING * *rounding)
+            .max(product))
     }
 
     /// The precision of the factor in use, if steps are condensed to the contact.
