@@ -16,7 +16,7 @@ use serde::Serialize;
 pub const POOR_QUALITY: f64 = 0.05;
 
 /// A cell is degenerate if its measure is below this multiple of its longest edge to the power `D`.
-const DEGENERATE: f64 = 1e-14;
+pub(super) const DEGENERATE: f64 = 1e-14;
 
 /// Two nodes coincide if their distance is below this multiple of the extent of the mesh.
 const COINCIDENT: f64 = 1e-12;

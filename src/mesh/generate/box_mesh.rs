@@ -1,7 +1,10 @@
 //! Tetrahedra in a box whose corner with the smallest coordinates is the origin.
 
 use super::limits::{countable, room};
-use super::{Grading, Grid, grading::axis};
+use super::{
+    Grading, Grid,
+    grading::{axis, refuse_flat},
+};
 use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
 use std::ops::Range;
@@ -90,7 +93,7 @@ impl Cuboid {
             axis("y", size[1], cells[1], y)?,
             axis("z", size[2], cells[2], z)?,
         ];
-        Ok(Self { lines })
+        Ok(Self { lines: refuse_flat(lines)? })
     }
 
     fn add_facets(&self, piece: &mut Piece<3>, range: &[Range<usize>; 3], local: &Numbering) {

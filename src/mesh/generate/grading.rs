@@ -1,7 +1,10 @@
 //! The grid lines of a generated mesh along an axis.
 
 use super::limits::room;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    mesh::check::DEGENERATE,
+};
 
 /// The ends of an axis near which cells are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +72,27 @@ pub(super) fn axis(name: &str, length: f64, cells: usize, grading: Grading) -> R
         )));
     }
     Ok(points)
+}
+
+/// Refuses grid lines along the axes whose cells are degenerate.
+pub(super) fn refuse_flat<const D: usize>(lines: [Vec<f64>; D]) -> Result<[Vec<f64>; D]> {
+    const AXES: [&str; 3] = ["x", "y", "z"];
+    let sides = lines.each_ref().map(|points| {
+        let sides = points.windows(2).map(|pair| pair[1] - pair[0]);
+        sides.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), side| (least.min(side), most.max(side)))
+    });
+    for (i, &(least, _)) in sides.iter().enumerate() {
+        for (j, &(_, most)) in sides.iter().enumerate().filter(|(j, _)| *j != i) {
+            if least < DEGENERATE * most {
+                return Err(Error::Refused(format!(
+                    "mesh cells of {least:e} m along {} and {most:e} m along {} are degenerate: choose size, cells and grading so that \
+                     sides differ less",
+                    AXES[i], AXES[j]
+                )));
+            }
+        }
+    }
+    Ok(lines)
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! Triangles on a rectangle whose lower left corner is the origin.
 
 use super::limits::{countable, room};
-use super::{Grading, Grid, grading::axis};
+use super::{
+    Grading, Grid,
+    grading::{axis, refuse_flat},
+};
 use crate::error::Result;
 use crate::mesh::{GlobalMesh, piece::Piece};
 use std::ops::Range;
@@ -74,7 +77,7 @@ impl Rectangle {
         countable(counts(cells, diagonal), u32::MAX as usize, u32::MAX as usize)?;
         let [along_x, along_y] = grading.map(Into::into);
         let lines = [axis("x", size[0], cells[0], along_x)?, axis("y", size[1], cells[1], along_y)?];
-        Ok(Self { lines, diagonal })
+        Ok(Self { lines: refuse_flat(lines)?, diagonal })
     }
 
     fn crossed(&self) -> bool {

@@ -182,3 +182,17 @@ fn impossible_meshes_are_refused_with_the_axis_named() {
     assert!(box_mesh([1.0; 3], [usize::MAX; 3], [1.0; 3]).is_err());
     assert!(box_mesh([1.0, 1.0, -2.0], [1; 3], [1.0; 3]).unwrap_err().to_string().contains("along z is -2"));
 }
+
+#[test]
+fn degenerate_cells_are_refused() {
+    let sized = |height: f64, cells: usize| {
+        rectangle([1.0, height], [1, cells], Diagonal::Right, [1.0; 2])
+            .map(drop)
+            .map_err(|error| error.to_string())
+    };
+    assert!(sized(1e-13, 1).is_ok());
+    for (height, cells) in [(1e-15, 1), (1e-320, 4), (1e-308, 100_000), (1e-12, 1000)] {
+        let words = sized(height, cells).expect_err("degenerate");
+        assert!(words.contains("m along y and 1e0 m along x are degenerate"), "{words}");
+    }
+}
