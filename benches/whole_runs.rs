@@ -9,8 +9,8 @@
 //! With `--ranks N` the same problems are run on one process and on N instead, in turn, three times, and the medians compared.
 //!
 //! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps,
-//! the preconditioner (cholesky or gamg) and the number of processes, and prints the seconds that a step took as its last word. Its whole run is timed and its largest resident memory read
-//! from outside.
+//! the preconditioner (cholesky or gamg) and the number of processes, and prints the seconds that a step took as its last word. Its
+//! whole run is timed and its largest resident memory read from outside.
 //!
 //! `--write` puts the tables into docs/speed.md, those of ranks into docs/scaling.md.
 
@@ -66,15 +66,8 @@ const CASES: [Case; 9] = [
     case(3, 32, 16, "gamg", false),
 ];
 
-/// Problems to compare on one process and on several.
-const ON_RANKS: [Case; 6] = [
-    case(2, 128, 64, "auto", true),
-    case(2, 256, 32, "auto", true),
-    case(2, 512, 16, "auto", false),
-    case(3, 16, 16, "auto", true),
-    case(3, 32, 16, "auto", false),
-    case(3, 48, 16, "auto", false),
-];
+/// A problem that is compared on one process and on several besides those of the table by phases.
+const LARGE_CUBE: Case = case(3, 48, 16, "auto", false);
 /// How often each is run.
 const REPETITIONS: usize = 3;
 /// Where the table of ranks stands.
@@ -240,7 +233,8 @@ fn on_ranks(wanted: &Wanted, ranks: u32) {
         if wanted.peer.is_some() { "---|---|" } else { "" }
     );
     print!("{table}");
-    for case in ON_RANKS.iter().filter(|case| case.quick || !wanted.quick) {
+    let cases = CASES.iter().filter(|case| case.preconditioner == "auto").chain([&LARGE_CUBE]);
+    for case in cases.filter(|case| case.quick || !wanted.quick) {
         let mut costs = [Vec::new(), Vec::new(), Vec::new()];
         let mut words = String::new();
         for _ in 0..REPETITIONS {

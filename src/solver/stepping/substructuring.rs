@@ -4,8 +4,8 @@
 //! The interface consists of the nodes that cells of several ranks touch: without them, subdomains are not coupled. With the
 //! interface and the contact unknowns of a rank ordered last, its rows give `-K_lf K_ff^-1 K_fl`, and the sum over all ranks,
 //! beside the entries of the matrix between these unknowns, is the Schur complement of interface and contact. It is small and
-//! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps the whole factor. All sums are in the order of the ranks, so that runs on
-//! the same number of ranks repeat each bit.
+//! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps the whole factor. All sums are in the
+//! order of the ranks, so that runs on the same number of ranks repeat each bit.
 
 use super::frames::Frames;
 use crate::{
