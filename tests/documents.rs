@@ -1,4 +1,4 @@
-//! Checks that the names in ARCHITECTURE.md exist in the source.
+//! Checks of the pages: names of the source exist, links lead somewhere, jobs in them are valid.
 
 use std::path::{Path, PathBuf};
 
@@ -101,7 +101,6 @@ fn fault(name: &str, sources: &[(String, String)], others: &str) -> Option<Strin
 
 #[test]
 fn every_name_in_the_architecture_is_one_of_the_source() {
-    let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).expect("text");
     let sources: Vec<_> = ["src", "tests"]
         .into_iter()
         .flat_map(files)
@@ -109,8 +108,101 @@ fn every_name_in_the_architecture_is_one_of_the_source() {
         .collect();
     let others = files("jobs").into_iter().map(|(_, text)| text).collect::<String>()
         + &std::fs::read_to_string(root().join("Cargo.toml")).expect("text");
+    let text = read("ARCHITECTURE.md");
     let faults: Vec<String> = spans(&text).iter().filter_map(|name| fault(name, &sources, &others)).collect();
     assert!(faults.is_empty(), "ARCHITECTURE.md names what is not there:\n{}", faults.join("\n"));
+}
+
+fn read(page: &str) -> String {
+    std::fs::read_to_string(root().join(page)).expect(page)
+}
+
+/// All pages, relative to the root.
+fn pages() -> Vec<String> {
+    let is_page = |path: &String| path.ends_with(".md");
+    let of_docs = files("docs").into_iter().map(|(path, _)| path).filter(is_page);
+    ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+        .map(String::from)
+        .into_iter()
+        .chain(of_docs)
+        .collect()
+}
+
+/// The targets of the links and pictures of a page.
+fn links(text: &str) -> Vec<&str> {
+    text.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(target, _)| target)).collect()
+}
+
+/// The anchor that a heading has in a rendered page.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    kept.chars()
+        .filter(|&c| is_word(c) || c == ' ' || c == '-')
+        .map(|c| if c == ' ' { '-' } else { c })
+        .collect()
+}
+
+/// The links of a page that lead nowhere.
+fn broken_links(page: &str, text: &str) -> Vec<String> {
+    let folder = Path::new(page).parent().expect("folder").to_owned();
+    let is_broken = |target: &&str| {
+        if target.contains("://") || target.contains(' ') {
+            return false;
+        }
+        let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+        let file = if file.is_empty() { PathBuf::from(page) } else { folder.join(file) };
+        let has_heading =
+            |text: String| text.lines().any(|line| line.starts_with('#') && anchor(line) == heading);
+        !root().join(&file).exists()
+            || !(heading.is_empty() || std::fs::read_to_string(root().join(&file)).is_ok_and(has_heading))
+    };
+    links(text).into_iter().filter(is_broken).map(|target| format!("{page}: {target}")).collect()
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let faults: Vec<String> = pages().iter().flat_map(|page| broken_links(page, &read(page))).collect();
+    assert!(faults.is_empty(), "links to nothing:\n{}", faults.join("\n"));
+    let text = "[a](scope.md) [b](nothing.md) [c](../README.md#first-run) [d](../README.md#no-such-heading)";
+    assert_eq!(
+        broken_links("docs/x.md", text),
+        ["docs/x.md: nothing.md", "docs/x.md: ../README.md#no-such-heading"]
+    );
+}
+
+#[test]
+fn every_page_of_the_book_is_in_its_table_of_contents() {
+    let contents = read("docs/SUMMARY.md");
+    let listed = links(&contents);
+    let missing: Vec<String> = pages()
+        .into_iter()
+        .filter_map(|page| page.strip_prefix("docs/").map(str::to_owned))
+        .filter(|page| page != "SUMMARY.md" && !listed.contains(&page.as_str()))
+        .collect();
+    assert!(missing.is_empty(), "not in docs/SUMMARY.md: {missing:?}");
+}
+
+#[test]
+fn the_start_page_is_one_page() {
+    let words = read("README.md").split_whitespace().count();
+    assert!(words <= 900, "README.md has {words} words");
+}
+
+/// The TOML blocks of a page, one after the other.
+fn toml(page: &str) -> String {
+    let text = read(page);
+    let block = |part: &str| part.strip_prefix("toml\n").map(str::to_owned);
+    text.split("```").skip(1).step_by(2).filter_map(block).collect()
+}
+
+#[test]
+fn the_jobs_in_the_pages_are_valid() {
+    for page in ["README.md", "docs/writing-a-job.md"] {
+        let job = clarke::job::Job::from_text(&toml(page), page, &root(), &[]);
+        if let Err(error) = job {
+            panic!("{page}: {error}");
+        }
+    }
 }
 
 #[test]
