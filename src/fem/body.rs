@@ -132,7 +132,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
             }
             for called in called {
-                for effect in called.among_mut(effects) {
+                for effect in called.select_mut(effects) {
                     let before = if let Evaluation::Start(_) = at { Some(batch.stress) } else { None };
                     effect.evaluate(at, step, batch, &mut outcome);
                     let Some(before) = before else { continue };
@@ -164,15 +164,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let with_stress = self.called(|p| p.stress.is_some());
             let strained = self.needs(|p| p.stress).is_some();
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
+                weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
                 with_energy
-                    .among(&self.effects)
+                    .select(&self.effects)
                     .for_each(|effect| effect.add_energy(self.evaluation, step, batch, &mut energy));
                 with_stress
-                    .among(&self.effects)
+                    .select(&self.effects)
                     .for_each(|effect| effect.add_stress(self.evaluation, step, batch));
                 if strained {
-                    squares.take_in(batch.count, &batch.strain, &batch.stress);
+                    squares.update(batch.count, &batch.strain, &batch.stress);
                 }
             });
             Ok((energy, squares.peaks()))
@@ -215,12 +215,12 @@ impl<const D: usize, const S: usize> Body<D, S> {
         if form == Form::Elasticity {
             self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
         }
-        let called = Called::those(&self.effects, |effect| effect.term().form() == Some(form));
+        let called = Called::filter(&self.effects, |effect| effect.term().form() == Some(form));
         Batch::for_all(&self.mesh, &self.geometry, Nodal::all(x), needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
                 batch.stress = Pack::from_lanes(|lane| batch.strain_rate.lane(lane).map(|rate| -rate));
             }
-            called.among(&self.effects).for_each(|effect| effect.term().add_force(batch));
+            called.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
             batch.scatter(&self.mesh, forces);
         });
     }
@@ -280,7 +280,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
             }
             for called in called {
-                called.among(&self.effects).for_each(|e| e.add_error(curvature, batch, &mut error));
+                called.select(&self.effects).for_each(|e| e.add_error(curvature, batch, &mut error));
             }
         });
         error
@@ -294,8 +294,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let [weakening, called] = [self.called(|p| p.weakens), self.called(|p| p.stress.is_some())];
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch| {
-                weakening.among(&self.effects).for_each(|effect| effect.weaken(batch));
-                let effects = called.among(&self.effects);
+                weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
+                let effects = called.select(&self.effects);
                 effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
                 for (lane, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
                     *out = batch.stress.lane(lane);
@@ -402,11 +402,11 @@ impl Called {
         evaluation: Evaluation,
         holds: impl Fn(Phases) -> bool,
     ) -> Self {
-        Self::those(effects, |effect| holds(effect.phases(evaluation)))
+        Self::filter(effects, |effect| holds(effect.phases(evaluation)))
     }
 
     /// The effects for which this holds.
-    fn those<const D: usize, const S: usize>(
+    fn filter<const D: usize, const S: usize>(
         effects: &[Box<dyn Effect<D, S>>],
         holds: impl Fn(&dyn Effect<D, S>) -> bool,
     ) -> Self {
@@ -418,11 +418,11 @@ impl Called {
         self.0 == 0
     }
 
-    fn among<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
+    fn select<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
         all.iter().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
     }
 
-    fn among_mut<T>(self, all: &mut [T]) -> impl Iterator<Item = &mut T> {
+    fn select_mut<T>(self, all: &mut [T]) -> impl Iterator<Item = &mut T> {
         all.iter_mut().enumerate().filter(move |(at, _)| self.has(*at)).map(|(_, one)| one)
     }
 

@@ -69,8 +69,8 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     if matches!(start, Start::Over | Start::Newest) || !file.exists() {
         return Ok(());
     }
-    let goes_on = start.goes_on();
-    let remedy = if goes_on {
+    let is_restart = start.is_restart();
+    let remedy = if is_restart {
         "choose another [output] folder, or restore the keys"
     } else {
         "choose another [output] folder, or overwrite them with --force"
@@ -87,10 +87,10 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     }
     let mut differing = differing_keys(&there.physics()?, &job.physics()?);
     let file_name = |job: &Job| job.mesh_file().and_then(Path::file_name).map(std::ffi::OsStr::to_owned);
-    if file_name(&there) != file_name(job) && !goes_on {
+    if file_name(&there) != file_name(job) && !is_restart {
         differing.insert(0, "mesh.file".into());
     }
-    if there.about != job.about && !goes_on {
+    if there.about != job.about && !is_restart {
         differing.insert(0, "about".into());
     }
     if differing.is_empty() {
@@ -107,17 +107,17 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
 
 /// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that it is never
 /// taken for that of this run; a new start removes the checkpoints, too. On one rank.
-pub(super) fn prepare_folder(folder: &Path, goes_on: bool, log: &mut Log) -> Result<()> {
+pub(super) fn prepare_folder(folder: &Path, is_restart: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);
     log.lock(&file, true)?;
-    log.open(&file, goes_on)?;
+    log.open(&file, is_restart)?;
     let summary = folder.join(SUMMARY);
     match std::fs::remove_file(&summary) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::unwritable(&summary, error)),
         _ => {}
     }
-    if !goes_on {
+    if !is_restart {
         for (_, path) in list(folder)? {
             std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))?;
             log.line(format!("removed {} of an earlier run", path.display()));

@@ -55,7 +55,7 @@ pub(super) struct Contents<'a, const D: usize> {
     /// The probes, already located.
     pub probes: Probes<D>,
     /// Whether the files of an earlier run are continued.
-    pub goes_on: bool,
+    pub is_restart: bool,
 }
 
 impl<const D: usize, const S: usize> Outputs<D, S> {
@@ -68,11 +68,11 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         log: &mut Log,
     ) -> Result<Self> {
         let start = Instant::now();
-        let Contents { job, identity, mut probes, goes_on } = contents;
+        let Contents { job, identity, mut probes, is_restart } = contents;
         let folder = job.output_folder().to_owned();
-        let before = if goes_on && session.is_first() { length_of_all(&folder) } else { 0 };
+        let before = if is_restart && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;
-        let (step, time) = (goes_on.then_some(state.step), goes_on.then_some(state.time));
+        let (step, time) = (is_restart.then_some(state.step), is_restart.then_some(state.time));
         let fields = FieldOutput::open(session, job, body, time, log)?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
         let (every, profiles_every) = (job.output.fields, job.output.profiles);
@@ -144,7 +144,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Writes the fields and profiles of the last state unless their files have them, and flushes all tables. Collective.
     pub(super) fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
-        let fields = !self.fields.is_broken() && self.lacks_fields(state);
+        let fields = !self.fields.set_up_failed() && self.lacks_fields(state);
         let profiles = self.profiles_every.is_some() && self.lacks_profiles(state);
         self.write_state(session, body, state, [fields, profiles])?;
         self.fields.write_out()?;

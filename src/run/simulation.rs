@@ -65,8 +65,8 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             None => totals_at_start(session, &body, &state)?,
         };
         let mut adaptive = steps::adaptive(job);
-        if let (Some(adaptive), Some(pace)) = (&mut adaptive, totals.pace) {
-            adaptive.pace = pace;
+        if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
+            adaptive.step_level = level;
         }
         let (time, landings) = (job.time.clone(), steps::landings(job));
         Ok(Self { body, state, scheme, totals, time, landings, adaptive })
@@ -81,12 +81,12 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         let target = landings.next(state.time);
         let outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target)?;
-            totals.pace = Some(adaptive.pace);
+            totals.step_level = Some(adaptive.step_level);
             outcome
         } else {
             let step = next_step(state, time.step, target.time);
             let mut outcome = session.agree(scheme.advance(session, body, state, step))?;
-            outcome.landed_on = target.what.filter(|_| step.time == target.time);
+            outcome.landed_on = target.name.filter(|_| step.time == target.time);
             outcome
         };
         totals.add(&outcome);

@@ -23,7 +23,7 @@ pub enum Start {
 
 impl Start {
     /// Whether the run continues an earlier one.
-    pub(super) fn goes_on(&self) -> bool {
+    pub(super) fn is_restart(&self) -> bool {
         matches!(self, Self::Newest | Self::From(_))
     }
 }

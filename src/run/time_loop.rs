@@ -52,11 +52,11 @@ pub(super) fn run<const D: usize, const S: usize>(
     let mut log = Log::new(session.is_first(), clock.on_terminal);
     session.on_first(|| claim_folder(job, start, &mut log))?;
     let mut ready = session.agree(setup::<D, S>(session, loaded, mesh))?;
-    let goes_on = start.goes_on();
+    let is_restart = start.is_restart();
     let identity = Identity { version: super::VERSION.into(), physics: session.agree(job.physics())? };
     let candidates = candidates(session, start, folder)?;
     let restored = restore(session, &candidates, &identity, &mut ready.body, &mut ready.state)?;
-    session.on_first(|| prepare_folder(folder, goes_on, &mut log))?;
+    session.on_first(|| prepare_folder(folder, is_restart, &mut log))?;
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
         log.line(&restored.words);
@@ -67,7 +67,7 @@ pub(super) fn run<const D: usize, const S: usize>(
     let totals = restored.as_ref().map(|restored| restored.totals);
     let simulation = Simulation::start(session, job, (body, state, scheme), totals)?;
     let (body, state) = (&simulation.body, &simulation.state);
-    let contents = Contents { job, identity, probes, goes_on };
+    let contents = Contents { job, identity, probes, is_restart };
     let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;
     session.agree(outputs.at_start(session, body, state))?;
     let setup = clock.began.elapsed() - clock.launched;
@@ -128,7 +128,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         {
             let Simulation { body, state, totals, landings, adaptive, .. } = &self.simulation;
             self.outputs.after_step(self.session, body, state, &outcome, totals)?;
-            let goes_on = state.time < self.job.time.end;
+            let has_steps_left = state.time < self.job.time.end;
             let steps_left = landings.steps_after(state.time, state.step_length);
             let last = if adaptive.is_some() { state.step + steps_left } else { last };
             self.report(&outcome, last);
@@ -136,11 +136,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.refuse_growth()?;
             let request = self.pending_request(saved_at);
             if let Some(reason) = request.stop
-                && goes_on
+                && has_steps_left
             {
                 return Ok(Ended::Stopped(reason));
             }
-            if request.save && goes_on {
+            if request.save && has_steps_left {
                 self.save()?;
                 saved_at = Instant::now();
             }
@@ -180,7 +180,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             return Ok(());
         }
         Err(Error::Failed(format!(
-            "at t = {:.6e} s the time scheme has generated {made:.1e} times the energy that was supplied: explicit stresses let errors grow; use a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
+            "at t = {:.6e} s the time scheme has generated {made:.1e} times the energy that was supplied: explicit stresses amplify errors; use a smaller [time] step or an implicit scheme, or accept it with [solver] accept = [\"explicit_stability\"]",
             self.simulation.state.time
         )))
     }
@@ -323,7 +323,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             factor_precision: scheme.factor_precision().map(Precision::name),
             steps: state.step,
             time: state.time,
-            rejected_steps: totals.pace.map_or(0, |pace| pace.rejected),
+            rejected_steps: totals.step_level.map_or(0, |level| level.rejected),
             set_ups: scheme.set_ups,
             newton_iterations: totals.newton_iterations,
             linear_iterations: totals.linear_iterations,

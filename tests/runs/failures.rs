@@ -172,8 +172,8 @@ fn a_step_without_solution_fails_and_names_branches_that_come_back() {
             .says("try a smaller [time] step");
         // Full steps alone alternate between the two branches.
         unsolvable().set("solver.petsc", "{ snes_linesearch_type = 'basic' }").run_with(ranks, &[]).expect(1).says(
-            "failed: too many Newton iterations; Newton's method came back to the branches of the contact graph that it had 2 \
-             iterations before; try a smaller [time] step",
+            "failed: too many Newton iterations; Newton's method cycles: the branches of the contact graphs recur after 2 \
+             iterations; try a smaller [time] step",
         );
     }
 }

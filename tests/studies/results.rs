@@ -103,7 +103,7 @@ fn failed_runs_are_listed_with_their_words_and_the_others_compared() {
          step = 0.0625\n[[norm]]\nof = \"velocity\"\nin = \"H\"\nover = \"end\"\n"
     );
     scene.write("study.toml", &study);
-    scene.study(2, &[]).expect(1).says("explicit stresses let errors grow").says("1 of 2 runs failed");
+    scene.study(2, &[]).expect(1).says("explicit stresses amplify errors").says("1 of 2 runs failed");
     let results = scene.results();
     assert_eq!(results["runs"][0]["status"], "failed");
     assert!(

@@ -155,10 +155,10 @@ fn replay(session: &Session, scheme: &str) {
     while run.advance(session).expect("a step").is_some() {
         steps.push((run.state.time, run.state.step_length));
         if run.state.time < 0.01 {
-            at_start = run.totals.pace.expect("adaptive").rejected;
+            at_start = run.totals.step_level.expect("adaptive").rejected;
         }
     }
-    let rejected = run.totals.pace.expect("adaptive").rejected - at_start;
+    let rejected = run.totals.step_level.expect("adaptive").rejected - at_start;
     let shortened = steps.windows(2).filter(|pair| pair[1].1 < 0.9 * pair[0].1).count();
     assert!(rejected > 0 && shortened > 0, "{scheme}: {rejected} rejected, {steps:?}");
     let mut other = simulation::<2, 3>(session, &paper(scheme), &mesh);

@@ -7,7 +7,7 @@ use clarke::{
         body::Body,
         effect::{Effect, Inertia, ViscousStress},
     },
-    job::{Axis, Fix, Named},
+    job::{Axis, Fix, FixedDirections},
     laws::material::{ByMaterial, Isotropic},
     linear_algebra::{petsc::Matrix, tensor::larger},
     mesh::{
@@ -228,14 +228,15 @@ pub fn compare(session: &Session) {
     let plane = crossed([3, 2]);
     let askew = stir(rectangle([1.0, 2.0], [4, 3], Diagonal::Alternating, [1.0, 1.0]).expect("mesh"), 0.06);
     let space = brick([2, 3, 2]);
-    let corner = [("left", Fix::Named(Named::All)), ("bottom", Fix::Axes(vec![Axis::Y]))];
+    let corner = [("left", Fix::Keyword(FixedDirections::All)), ("bottom", Fix::Axes(vec![Axis::Y]))];
     for mesh in [&plane, &askew] {
         entries::<2, 3>(session, mesh, &[]);
         entries::<2, 4>(session, mesh, &corner);
         rigid_motions::<2, 3>(session, mesh);
     }
     entries::<3, 6>(session, &space, &[]);
-    let sides = [("left", Fix::Named(Named::Normal)), ("front", Fix::Named(Named::All))];
+    let sides =
+        [("left", Fix::Keyword(FixedDirections::Normal)), ("front", Fix::Keyword(FixedDirections::All))];
     entries::<3, 6>(session, &space, &sides);
     rigid_motions::<3, 6>(session, &space);
     total_mass::<2, 3>(session, &plane, 1.2 * 0.9);

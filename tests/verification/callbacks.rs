@@ -179,7 +179,7 @@ pub fn solve_nonlinear(session: &Session) {
     x.fill(0.0).expect("fill");
     let short = snes.solve(&mut problem, &mut x, (1e-11, 0.0), 1).expect("an outcome, not an error");
     assert!(!short.converged());
-    assert_eq!(short.words(), "too many Newton iterations");
+    assert_eq!(short.description(), "too many Newton iterations");
 }
 
 pub fn fail_on_the_last_rank(session: &Session) {

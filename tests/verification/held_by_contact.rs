@@ -91,7 +91,7 @@ fn block<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>
         let found = session.agree(run.advance(session)).expect_err("a failure");
         assert_eq!(found.exit(), Exit::Failed);
         let words = found.to_string();
-        assert!(words.contains("contact and friction alone hold these motions"), "{words}");
+        assert!(words.contains("only contact and friction resist the following rigid motions"), "{words}");
         assert!(words.contains("translation along x"), "{words}");
     }
     // Without friction nothing prevents the motion along the plane.

@@ -4,7 +4,7 @@ use crate::run_on;
 use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     fem::effect::{Contact, ContactConditions, Effect, Inertia, Quadrature, ViscousStress, choose_unknowns},
-    job::{Expression, Fix, Named, Scalar},
+    job::{Expression, Fix, FixedDirections, Scalar},
     laws::{
         contact::{
             Bound, Compliance, Coulomb, DampedResponse, ExponentialDamper, FrictionLaw, Gap, Graph,
@@ -15,7 +15,7 @@ use clarke::{
     linear_algebra::petsc::{Matrix, NonlinearProblem, ProjectedKsp},
     mesh::GlobalMesh,
     parallel::session::Session,
-    solver::stepping::{ContactEquations, Effort, Scratch},
+    solver::stepping::{ContactEquations, Scratch, SolveCounts},
 };
 
 fn laws() -> Vec<NormalResponse> {
@@ -66,7 +66,8 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
         Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
     ];
-    let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Named(Named::All))], effects);
+    let (body, state) =
+        body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
     let [bottom, right] =
@@ -152,7 +153,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 session,
                 stop_at_cycles: false,
                 equilibrated: false,
-                effort: Effort::default(),
+                counts: SolveCounts::default(),
             };
             equations.linearise(&point).expect("linearised");
             equations.apply_jacobian(&direction, &mut derivative).expect("derivative");
@@ -180,8 +181,8 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             derivative.add_scaled(-0.5 / h, &above).expect("add");
             let error = derivative.norm().expect("norm") / size;
             assert!(error < 1e-8, "{D}D, law {law}, {quadrature:?}, {friction:?}: relative error {error}");
-            assert_eq!(equations.effort.residuals, 2);
-            coupled += equations.effort.coupled;
+            assert_eq!(equations.counts.residuals, 2);
+            coupled += equations.counts.coupled;
             assert!(smooth || quadrature == Quadrature::Nodal);
 
             matrix.multiply(&direction, &mut second).expect("product");

@@ -147,7 +147,7 @@ fn refusal(session: &Session) {
     let refused = set_up(&job("bottom", "vinewtonrsls")).expect_err("an oblique normal");
     assert_eq!(
         refused.to_string(),
-        "[solver] method = \"vinewtonrsls\" bounds components of the velocity, but the normal at [0.0, 0.0] m is not along \
+        "[solver] method = \"vinewtonrsls\" limits components of the velocity, but the normal at [0.0, 0.0] m is not parallel to \
          an axis; use method = \"newton\""
     );
     set_up(&job("bottom", "newton")).expect("Newton's method takes any normal");

@@ -138,7 +138,7 @@ pub fn solve_linear(session: &Session) {
         x.fill(0.0).expect("fill");
         let outcome = ksp.solve(&b, &mut x).expect("solve");
         assert!(outcome.converged() && outcome.residual <= 1e-12, "{preconditioner}: {outcome:?}");
-        assert_eq!(outcome.words(), "converged");
+        assert_eq!(outcome.description(), "converged");
         assert_owned(session, &x, solution);
         ksp.start_from_solution().expect("start");
         ksp.set_tolerances(0.0, 1e-9, 100).expect("tolerances");
@@ -153,7 +153,7 @@ pub fn solve_linear(session: &Session) {
     x.fill(0.0).expect("fill");
     let outcome = short.solve(&b, &mut x).expect("an outcome, not an error");
     assert!(!outcome.converged(), "{outcome:?}");
-    assert_eq!(outcome.words(), "too many linear iterations");
+    assert_eq!(outcome.description(), "too many linear iterations");
 }
 
 /// Number of iterations of a solve that never reaches its tolerance, limited by options.

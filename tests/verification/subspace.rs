@@ -5,7 +5,7 @@ use crate::scenes::{body, brick, crossed, noise, set_nodal};
 use clarke::{
     error::Result,
     fem::effect::{Effect, Inertia, ViscousStress},
-    job::{Fix, Named},
+    job::{Fix, FixedDirections},
     laws::material::{ByMaterial, Isotropic},
     linear_algebra::petsc::{DistributedVector, Matrix, ProjectedKsp, ProjectedOperator, set_default_option},
     mesh::GlobalMesh,
@@ -41,7 +41,8 @@ fn solves<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<
         Box::new(Inertia { density: ByMaterial::uniform(2.0) }),
         Box::new(ViscousStress { tensor: ByMaterial::uniform(Isotropic { volumetric: 1.0, shear: 3.0 }) }),
     ];
-    let (body, state) = body::<D, S>(session, whole, &[("left", Fix::Named(Named::All))], effects);
+    let (body, state) =
+        body::<D, S>(session, whole, &[("left", Fix::Keyword(FixedDirections::All))], effects);
     let matrix = Matrix::symmetric(D, &body.matrix(session, 0.1).expect("assembled")).expect("matrix");
     let vector = || state.velocity.like().expect("like");
     let solver = |refresh_threshold| {

@@ -41,7 +41,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.
     pub fn softening(&self) -> impl Iterator<Item = &'static str> {
-        let cells = self.called(|p| p.end && p.weakens).among(&self.effects).map(|e| e.name());
+        let cells = self.called(|p| p.end && p.weakens).select(&self.effects).map(|e| e.name());
         let surface = self.surface_effects.iter().filter(|e| !self.is_explicit() && e.softens());
         cells.chain(surface.map(|e| e.name()))
     }
@@ -100,7 +100,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
             self.effects.iter().for_each(|effect| effect.add_elastic_stress(batch));
         }
         outcome.has_flowed = false;
-        for effect in called.among_mut(self.effects) {
+        for effect in called.select_mut(self.effects) {
             effect.evaluate(self.evaluation, self.step, batch, outcome);
         }
     }

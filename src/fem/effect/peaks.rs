@@ -28,8 +28,8 @@ pub struct PeakSquares {
 
 impl PeakSquares {
     /// Updates the maxima with strain and total stress of the first `count` cells of a pack.
-    pub fn take_in<const S: usize>(&mut self, count: usize, strain: &Pack<S>, stress: &Pack<S>) {
-        take_in(self, count, strain, stress);
+    pub fn update<const S: usize>(&mut self, count: usize, strain: &Pack<S>, stress: &Pack<S>) {
+        update(self, count, strain, stress);
     }
 
     /// The maxima over all lanes.
@@ -40,7 +40,7 @@ impl PeakSquares {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-fn take_in<const S: usize>(most: &mut PeakSquares, count: usize, strain: &Pack<S>, stress: &Pack<S>) {
+fn update<const S: usize>(most: &mut PeakSquares, count: usize, strain: &Pack<S>, stress: &Pack<S>) {
     for lane in 0..LANES {
         // Lanes that no cell fills count nothing, whatever stands there.
         let counts = lane < count;
@@ -71,13 +71,13 @@ mod tests {
                 expected.strain = larger(expected.strain, dot(&strain.lane(lane), &strain.lane(lane)).sqrt());
             }
             (count..LANES).for_each(|lane| stress.set(lane, [1e9, 0.0, f64::NAN, 0.0, 0.0, 0.0]));
-            squares.take_in(count, &strain, &stress);
+            squares.update(count, &strain, &stress);
         }
         assert_eq!(squares.peaks(), expected);
         let mut bad = pack(1);
         bad.set(3, [f64::NAN; 6]);
-        squares.take_in(LANES, &pack(2), &bad);
-        squares.take_in(LANES, &pack(2), &pack(3));
+        squares.update(LANES, &pack(2), &bad);
+        squares.update(LANES, &pack(2), &pack(3));
         assert!(squares.peaks().von_mises.is_nan() && squares.peaks().strain == expected.strain);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    job::{Fix, Named, Support},
+    job::{Fix, FixedDirections, Support},
     linear_algebra::{petsc::DistributedVector, tensor::norm},
     mesh::{Mesh, shape::facet_normal},
 };
@@ -11,9 +11,9 @@ use crate::{
 fn fixed_axes<const D: usize>(fix: &Fix, mesh: &Mesh<D>, boundary: &str, facet: u32) -> Result<[bool; D]> {
     let mut out = [false; D];
     match fix {
-        Fix::Named(Named::All) => out = [true; D],
+        Fix::Keyword(FixedDirections::All) => out = [true; D],
         Fix::Axes(axes) => axes.iter().for_each(|axis| out[axis.index()] = true),
-        Fix::Named(Named::Normal) => {
+        Fix::Keyword(FixedDirections::Normal) => {
             let normal = facet_normal(&mesh.facet_corners(facet));
             let size = norm(&normal);
             let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);

@@ -72,8 +72,8 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// Whether writing has failed, so that no further step can be written.
-    pub(crate) fn is_broken(&self) -> bool {
-        self.file.is_broken()
+    pub(crate) fn set_up_failed(&self) -> bool {
+        self.file.set_up_failed()
     }
 
     /// The last time appended, if any.

@@ -142,8 +142,8 @@ impl<const D: usize> FieldFile<D> {
     }
 
     /// Whether writing failed before, so that no step can follow.
-    pub fn is_broken(&self) -> bool {
-        self.file.is_broken()
+    pub fn set_up_failed(&self) -> bool {
+        self.file.set_up_failed()
     }
 
     /// Times of the steps in s, those included that are not written out yet.
@@ -196,7 +196,7 @@ impl<const D: usize> FieldFile<D> {
             return Ok(());
         }
         let first = self.times.len() - self.waiting.len();
-        if self.is_broken() {
+        if self.set_up_failed() {
             let lost = format!("{}: the steps from {first} on cannot be written", self.file.path().display());
             return agree(&self.communicator, Err(Error::Failed(lost)));
         }
@@ -219,7 +219,7 @@ impl<const D: usize> FieldFile<D> {
 
     /// Writes out all steps and closes the files.
     pub fn close(mut self) -> Result<(), Agreed> {
-        if !self.is_broken() {
+        if !self.set_up_failed() {
             self.write_out()?;
         }
         self.file.close()

@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     fem::effect::{Energy, Peaks, Role},
     linear_algebra::tensor::larger,
-    solver::stepping::{Pace, StepOutcome},
+    solver::stepping::{StepLevel, StepOutcome},
 };
 use serde::{Deserialize, Serialize};
 use std::{cmp::Ordering, path::Path};
@@ -62,7 +62,8 @@ pub struct Totals {
     pub most_solutions: u64,
     /// The level of adaptive steps.
     #[serde(default)]
-    pub pace: Option<Pace>,
+    #[serde(rename = "pace")]
+    pub step_level: Option<StepLevel>,
 }
 
 impl Totals {

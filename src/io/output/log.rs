@@ -44,9 +44,9 @@ impl Log {
     }
 
     /// Writes to the file from now on; appends to it if the run continues an earlier one.
-    pub(crate) fn open(&mut self, path: &Path, goes_on: bool) -> Result<()> {
+    pub(crate) fn open(&mut self, path: &Path, is_restart: bool) -> Result<()> {
         match &self.file {
-            Some(file) if !goes_on => file.set_len(0).map_err(|e| Error::unwritable(path, e)),
+            Some(file) if !is_restart => file.set_len(0).map_err(|e| Error::unwritable(path, e)),
             _ => Ok(()),
         }
     }

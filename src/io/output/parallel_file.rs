@@ -119,7 +119,7 @@ impl ParallelFile {
     }
 
     /// Whether writing failed before: then nothing more must be done with the file. The same on all ranks.
-    pub fn is_broken(&self) -> bool {
+    pub fn set_up_failed(&self) -> bool {
         self.broken.get()
     }
 
@@ -146,7 +146,7 @@ impl ParallelFile {
 
     /// Flushes and closes the file on all ranks; one that could not be written is given up.
     pub fn close(self) -> Result<(), Agreed> {
-        if self.is_broken() {
+        if self.set_up_failed() {
             return Ok(());
         }
         self.flush()?;

@@ -22,7 +22,7 @@ pub struct Support {
 #[serde(untagged)]
 pub enum Fix {
     /// All components, or the normal one.
-    Named(Named),
+    Keyword(FixedDirections),
     /// The components along the listed axes.
     Axes(#[schemars(length(min = 1))] Vec<Axis>),
 }
@@ -30,7 +30,7 @@ pub enum Fix {
 /// A set of components that has a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Named {
+pub enum FixedDirections {
     /// All components.
     All,
     /// The normal component. The boundary must be flat and perpendicular to a coordinate axis.

@@ -12,7 +12,7 @@ mod output;
 mod time;
 
 pub use crate::laws::contact::Quadrature;
-pub use boundary::{Axis, BodyForce, Fix, Initial, Named, Support, Traction};
+pub use boundary::{Axis, BodyForce, Fix, FixedDirections, Initial, Support, Traction};
 pub use contact::Contact;
 pub use material::{Material, Region};
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};

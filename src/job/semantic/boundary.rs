@@ -1,7 +1,7 @@
 //! Checks of the names of boundaries, of tables that refer to the same boundary, and of the components of vectors.
 
 use super::findings::{Findings, MeshNames, items};
-use crate::job::document::{Axis, Fix, Named};
+use crate::job::document::{Axis, Fix, FixedDirections};
 use crate::job::source::{Node, Value};
 use crate::laws::expression::{Scalar, Variable};
 use crate::laws::nearest::nearest;
@@ -83,7 +83,7 @@ fn check_claims(findings: &mut Findings<'_>) {
 
 fn holds_all(fix: Option<Fix>, root: &Node) -> bool {
     match fix {
-        Some(Fix::Named(Named::All)) => true,
+        Some(Fix::Keyword(FixedDirections::All)) => true,
         Some(Fix::Axes(axes)) => {
             let plane = root.find("mesh.rectangle").is_some();
             let needed: &[Axis] = if plane { &[Axis::X, Axis::Y] } else { &[Axis::X, Axis::Y, Axis::Z] };

@@ -19,23 +19,23 @@ impl DenseCholesky {
         unsafe {
             check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
             check(sys::MatCholeskyFactor(raw, ptr::null_mut(), ptr::null()))?;
-            let given = Reference::new(|vector| sys::MatCreateVecs(raw, vector, ptr::null_mut()))?;
-            let found = Reference::new(|vector| sys::MatCreateVecs(raw, ptr::null_mut(), vector))?;
-            Ok(Self { factor, vectors: [given, found].map(|raw| DistributedVector { raw }) })
+            let right_hand_side = Reference::new(|vector| sys::MatCreateVecs(raw, vector, ptr::null_mut()))?;
+            let solution = Reference::new(|vector| sys::MatCreateVecs(raw, ptr::null_mut(), vector))?;
+            Ok(Self { factor, vectors: [right_hand_side, solution].map(|raw| DistributedVector { raw }) })
         }
     }
 
     /// Replaces a right-hand side by the solution.
     pub fn solve(&mut self, values: &mut [f64]) -> Result<()> {
-        let [given, found] = &mut self.vectors;
-        let rows = given.owned()?.len();
+        let [right_hand_side, solution] = &mut self.vectors;
+        let rows = right_hand_side.owned()?.len();
         if values.len() != rows {
             return Err(Error::Internal(format!("{} values for a factor of {rows} rows", values.len())));
         }
-        given.owned_mut()?.copy_from_slice(values);
+        right_hand_side.owned_mut()?.copy_from_slice(values);
         // SAFETY: live objects of one size; the two vectors differ.
-        check(unsafe { sys::MatSolve(self.factor.get(), given.raw.get(), found.raw.get()) })?;
-        values.copy_from_slice(&found.owned()?);
+        check(unsafe { sys::MatSolve(self.factor.get(), right_hand_side.raw.get(), solution.raw.get()) })?;
+        values.copy_from_slice(&solution.owned()?);
         Ok(())
     }
 }

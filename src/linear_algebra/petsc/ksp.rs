@@ -44,7 +44,7 @@ impl LinearOutcome {
     }
 
     /// The reason as text.
-    pub fn words(&self) -> &'static str {
+    pub fn description(&self) -> &'static str {
         linear_reason(self.reason)
     }
 
@@ -179,7 +179,7 @@ impl Ksp {
     /// Sets up the preconditioner; required after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
-        levels::give_back(pc, &self.levels)?;
+        levels::restore_interpolations(pc, &self.levels)?;
         if let Some(own) = &self.own
             && is_type(pc, c"shell")?
         {

@@ -57,7 +57,7 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
             check(sys::PCMGGetInterpolation(pc, number, &mut interpolation))?;
             if let Some(shell) = BlockTransfer::shell(interpolation)? {
                 let original = Reference::to(interpolation)?;
-                put_transfer(pc, number, shell.raw.get())?;
+                set_interpolation(pc, number, shell.raw.get())?;
                 level.transfer = Some((shell, original));
             }
             levels.push(level);
@@ -67,11 +67,11 @@ pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
 }
 
 /// Restores PETSc's own interpolations, from which PETSc computes coarse matrices.
-pub(super) fn give_back(pc: sys::PC, levels: &[Level]) -> Result<()> {
+pub(super) fn restore_interpolations(pc: sys::PC, levels: &[Level]) -> Result<()> {
     for (level, number) in levels.iter().zip(1..) {
         if let Some((_, original)) = &level.transfer {
             // SAFETY: live objects of this preconditioner.
-            unsafe { put_transfer(pc, number, original.get())? };
+            unsafe { set_interpolation(pc, number, original.get())? };
         }
     }
     Ok(())
@@ -79,7 +79,7 @@ pub(super) fn give_back(pc: sys::PC, levels: &[Level]) -> Result<()> {
 
 /// # Safety
 /// A live multigrid preconditioner with this level, a live matrix of the right layout.
-unsafe fn put_transfer(pc: sys::PC, level: sys::PetscInt, matrix: sys::Mat) -> Result<()> {
+unsafe fn set_interpolation(pc: sys::PC, level: sys::PetscInt, matrix: sys::Mat) -> Result<()> {
     // SAFETY: the caller's; PETSc keeps its own references.
     unsafe {
         check(sys::PCMGSetInterpolation(pc, level, matrix))?;

@@ -166,7 +166,7 @@ impl ProjectedKsp {
             self.refresh()?;
         } else if !worth && self.reducing {
             let raw = constant.raw.get();
-            reduced.forget()?;
+            reduced.reset_projection()?;
             self.precondition_with(raw)?;
         }
         self.reducing = worth;

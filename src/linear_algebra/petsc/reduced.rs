@@ -21,7 +21,7 @@ pub(super) struct ReducedMatrix {
     /// All components of all nodes.
     directions: f64,
     /// The same for the projection for which the matrix was computed.
-    made_for: Vec<DistributedVector>,
+    projection: Vec<DistributedVector>,
 }
 
 impl ReducedMatrix {
@@ -42,9 +42,9 @@ impl ReducedMatrix {
             Ok(column)
         };
         let columns = (0..block).map(unit).collect::<Result<_>>()?;
-        let made_for: Vec<DistributedVector> = (0..block).map(unit).collect::<Result<_>>()?;
+        let projection: Vec<DistributedVector> = (0..block).map(unit).collect::<Result<_>>()?;
         let mut directions = 0.0;
-        for column in &made_for {
+        for column in &projection {
             directions += column.norm()?.powi(2);
         }
         let ghosts = others.into_iter().enumerate().map(|(at, node)| (node, owned + at)).collect();
@@ -56,7 +56,7 @@ impl ReducedMatrix {
             check(sys::MatSetOption(copy.get(), sys::MAT_SPD, 1))?;
             copy
         };
-        Ok(Self { raw, block, ghosts, columns, directions: directions.round(), made_for })
+        Ok(Self { raw, block, ghosts, columns, directions: directions.round(), projection })
     }
 
     /// Reads the current projection; returns whether the matrix was computed for another one. Collective.
@@ -68,14 +68,14 @@ impl ReducedMatrix {
         for (i, column) in self.columns.iter_mut().enumerate() {
             write_unit(column, i, self.block)?;
             project(column)?;
-            changed |= !column.equals(&self.made_for[i])?;
+            changed |= !column.equals(&self.projection[i])?;
         }
         Ok(changed)
     }
 
-    /// Discards the projection for which the matrix was computed.
-    pub(super) fn forget(&mut self) -> Result<()> {
-        for (i, made) in self.made_for.iter_mut().enumerate() {
+    /// Resets the projection for which the matrix was computed to the identity.
+    pub(super) fn reset_projection(&mut self) -> Result<()> {
+        for (i, made) in self.projection.iter_mut().enumerate() {
             write_unit(made, i, self.block)?;
         }
         Ok(())
@@ -92,7 +92,7 @@ impl ReducedMatrix {
 
     /// Computes the matrix for the projection that was last read. Collective.
     pub(super) fn make(&mut self, constant: &Matrix) -> Result<()> {
-        for (made, column) in self.made_for.iter_mut().zip(&self.columns) {
+        for (made, column) in self.projection.iter_mut().zip(&self.columns) {
             made.copy_from(column)?;
         }
         // SAFETY: live matrices of one pattern.

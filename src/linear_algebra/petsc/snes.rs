@@ -62,7 +62,7 @@ impl NonlinearOutcome {
     }
 
     /// The reason as text.
-    pub fn words(&self) -> &'static str {
+    pub fn description(&self) -> &'static str {
         match self.reason {
             1.. => "converged",
             -3 => "no direction was found that reduces the residual",

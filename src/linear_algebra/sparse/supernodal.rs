@@ -242,7 +242,7 @@ impl<R: Real> Columns<R> {
 }
 
 /// Linked lists of supernodes: each is in the list of the next supernode that it updates.
-struct Waiting {
+struct UpdateLists {
     /// Head of each supernode's list, and the successor of each supernode in its list.
     first: Vec<u32>,
     next: Vec<u32>,
@@ -252,7 +252,7 @@ struct Waiting {
     of_column: Vec<u32>,
 }
 
-impl Waiting {
+impl UpdateLists {
     fn new(nodes: Supernodes<'_>) -> Self {
         let repeat = |node: usize| std::iter::repeat_n(node as u32, nodes.columns(node).len());
         let none = vec![NONE; nodes.len()];
@@ -260,8 +260,8 @@ impl Waiting {
         Self { first: none.clone(), next: none, row: vec![0; nodes.len()], of_column }
     }
 
-    /// Puts a supernode into the list of the one that owns this row.
-    fn put(&mut self, node: usize, rows: &[sys::PetscInt], row: usize) {
+    /// Inserts a supernode into the list of the one that owns this row.
+    fn insert(&mut self, node: usize, rows: &[sys::PetscInt], row: usize) {
         self.row[node] = row;
         if let Some(&at) = rows.get(row) {
             let target = self.of_column[at as usize] as usize;
@@ -271,7 +271,7 @@ impl Waiting {
     }
 
     /// Removes and returns the first of a supernode's list.
-    fn take(&mut self, target: usize) -> Option<usize> {
+    fn pop(&mut self, target: usize) -> Option<usize> {
         let node = self.first[target];
         (node != NONE).then(|| {
             self.first[target] = self.next[node as usize];
@@ -283,8 +283,8 @@ impl Waiting {
 /// The left-looking supernodal factorisation (Ng and Peyton 1993): each supernode receives the updates of earlier ones, and is then
 /// factored as a dense matrix. Columns from position `end` on only receive updates.
 fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, values: &mut [R]) -> Option<()> {
-    let mut waiting = Waiting::new(nodes);
-    let mut line = vec![0u32; waiting.of_column.len()];
+    let mut lists = UpdateLists::new(nodes);
+    let mut line = vec![0u32; lists.of_column.len()];
     let (mut update, mut lines) = (Vec::new(), Vec::new());
     for node in 0..nodes.len() {
         let (own, rows) = (nodes.columns(node), nodes.rows(node));
@@ -295,8 +295,8 @@ fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, valu
         for (column, panel) in factored.clone().zip(panel.chunks_exact_mut(rows.len())) {
             columns.column(column).for_each(|(row, value)| panel[line[row] as usize] = value);
         }
-        while let Some(other) = waiting.take(node) {
-            let (all, first) = (nodes.rows(other), waiting.row[other]);
+        while let Some(other) = lists.pop(node) {
+            let (all, first) = (nodes.rows(other), lists.row[other]);
             let changed = all[first..].partition_point(|&row| (row as usize) < own.end);
             let height = all.len() - first;
             let width = eliminated(nodes.columns(other), end).len();
@@ -312,7 +312,7 @@ fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, valu
                     panel[line as usize] -= *value;
                 }
             }
-            waiting.put(other, all, first + changed);
+            lists.insert(other, all, first + changed);
         }
         let (width, height) = (factored.len(), rows.len());
         if width == 0 {
@@ -333,7 +333,7 @@ fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, valu
                     .for_each(|(value, update)| *value -= *update);
             }
         }
-        waiting.put(node, rows, own.len());
+        lists.insert(node, rows, own.len());
     }
     Some(())
 }

@@ -85,9 +85,9 @@ impl<const B: usize, T: Stored> SymmetricBlocks<B, T> {
         let unit = unit_of(rows.values);
         let count = (rows.starts.len() - 1) / B;
         let mut matrix = Self { starts: vec![0], columns: Vec::new(), blocks: Vec::new(), unit };
-        let half = rows.columns.len() / (2 * B * B) + count;
-        matrix.columns.reserve(half);
-        matrix.blocks.reserve(half);
+        let capacity = rows.columns.len() / (2 * B * B) + count;
+        matrix.columns.reserve(capacity);
+        matrix.blocks.reserve(capacity);
         let mut columns: Vec<u32> = Vec::new();
         for row in 0..count {
             columns.clear();

@@ -136,8 +136,8 @@ fn markdown(text: &str, captions: &mut Vec<(String, String)>) -> (Option<String>
             captions.push((file.trim_end_matches(')').to_owned(), caption.to_owned()));
         } else if !line.is_empty() {
             let mut words = line.to_owned();
-            let goes_on = |next: &&str| !next.trim().is_empty() && !next.starts_with(['|', '#', '-', '!']);
-            while let Some(next) = lines.next_if(goes_on) {
+            let continues = |next: &&str| !next.trim().is_empty() && !next.starts_with(['|', '#', '-', '!']);
+            while let Some(next) = lines.next_if(continues) {
                 words = format!("{words} {}", next.trim());
             }
             out += &format!("<p>{}</p>\n", escape(&words.replace("\\|", "|")));

@@ -122,7 +122,7 @@ impl Verdict {
             return;
         }
         let found = format!(
-            "the step of {step} s exceeds {bound:.4e} s, above which explicit stresses let errors grow"
+            "the step of {step} s exceeds {bound:.4e} s, above which explicit stresses amplify errors"
         );
         self.words.push(found.clone());
         let remedy = format!(

@@ -12,8 +12,8 @@
 
 use super::{
     Norms, StepError, StepOutcome, Stepper,
-    drives::Drives,
-    step_length::{Landing, SNAP, next_step},
+    step_length::{Landing, TIME_TOLERANCE, next_step},
+    time_dependent_data::TimeDependentData,
 };
 use crate::{
     error::{Error, Result},
@@ -28,10 +28,10 @@ const STEPS_BEFORE_GROWTH: u32 = 2;
 /// Safety factor: share of the length that the tolerance allows.
 const SAFETY: f64 = 0.9;
 
-/// The level of a run and the values that determine its changes; saved in checkpoints.
+/// The level of the step length and the values that determine its changes; saved in checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Pace {
+pub struct StepLevel {
     /// Steps are of the first length times two to this power.
     pub level: i32,
     /// Steps taken at this level.
@@ -53,11 +53,11 @@ pub struct Adaptive<const D: usize> {
     /// The end of the run in s.
     end: f64,
     /// Time-dependent loads and obstacles, from the first step on.
-    drives: Option<Drives<D>>,
+    time_dependent_data: Option<TimeDependentData<D>>,
     lowest: i32,
     highest: i32,
-    /// Its level.
-    pub pace: Pace,
+    /// The current level.
+    pub step_level: StepLevel,
 }
 
 impl<const D: usize> Adaptive<D> {
@@ -66,7 +66,15 @@ impl<const D: usize> Adaptive<D> {
         let level = |length: f64| (length / first).log2();
         let lowest = (level(settings.smallest_step) - 1e-9).ceil() as i32;
         let highest = (level(settings.largest_step) + 1e-9).floor() as i32;
-        Self { settings, first, end, drives: None, lowest, highest, pace: Pace::default() }
+        Self {
+            settings,
+            first,
+            end,
+            time_dependent_data: None,
+            lowest,
+            highest,
+            step_level: StepLevel::default(),
+        }
     }
 
     /// Length in s of its longest steps.
@@ -89,25 +97,25 @@ impl<const D: usize> Adaptive<D> {
         state: &mut State,
         target: Landing,
     ) -> Result<StepOutcome, Agreed> {
-        if self.drives.is_none() {
-            self.drives = Some(Drives::of(session, body, self.end));
+        if self.time_dependent_data.is_none() {
+            self.time_dependent_data = Some(TimeDependentData::of(session, body, self.end));
         }
-        if self.pace.velocity == 0.0 && self.pace.stress == 0.0 {
-            self.look_ahead(session, stepper, body, state, target)?;
+        if self.step_level.velocity == 0.0 && self.step_level.stress == 0.0 {
+            self.estimate_reference_norms(session, stepper, body, state, target)?;
         }
         loop {
-            let (step, landing) = self.choose(session, state, target);
+            let (step, landing) = self.choose_step(session, state, target);
             let is_shortest = self.level_of(step) <= self.lowest;
             match self.attempt(session, stepper, body, state, step) {
                 Ok((mut outcome, error, size)) if is_shortest || error <= self.settings.tolerance => {
                     session.agree(stepper.accept(session, body, state, step, &mut outcome))?;
-                    outcome.landed_on = landing.what.filter(|_| step.time == landing.time);
-                    self.pace.velocity = self.pace.velocity.max(size.velocity);
-                    self.pace.stress = self.pace.stress.max(size.stress);
-                    self.grow(step, error);
+                    outcome.landed_on = landing.name.filter(|_| step.time == landing.time);
+                    self.step_level.velocity = self.step_level.velocity.max(size.velocity);
+                    self.step_level.stress = self.step_level.stress.max(size.stress);
+                    self.adjust_level(step, error);
                     return Ok(outcome);
                 }
-                Ok((_, error, _)) => self.reject(step, self.fitting(step, error)),
+                Ok((_, error, _)) => self.reject(step, self.level_within_tolerance(step, error)),
                 Err(error) if error.is_failure() && !is_shortest => {
                     self.reject(step, self.level_of(step) - 1)
                 }
@@ -118,17 +126,20 @@ impl<const D: usize> Adaptive<D> {
 
     /// The length of the next attempt and the time that it must not pass. Within the length, loads and obstacles deviate from
     /// linear functions of time by at most the tolerance. Collective.
-    fn choose(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
+    fn choose_step(&mut self, session: &Session, state: &State, target: Landing) -> (Step, Landing) {
         loop {
             let length = self.next_length(target.time - state.time, state.step_length);
             let landing = self.landing(session, state, target, length);
             let length = self.next_length(landing.time - state.time, state.step_length);
             let step = next_step(state, length, landing.time);
-            let departure = self.drives.as_ref().map_or(0.0, |drives| drives.departure(session, step));
-            if departure <= self.settings.tolerance || self.level_of(step) <= self.lowest {
+            let deviation = self
+                .time_dependent_data
+                .as_ref()
+                .map_or(0.0, |data| data.deviation_from_linear(session, step));
+            if deviation <= self.settings.tolerance || self.level_of(step) <= self.lowest {
                 return (step, landing);
             }
-            self.shorten(step, self.fitting(step, departure));
+            self.shorten(step, self.level_within_tolerance(step, deviation));
         }
     }
 
@@ -136,9 +147,9 @@ impl<const D: usize> Adaptive<D> {
     /// Collective.
     fn landing(&self, session: &Session, state: &State, target: Landing, length: f64) -> Landing {
         let last = target.time.min(state.time + 2.0 * length);
-        let least = (1.0 - SNAP) * self.settings.smallest_step;
-        let drives = self.drives.as_ref();
-        let end = drives.and_then(|d| d.first_end(session, [state.time, last], [least, length]));
+        let shortest = (1.0 - TIME_TOLERANCE) * self.settings.smallest_step;
+        let data = self.time_dependent_data.as_ref();
+        let end = data.and_then(|data| data.next_breakpoint(session, [state.time, last], [shortest, length]));
         end.unwrap_or(target)
     }
 
@@ -153,21 +164,21 @@ impl<const D: usize> Adaptive<D> {
         step: Step,
     ) -> Result<(StepOutcome, f64, Norms), Agreed> {
         let outcome = session.agree(stepper.attempt(session, body, state, step))?;
-        let found = session.agree(stepper.error(session, body, state, step))?;
-        let error = self.relative(found);
+        let step_error = session.agree(stepper.error(session, body, state, step))?;
+        let error = self.relative(step_error);
         let failed = || {
             Error::Failed(format!(
-                "the error of the step to t = {:.6e} s is not a number: values of the state, the loads or the material have no \
-                 limit; see what the job makes them of",
+                "the error of the step to t = {:.6e} s is not a number: the state, the loads or the material contain values \
+                 that are not finite; check the expressions and numbers of the job",
                 step.time
             ))
         };
-        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, found.size)) })
+        session.agree(if error.is_nan() { Err(failed()) } else { Ok((outcome, error, step_error.size)) })
     }
 
     /// Finds reference norms of velocity and stress for a body at rest from a trial step of the largest length, or to the end of
     /// the current piece of a load. The trial step is not committed.
-    fn look_ahead<const S: usize>(
+    fn estimate_reference_norms<const S: usize>(
         &mut self,
         session: &Session,
         stepper: &mut Stepper,
@@ -179,7 +190,7 @@ impl<const D: usize> Adaptive<D> {
         let step = next_step(state, self.longest(), landing.time);
         match self.attempt(session, stepper, body, state, step) {
             Ok((_, _, size)) => {
-                (self.pace.velocity, self.pace.stress) = (size.velocity, size.stress);
+                (self.step_level.velocity, self.step_level.stress) = (size.velocity, size.stress);
                 Ok(())
             }
             Err(error) if error.is_failure() => Ok(()),
@@ -190,13 +201,14 @@ impl<const D: usize> Adaptive<D> {
     /// The length of the next step, with the time `left` to the target, after a step of the length `last` (0 before the first): at
     /// most twice `last`, and half of `left` where a full step would leave a very short remainder.
     fn next_length(&self, left: f64, last: f64) -> f64 {
-        let mut level = self.pace.level.clamp(self.lowest, self.highest);
+        let mut level = self.step_level.level.clamp(self.lowest, self.highest);
         while last > 0.0 && level > self.lowest && self.length(level) > 2.000_001 * last {
             level -= 1;
         }
         let length = self.length(level);
-        let leaves_a_sliver = left > (1.0 + SNAP) * length && left < (2.0 - SNAP) * length;
-        if leaves_a_sliver { 0.5 * left } else { length }
+        let leaves_short_remainder =
+            left > (1.0 + TIME_TOLERANCE) * length && left < (2.0 - TIME_TOLERANCE) * length;
+        if leaves_short_remainder { 0.5 * left } else { length }
     }
 
     /// The highest level whose step length is not above this length.
@@ -206,43 +218,44 @@ impl<const D: usize> Adaptive<D> {
 
     /// The error relative to the largest norms so far; NaN if the error or a norm is NaN.
     fn relative(&self, StepError { error, size, negligible }: StepError) -> f64 {
-        let share = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
-        let largest_velocity = self.pace.velocity.max(size.velocity);
-        let largest_stress = self.pace.stress.max(size.stress);
-        let velocity = share(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
-        let stress = share(error.stress, largest_stress.max(negligible.stress * largest_velocity));
+        let ratio = |error: f64, largest: f64| if error <= 0.0 { 0.0 } else { error / largest };
+        let largest_velocity = self.step_level.velocity.max(size.velocity);
+        let largest_stress = self.step_level.stress.max(size.stress);
+        let velocity = ratio(error.velocity, largest_velocity.max(negligible.velocity * largest_stress));
+        let stress = ratio(error.stress, largest_stress.max(negligible.stress * largest_velocity));
         (velocity * velocity + stress * stress).sqrt()
     }
 
     /// The level whose error is expected to be within the tolerance: the error is proportional to the square of the length.
-    fn fitting(&self, step: Step, error: f64) -> i32 {
+    fn level_within_tolerance(&self, step: Step, error: f64) -> i32 {
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
         let level = (length / self.first).log2().floor();
         if level.is_finite() { (level as i32).min(self.level_of(step) - 1) } else { self.level_of(step) - 1 }
     }
 
     fn reject(&mut self, step: Step, level: i32) {
-        self.pace.rejected += 1;
+        self.step_level.rejected += 1;
         self.shorten(step, level);
     }
 
     fn shorten(&mut self, step: Step, level: i32) {
-        self.pace.taken = 0;
-        self.pace.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
+        self.step_level.taken = 0;
+        self.step_level.level = level.min(self.level_of(step)).clamp(self.lowest, self.highest);
     }
 
     /// Moves up one level if a step of twice the length would be within the tolerance, after some steps at this level.
-    fn grow(&mut self, step: Step, error: f64) {
+    fn adjust_level(&mut self, step: Step, error: f64) {
         let level = self.level_of(step).clamp(self.lowest, self.highest);
-        if step.length < 0.999_999 * self.length(self.pace.level) {
+        if step.length < 0.999_999 * self.length(self.step_level.level) {
             // Shortened to end at a prescribed time, or growing again afterwards.
             return;
         }
-        self.pace.taken += 1;
+        self.step_level.taken += 1;
         let length = SAFETY * step.length * (self.settings.tolerance / error).sqrt();
-        if self.pace.taken >= STEPS_BEFORE_GROWTH && length >= 2.0 * step.length && level < self.highest {
-            self.pace.level = level + 1;
-            self.pace.taken = 0;
+        if self.step_level.taken >= STEPS_BEFORE_GROWTH && length >= 2.0 * step.length && level < self.highest
+        {
+            self.step_level.level = level + 1;
+            self.step_level.taken = 0;
         }
     }
 }
@@ -270,75 +283,83 @@ mod tests {
     #[test]
     fn small_errors_let_steps_double_after_two_steps() {
         let mut adaptive = adaptive();
-        adaptive.grow(step(0.01), 1e-3);
-        assert_eq!(adaptive.pace.level, 0, "one step is not enough");
-        adaptive.grow(step(0.01), 1e-3);
-        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 0));
-        adaptive.grow(step(0.02), 5e-3);
-        adaptive.grow(step(0.02), 5e-3);
-        assert_eq!(adaptive.pace.level, 1, "no room for twice the length");
-        adaptive.grow(step(0.015), 1e-9);
-        assert_eq!((adaptive.pace.level, adaptive.pace.taken), (1, 2), "a cut step says nothing");
+        adaptive.adjust_level(step(0.01), 1e-3);
+        assert_eq!(adaptive.step_level.level, 0, "after one step the level is unchanged");
+        adaptive.adjust_level(step(0.01), 1e-3);
+        assert_eq!((adaptive.step_level.level, adaptive.step_level.taken), (1, 0));
+        adaptive.adjust_level(step(0.02), 5e-3);
+        adaptive.adjust_level(step(0.02), 5e-3);
+        assert_eq!(adaptive.step_level.level, 1, "an error that permits no doubling");
+        adaptive.adjust_level(step(0.015), 1e-9);
+        assert_eq!(
+            (adaptive.step_level.level, adaptive.step_level.taken),
+            (1, 2),
+            "a shortened step does not change the level"
+        );
     }
 
     #[test]
-    fn a_rejected_step_is_tried_again_as_short_as_its_error_asks_for() {
+    fn a_rejected_step_is_repeated_with_the_length_that_its_error_permits() {
         let mut adaptive = adaptive();
-        let level = adaptive.fitting(step(0.01), 0.05);
+        let level = adaptive.level_within_tolerance(step(0.01), 0.05);
         assert_eq!(level, -2, "0.01 x 0.9 / sqrt 5 = 0.004");
         adaptive.reject(step(0.01), level);
-        assert_eq!((adaptive.pace.level, adaptive.pace.rejected), (-2, 1));
-        assert_eq!(adaptive.fitting(step(0.01), f64::NAN), -1);
+        assert_eq!((adaptive.step_level.level, adaptive.step_level.rejected), (-2, 1));
+        assert_eq!(adaptive.level_within_tolerance(step(0.01), f64::NAN), -1);
     }
 
     #[test]
-    fn the_error_is_relative_to_the_largest_norms_and_never_hides_what_is_no_number() {
+    fn the_error_is_relative_to_the_largest_norms_and_propagates_nan() {
         let norms = |[velocity, stress]: [f64; 2]| Norms { velocity, stress };
-        let found = |error: [f64; 2], size: [f64; 2]| StepError {
+        let step_error = |error: [f64; 2], size: [f64; 2]| StepError {
             error: norms(error),
             size: norms(size),
             negligible: norms([1e-3, 1e-2]),
         };
         let mut adaptive = adaptive();
-        (adaptive.pace.velocity, adaptive.pace.stress) = (2.0, 0.5);
-        assert_eq!(adaptive.relative(found([0.6, 0.0], [1.0, 1.0])), 0.3, "the largest velocity was 2");
-        assert_eq!(adaptive.relative(found([0.0, 0.8], [1.0, 2.0])), 0.4, "the stress was never larger");
-        assert!((adaptive.relative(found([0.6, 0.8], [1.0, 2.0])) - 0.5).abs() < 1e-15);
-        assert_eq!(adaptive.relative(found([-1e-30, -0.0], [1.0, 1.0])), 0.0, "rounding below zero");
+        (adaptive.step_level.velocity, adaptive.step_level.stress) = (2.0, 0.5);
+        assert_eq!(adaptive.relative(step_error([0.6, 0.0], [1.0, 1.0])), 0.3, "the largest velocity was 2");
+        assert_eq!(
+            adaptive.relative(step_error([0.0, 0.8], [1.0, 2.0])),
+            0.4,
+            "the current stress is the largest"
+        );
+        assert!((adaptive.relative(step_error([0.6, 0.8], [1.0, 2.0])) - 0.5).abs() < 1e-15);
+        assert_eq!(adaptive.relative(step_error([-1e-30, -0.0], [1.0, 1.0])), 0.0, "rounding below zero");
         let [nan, infinite] = [f64::NAN, f64::INFINITY];
         for error in [[nan, 0.1], [0.1, nan], [infinite, nan]] {
-            assert!(adaptive.relative(found(error, [1.0, 1.0])).is_nan(), "{error:?}");
+            assert!(adaptive.relative(step_error(error, [1.0, 1.0])).is_nan(), "{error:?}");
         }
-        (adaptive.pace.velocity, adaptive.pace.stress) = (0.0, 0.0);
-        assert_eq!(adaptive.relative(found([0.0, 0.0], [0.0, 0.0])), 0.0, "nothing moves");
+        (adaptive.step_level.velocity, adaptive.step_level.stress) = (0.0, 0.0);
+        assert_eq!(adaptive.relative(step_error([0.0, 0.0], [0.0, 0.0])), 0.0, "a body at rest");
         assert!(
-            (adaptive.relative(found([1e-4, 0.0], [1e-9, 5.0])) - 0.02).abs() < 1e-15,
-            "held: 1e-4 of 5e-3"
+            (adaptive.relative(step_error([1e-4, 0.0], [1e-9, 5.0])) - 0.02).abs() < 1e-15,
+            "a fixed body: 1e-4 of 5e-3"
         );
         assert!(
-            (adaptive.relative(found([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
-            "flying: 1e-4 of 5e-2"
+            (adaptive.relative(step_error([0.0, 1e-4], [5.0, 1e-9])) - 2e-3).abs() < 1e-15,
+            "a free body: 1e-4 of 5e-2"
         );
     }
 
     #[test]
-    fn lengths_double_at_most_and_leave_no_sliver() {
+    fn lengths_at_most_double_and_leave_no_short_remainder() {
         let mut adaptive = adaptive();
-        adaptive.pace.level = 3;
-        assert_eq!(adaptive.next_length(100.0, 0.0), 0.08, "nothing was before the first");
+        adaptive.step_level.level = 3;
+        assert_eq!(adaptive.next_length(100.0, 0.0), 0.08, "the first step");
         assert_eq!(adaptive.next_length(100.0, 0.01), 0.02);
         assert_eq!(adaptive.next_length(100.0, 0.005), 0.01);
         assert_eq!(adaptive.next_length(100.0, 0.0099), 0.01, "a power of two times the first length");
         assert_eq!(adaptive.next_length(100.0, 1e-9), 0.00125, "never below the shortest length");
-        assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of what is left");
-        assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "cut by the target, not here");
+        assert_eq!(adaptive.next_length(0.12, 0.08), 0.06, "half of the remainder");
+        assert_eq!(adaptive.next_length(0.04, 0.08), 0.08, "shortened later, by the target");
         assert_eq!(adaptive.next_length(0.16, 0.08), 0.08, "two steps are left");
-        adaptive.pace.level = -9;
+        adaptive.step_level.level = -9;
         assert_eq!(adaptive.next_length(100.0, 0.08), 0.00125);
     }
 
     #[test]
-    fn the_level_of_a_step_is_the_highest_that_is_not_longer() {
+    fn the_level_of_a_step_is_the_highest_whose_length_is_not_larger() {
         let adaptive = adaptive();
         for (length, level) in [(0.01, 0), (0.0199, 0), (0.02, 1), (0.005, -1), (0.0049, -2), (0.08, 3)] {
             assert_eq!(adaptive.level_of(step(length)), level, "{length}");

@@ -38,15 +38,15 @@ impl Bounded {
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<usize> {
-        let solved = self.solve_here(&mut problem.body.contacts, system, trial);
+        let solved = self.solve_on_rank(&mut problem.body.contacts, system, trial);
         let outcome = problem.session.agree(solved)?;
         if !outcome.converged() {
-            return Err(problem.failed(outcome.words(), REMEDY));
+            return Err(problem.failed(outcome.description(), REMEDY));
         }
         Ok(outcome.iterations)
     }
 
-    fn solve_here<const D: usize>(
+    fn solve_on_rank<const D: usize>(
         &mut self,
         contacts: &mut [Contact<D>],
         system: System<'_>,
@@ -60,7 +60,9 @@ impl Bounded {
         }
         let bounds = [&self.lower, &self.upper];
         let Some(matrix) = system.matrix.assembled() else {
-            return Err(Error::Internal("bounds need the entries of the matrix".into()));
+            return Err(Error::Internal(
+                "the solver of variational inequalities requires an assembled matrix".into(),
+            ));
         };
         let limits = Limits {
             absolute: system.tolerance,
@@ -84,11 +86,11 @@ impl Bounded {
 }
 
 /// Refuses contacts on this rank that are not velocity bounds.
-pub(super) fn refuse<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
-    match body.contacts.iter().find_map(Contact::more_than_bounds) {
+pub(super) fn refuse_oblique_normals<const D: usize, const S: usize>(body: &Body<D, S>) -> Result<()> {
+    match body.contacts.iter().find_map(Contact::oblique_normal) {
         None => Ok(()),
         Some(place) => Err(Error::Refused(format!(
-            "[solver] method = \"vinewtonrsls\" bounds components of the velocity, but the normal at {place:?} m is not along \
+            "[solver] method = \"vinewtonrsls\" limits components of the velocity, but the normal at {place:?} m is not parallel to \
              an axis; use method = \"newton\""
         ))),
     }

@@ -20,7 +20,7 @@ use super::{
     newton::Newton,
     problem::{StepProblem, System},
     resistance::{resistances, resistances_of_body},
-    springs::SprungRows,
+    springs::RowsWithSprings,
     substructuring::{Factors, Substructures},
 };
 use crate::{
@@ -34,9 +34,9 @@ use crate::{
 };
 
 /// Number of corrections after which single precision has failed.
-const CORRECTIONS: usize = 12;
-/// A correction that leaves more than this share of the residual counts as divergence.
-const LARGEST_SHARE_LEFT: f64 = 0.5;
+const MAX_CORRECTIONS: usize = 12;
+/// A correction that reduces the residual by less than this factor counts as divergence.
+const LARGEST_REDUCTION: f64 = 0.5;
 /// Share of the tolerance to which the contact system is solved. Later corrections start so close to their solution that Newton's
 /// method would otherwise stop just below the tolerance, with velocity and pressure at that distance from their graph.
 const CONTACT_SHARE: f64 = 0.1;
@@ -75,7 +75,7 @@ struct Elimination {
     substructures: Substructures,
     values: Vec<f64>,
     /// Half solves since the count of traffic was restarted.
-    halves: u64,
+    half_solves: u64,
 }
 
 /// The contact nodes of this rank, in the order of vectors of contact nodes, and the motions on which laws act.
@@ -135,7 +135,7 @@ impl Condensed {
                 substructures: Substructures::new(session, &body.mesh, &frames)?,
                 frames,
                 values: vec![0.0; body.mesh.owned * D],
-                halves: 0,
+                half_solves: 0,
             },
             precision,
             own: start..start + nodes.motions.len(),
@@ -156,13 +156,13 @@ impl Condensed {
         &mut self,
         session: &Session,
         body: &Body<D, S>,
-        rows: SprungRows,
+        rows: RowsWithSprings,
         matrix: &Matrix,
         like: &DistributedVector,
     ) -> Result<bool> {
-        let SprungRows { mut rows, springs } = rows;
+        let RowsWithSprings { mut rows, springs } = rows;
         let Elimination { factored, frames, substructures, .. } = &mut self.elimination;
-        frames.turn_matrix(&mut rows);
+        frames.rotate_matrix(&mut rows);
         *factored = None;
         let order = self.order.as_deref();
         let Some(factors) = Factors::new(session.world(), substructures, &rows, order, self.precision)?
@@ -176,7 +176,7 @@ impl Condensed {
         let has_springs = springs.is_some();
         let condensed = CondensedMatrix {
             lower: factors.last_factor(),
-            places: factors.places(unknowns),
+            positions: factors.positions(unknowns),
             nodes: groups.clone(),
             own: self.own.clone(),
             motions: self.nodes.motions.clone(),
@@ -200,12 +200,12 @@ impl Condensed {
     }
 
     /// The precision of the factor in use.
-    pub(super) fn precision_in_use(&mut self) -> Result<Precision> {
-        Ok(in_use(&mut self.elimination.factored)?.factors.precision())
+    pub(super) fn active_precision(&mut self) -> Result<Precision> {
+        Ok(factored_mut(&mut self.elimination.factored)?.factors.precision())
     }
 
-    /// Exchanges the factored matrix for another.
-    pub(super) fn exchange(&mut self, other: &mut Option<Factored>) {
+    /// Swaps the factored matrix with another.
+    pub(super) fn swap_factored(&mut self, other: &mut Option<Factored>) {
         std::mem::swap(&mut self.elimination.factored, other);
         if let Some(factored) = &self.elimination.factored {
             self.newton.scales.clone_from(&factored.scales);
@@ -224,33 +224,34 @@ impl Condensed {
 
     /// Restarts the count of traffic.
     pub(super) fn restart_traffic(&mut self) {
-        self.elimination.halves = 0;
+        self.elimination.half_solves = 0;
         self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
     }
 
     /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product.
     pub(super) fn traffic(&self) -> u64 {
-        let Elimination { factored, halves, .. } = &self.elimination;
-        let of = |factored: &Factored| halves * factored.factors.bytes() + factored.condensed.traffic();
-        factored.as_ref().map_or(0, of)
+        let Elimination { factored, half_solves, .. } = &self.elimination;
+        let bytes =
+            |factored: &Factored| half_solves * factored.factors.bytes() + factored.condensed.traffic();
+        factored.as_ref().map_or(0, bytes)
     }
 
     /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails with a factor in single precision,
-    /// [`Condensed::start_again`] resets `trial`. Collective.
+    /// [`Condensed::restore_start`] resets `trial`. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        if self.precision_in_use()? == Precision::Single {
+        if self.active_precision()? == Precision::Single {
             return self.refine(problem, system, trial);
         }
         let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
         elimination.forward(system.right_hand_side)?;
         nodes.restrict::<D>(system.converged, converged)?;
         nodes.restrict::<D>(trial, velocity)?;
-        let Factored { factors, condensed, .. } = in_use(&mut elimination.factored)?;
+        let Factored { factors, condensed, .. } = factored_mut(&mut elimination.factored)?;
         condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
         let contact = System { matrix: condensed, right_hand_side, converged, ..system };
         let outcome = newton.solve(problem, contact, velocity)?;
@@ -278,13 +279,13 @@ impl Condensed {
         nodes.restrict::<D>(system.converged, converged)?;
         system.write_residual(trial, residual)?;
         let (mut sum, mut last) = (StepOutcome::default(), f64::INFINITY);
-        for _ in 0..CORRECTIONS {
+        for _ in 0..MAX_CORRECTIONS {
             // The contact system.
-            nodes.separate_forces::<D>(residual, change)?;
+            nodes.extract_forces::<D>(residual, change)?;
             elimination.forward(residual)?;
             nodes.restrict::<D>(trial, velocity)?;
             before.copy_from(velocity)?;
-            let Factored { factors, condensed, .. } = in_use(&mut elimination.factored)?;
+            let Factored { factors, condensed, .. } = factored_mut(&mut elimination.factored)?;
             condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
             right_hand_side.add_scaled(1.0, change)?;
             condensed.multiply(before, product)?;
@@ -313,44 +314,46 @@ impl Condensed {
             change.add_scaled(-1.0, product)?;
             correction.copy_from(residual)?;
             nodes.subtract::<D>(change, correction)?;
-            let left = correction.norm()?;
-            if left <= system.tolerance {
+            let norm = correction.norm()?;
+            if norm <= system.tolerance {
                 trial.update_ghosts()?;
                 return Ok(sum);
             }
-            if left.is_nan() || left > LARGEST_SHARE_LEFT * last {
+            if norm.is_nan() || norm > LARGEST_REDUCTION * last {
                 break;
             }
-            last = left;
+            last = norm;
         }
         Err(Error::Failed("corrections with a factor in single precision do not converge".into()))
     }
 
     /// Resets `trial` to the start value of the last step with a factor in single precision.
-    pub(super) fn start_again(&self, trial: &mut DistributedVector) -> Result<()> {
+    pub(super) fn restore_start(&self, trial: &mut DistributedVector) -> Result<()> {
         self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
     }
 }
 
-/// The factor in use.
-fn in_use(factored: &mut Option<Factored>) -> Result<&mut Factored> {
-    factored.as_mut().ok_or_else(|| Error::Internal("a step was taken before its matrix was factored".into()))
+/// The factored matrix, which must exist.
+fn factored_mut(factored: &mut Option<Factored>) -> Result<&mut Factored> {
+    factored
+        .as_mut()
+        .ok_or_else(|| Error::Internal("a step was solved before its matrix was factored".into()))
 }
 
 impl Elimination {
     /// Solves `L y = b`. Collective.
     fn forward(&mut self, right_hand_side: &DistributedVector) -> Result<()> {
         self.values.copy_from_slice(&right_hand_side.owned()?);
-        self.frames.turn(&mut self.values, false);
-        self.halves += 1;
-        in_use(&mut self.factored)?.factors.forward(&self.values)
+        self.frames.rotate(&mut self.values, false);
+        self.half_solves += 1;
+        factored_mut(&mut self.factored)?.factors.forward(&self.values)
     }
 
     /// Solves `L^T x = y`.
     fn backward(&mut self, solution: &mut DistributedVector) -> Result<()> {
-        self.halves += 1;
-        in_use(&mut self.factored)?.factors.backward(&mut self.values)?;
-        self.frames.turn(&mut self.values, true);
+        self.half_solves += 1;
+        factored_mut(&mut self.factored)?.factors.backward(&mut self.values)?;
+        self.frames.rotate(&mut self.values, true);
         solution.owned_mut()?.copy_from_slice(&self.values);
         Ok(())
     }
@@ -360,7 +363,7 @@ impl ContactNodes {
     fn new<const D: usize>(contact: &[ContactNode<D>]) -> Self {
         let motions = contact.iter().enumerate().flat_map(|(number, contact)| {
             let motion = move |direction: &[f64; D]| Motion { at: number * D, direction: direction.to_vec() };
-            contact.frame[..contact.seen].iter().map(motion)
+            contact.frame[..contact.active].iter().map(motion)
         });
         Self { nodes: contact.iter().map(|contact| contact.node).collect(), motions: motions.collect() }
     }
@@ -397,14 +400,14 @@ impl ContactNodes {
         for motion in &self.motions {
             let velocity = &velocity[motion.at..][..D];
             let value = &mut trial[self.nodes[motion.at / D] * D..][..D];
-            let off: f64 = (0..D).map(|i| motion.direction[i] * (velocity[i] - value[i])).sum();
-            (0..D).for_each(|i| value[i] += off * motion.direction[i]);
+            let difference: f64 = (0..D).map(|i| motion.direction[i] * (velocity[i] - value[i])).sum();
+            (0..D).for_each(|i| value[i] += difference * motion.direction[i]);
         }
         Ok(())
     }
 
     /// Moves the forces along the motions on which laws act from a residual of all nodes into a vector of contact nodes.
-    fn separate_forces<const D: usize>(
+    fn extract_forces<const D: usize>(
         &self,
         residual: &mut DistributedVector,
         forces: &mut DistributedVector,
@@ -413,10 +416,10 @@ impl ContactNodes {
         forces.fill(0.0);
         for motion in &self.motions {
             let value = &mut residual[self.nodes[motion.at / D] * D..][..D];
-            let along: f64 = motion.direction.iter().zip(&*value).map(|(n, r)| n * r).sum();
+            let component: f64 = motion.direction.iter().zip(&*value).map(|(n, r)| n * r).sum();
             for ((value, force), n) in value.iter_mut().zip(&mut forces[motion.at..]).zip(&motion.direction) {
-                *value -= along * n;
-                *force += along * n;
+                *value -= component * n;
+                *force += component * n;
             }
         }
         Ok(())

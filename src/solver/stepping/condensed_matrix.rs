@@ -25,7 +25,7 @@ pub(super) struct CondensedMatrix {
     /// Columns of `L` from the diagonal down.
     pub lower: Vec<f64>,
     /// The position of each motion of all ranks in `L`.
-    pub places: Vec<usize>,
+    pub positions: Vec<usize>,
     /// The motions of each node of all ranks.
     pub nodes: Vec<Range<usize>>,
     /// The range of this rank in these motions.
@@ -44,12 +44,12 @@ pub(super) struct Workspace {
     all: Vec<f64>,
     gathering: Gathering,
     /// Amounts in the order of the factor.
-    placed: [Vec<f64>; 2],
+    ordered_amounts: [Vec<f64>; 2],
     /// The blocks of a projection, of this rank and of all ranks, and the images of unit motions that they are made of.
     own_blocks: Vec<f64>,
     blocks: Vec<f64>,
     block_gathering: Gathering,
-    images: [Vec<f64>; DIMENSIONS],
+    images: [Vec<f64>; MAX_DIMENSION],
     /// Bytes read since the count of traffic was restarted.
     traffic: u64,
 }
@@ -64,7 +64,7 @@ impl Workspace {
             own: vec![0.0; motions.len()],
             all: vec![0.0; total],
             gathering: Gathering::new(&world, motions.len())?,
-            placed: [vec![0.0; total], vec![0.0; total]],
+            ordered_amounts: [vec![0.0; total], vec![0.0; total]],
             own_blocks: Vec::with_capacity(pairs),
             blocks: vec![0.0; block_gathering.total()],
             block_gathering,
@@ -76,18 +76,18 @@ impl Workspace {
 
 /// Data of the current subspace.
 pub(super) struct Subspace {
-    room: DistributedVector,
-    /// The blocks of the projection, node after node of all ranks.
-    made_for: Vec<f64>,
+    work_vector: DistributedVector,
+    /// The blocks of the projection for which the factor was computed, node after node of all ranks.
+    projection_blocks: Vec<f64>,
     factor: Option<DenseCholesky>,
-    in_use: bool,
+    is_active: bool,
 }
 
 impl Subspace {
     /// The whole space, for vectors with the layout of `like`.
     pub(super) fn whole(like: &DistributedVector) -> Result<RefCell<Self>> {
-        let room = like.like()?;
-        Ok(RefCell::new(Self { room, made_for: Vec::new(), factor: None, in_use: false }))
+        let work_vector = like.like()?;
+        Ok(RefCell::new(Self { work_vector, projection_blocks: Vec::new(), factor: None, is_active: false }))
     }
 }
 
@@ -96,8 +96,8 @@ impl CondensedMatrix {
     pub(super) fn write_times_lower(&self, x: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         workspace.traffic += self.bytes();
-        self.times_lower(x, &mut workspace.placed[0]);
-        self.write(&workspace.placed[0], vector)
+        self.times_lower(x, &mut workspace.ordered_amounts[0]);
+        self.write(&workspace.ordered_amounts[0], vector)
     }
 
     /// `L^T x` for the amounts `x` of all motions in a vector of contact nodes. Collective.
@@ -105,7 +105,7 @@ impl CondensedMatrix {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(vector, workspace)?;
         workspace.traffic += self.bytes();
-        self.times_upper(&workspace.placed[0], product);
+        self.times_upper(&workspace.ordered_amounts[0], product);
         Ok(())
     }
 
@@ -122,7 +122,7 @@ impl CondensedMatrix {
     /// Reads the amounts of all motions in a vector of contact nodes into the first work vector, in the order of the factor.
     /// Collective.
     fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
-        let Workspace { own, all, gathering, placed: [placed, _], .. } = workspace;
+        let Workspace { own, all, gathering, ordered_amounts: [ordered, _], .. } = workspace;
         {
             let values = vector.owned()?;
             for (amount, motion) in own.iter_mut().zip(&self.motions) {
@@ -130,7 +130,7 @@ impl CondensedMatrix {
             }
         }
         gathering.gather(&SimpleCommunicator::world(), own, all);
-        self.places.iter().zip(all).for_each(|(&place, amount)| placed[place] = *amount);
+        self.positions.iter().zip(all).for_each(|(&position, amount)| ordered[position] = *amount);
         Ok(())
     }
 
@@ -139,7 +139,7 @@ impl CondensedMatrix {
         let mut values = vector.owned_mut()?;
         values.fill(0.0);
         for (motion, number) in self.motions.iter().zip(self.own.clone()) {
-            let amount = amounts[self.places[number]];
+            let amount = amounts[self.positions[number]];
             let value = values[motion.at..].iter_mut();
             value.zip(&motion.direction).for_each(|(value, direction)| *value += amount * direction);
         }
@@ -220,16 +220,16 @@ impl CondensedMatrix {
     }
 
     /// Factors `P S P + k (I - P)`, where `P` has these blocks; in the order of the motions.
-    fn factor_on(&self, blocks: &[f64]) -> Result<DenseCholesky> {
-        let size = self.places.len();
+    fn factor_on_subspace(&self, blocks: &[f64]) -> Result<DenseCholesky> {
+        let size = self.positions.len();
         let mut full = vec![0.0; size * size];
         for at in 0..size {
             full[at * size + at..][..size - at].copy_from_slice(column(&self.lower, size, at));
         }
         let product = times_own_transpose(size, &full)?;
-        for (to, &place) in full.chunks_exact_mut(size.max(1)).zip(&self.places) {
+        for (to, &place) in full.chunks_exact_mut(size.max(1)).zip(&self.positions) {
             let from = &product[place * size..][..size];
-            to.iter_mut().zip(&self.places).for_each(|(value, &place)| *value = from[place]);
+            to.iter_mut().zip(&self.positions).for_each(|(value, &place)| *value = from[place]);
         }
         let mean = (0..size).map(|at| full[at * size + at]).sum::<f64>() / size as f64;
         let mut first = 0;
@@ -237,10 +237,10 @@ impl CondensedMatrix {
             let block = &blocks[first..first + node.len() * node.len()];
             first += block.len();
             for line in 0..size {
-                mix(&mut full, block, node.clone().map(|at| at * size + line));
+                multiply_entries(&mut full, block, node.clone().map(|at| at * size + line));
             }
             for line in 0..size {
-                mix(&mut full, block, node.clone().map(|at| line * size + at));
+                multiply_entries(&mut full, block, node.clone().map(|at| line * size + at));
             }
             for (i, row) in node.clone().enumerate() {
                 for (j, column) in node.clone().enumerate() {
@@ -253,19 +253,19 @@ impl CondensedMatrix {
     }
 }
 
-/// Most components of a node.
-const DIMENSIONS: usize = 3;
+/// Largest number of components of a node.
+const MAX_DIMENSION: usize = 3;
 
 impl StepMatrix for CondensedMatrix {
     fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(x, workspace)?;
         workspace.traffic += 2 * self.bytes();
-        let [amounts, product] = &mut workspace.placed;
+        let [amounts, product] = &mut workspace.ordered_amounts;
         self.times_upper(amounts, product);
         self.times_lower(product, amounts);
         for ((spring, amount), number) in self.springs.iter().zip(&workspace.own).zip(self.own.clone()) {
-            amounts[self.places[number]] -= spring * amount;
+            amounts[self.positions[number]] -= spring * amount;
         }
         self.write(amounts, y)
     }
@@ -274,13 +274,13 @@ impl StepMatrix for CondensedMatrix {
         let workspace = &mut *self.workspace.borrow_mut();
         self.read(r, workspace)?;
         workspace.traffic += 2 * self.bytes();
-        let [amounts, ordered] = &mut workspace.placed;
+        let [amounts, ordered] = &mut workspace.ordered_amounts;
         let mut subspace = self.subspace.borrow_mut();
         match &mut *subspace {
-            Subspace { factor: Some(factor), in_use: true, .. } => {
-                ordered.iter_mut().zip(&self.places).for_each(|(amount, &place)| *amount = amounts[place]);
+            Subspace { factor: Some(factor), is_active: true, .. } => {
+                ordered.iter_mut().zip(&self.positions).for_each(|(amount, &place)| *amount = amounts[place]);
                 factor.solve(ordered)?;
-                self.places.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
+                self.positions.iter().zip(ordered).for_each(|(&place, amount)| amounts[place] = *amount);
             }
             _ => self.solve(amounts),
         }
@@ -290,26 +290,26 @@ impl StepMatrix for CondensedMatrix {
     fn set_subspace(&self, project: &mut dyn FnMut(&mut DistributedVector) -> Result<()>) -> Result<bool> {
         let mut subspace = self.subspace.borrow_mut();
         let workspace = &mut *self.workspace.borrow_mut();
-        self.write_blocks(project, &mut subspace.room, workspace)?;
+        self.write_blocks(project, &mut subspace.work_vector, workspace)?;
         let blocks = &workspace.blocks;
         let (mut removed, mut first) = (0.0, 0);
         for count in self.nodes.iter().map(ExactSizeIterator::len) {
             removed += (0..count).map(|i| 1.0 - blocks[first + i * (count + 1)]).sum::<f64>();
             first += count * count;
         }
-        subspace.in_use = removed.round() >= MISSING_DIRECTIONS;
-        if !subspace.in_use || (subspace.factor.is_some() && subspace.made_for == *blocks) {
+        subspace.is_active = removed.round() >= MISSING_DIRECTIONS;
+        if !subspace.is_active || (subspace.factor.is_some() && subspace.projection_blocks == *blocks) {
             return Ok(false);
         }
-        subspace.factor = Some(self.factor_on(blocks)?);
-        subspace.made_for.clone_from(blocks);
+        subspace.factor = Some(self.factor_on_subspace(blocks)?);
+        subspace.projection_blocks.clone_from(blocks);
         Ok(true)
     }
 }
 
 /// Replaces these entries by their product with a symmetric block.
-fn mix(entries: &mut [f64], block: &[f64], at: impl Iterator<Item = usize> + Clone) {
-    let mut before = [0.0; DIMENSIONS];
+fn multiply_entries(entries: &mut [f64], block: &[f64], at: impl Iterator<Item = usize> + Clone) {
+    let mut before = [0.0; MAX_DIMENSION];
     at.clone().zip(&mut before).for_each(|(at, value)| *value = entries[at]);
     let count = block.len().isqrt();
     for (at, row) in at.zip(block.chunks_exact(count.max(1))) {

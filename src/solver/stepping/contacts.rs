@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Adds the energy that contact dissipated in a committed step, the numerical part, and the work on obstacles.
-pub(super) fn released_by_contact<const D: usize, const S: usize>(
+pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &State,
     step: Step,
@@ -18,7 +18,7 @@ pub(super) fn released_by_contact<const D: usize, const S: usize>(
 ) -> Result<()> {
     let velocity = state.velocity.local()?;
     for contact in &body.contacts {
-        let [dissipated, numerical, work] = contact.release(&velocity, step.length);
+        let [dissipated, numerical, work] = contact.energy_of_step(&velocity, step.length);
         energy.contact += dissipated;
         energy.numerical += numerical;
         energy.work += work;

@@ -6,7 +6,7 @@
 
 use super::{
     linear_solver::{FactorPrecision, Preconditioner, ProblemSize},
-    substructuring::{MOST_ON_INTERFACE, interface_nodes},
+    substructuring::{MAX_INTERFACE_UNKNOWNS, interface_nodes},
 };
 use crate::{
     fem::{
@@ -29,25 +29,25 @@ pub struct Cost {
 }
 
 /// Size in bytes above which a factor in double precision does not fit any cache.
-const BEYOND_CACHES: f64 = 16e6;
+const CACHE_SIZE: f64 = 16e6;
 /// Seconds for the messages of a V-cycle between processes of one machine: 25 exchanges with two neighbours (docs/scaling.md).
-const MESSAGES: f64 = 100e-6;
+const CYCLE_MESSAGE_TIME: f64 = 100e-6;
 /// Number of V-cycles whose messages take as long as those of a set-up.
 const SET_UP_CYCLES: f64 = 100.0;
 /// Seconds for the messages of a step with a shared factor between processes of one machine (docs/scaling.md).
-const STEP_MESSAGES: f64 = 85e-6;
+const STEP_MESSAGE_TIME: f64 = 85e-6;
 /// Factor by which a step with MUMPS takes longer than one with a factor on one rank: 233 ms on two ranks instead of 32 ms for the
 /// problem of Wang and Cheng on 256 x 256 cells, 1.25 s instead of 0.15 s on 512 x 512.
-const MUMPS: f64 = 8.0;
+const MUMPS_FACTOR: f64 = 8.0;
 /// Seconds of a step for each unknown besides the solve: stress, history, forces, energies.
-const OTHER: f64 = 55e-9;
+const OTHER_TIME: f64 = 55e-9;
 
 /// Number of motions of contact nodes whose dense matrix costs no more than the factorisation.
-const MOST_MOTIONS: usize = 4_000;
+const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
 /// The number of motions on which the contacts of a body act, over all ranks. Collective.
-fn motions<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
-    session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.seen).sum())
+fn motion_count<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
+    session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.active).sum())
 }
 
 /// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's
@@ -66,7 +66,7 @@ impl ProblemSize {
         steps: u64,
         precision: FactorPrecision,
     ) -> Result<Self, Agreed> {
-        let motions = motions(session, body);
+        let motions = motion_count(session, body);
         let contacts = &body.contacts;
         Ok(Self {
             dimension: D,
@@ -78,19 +78,19 @@ impl ProblemSize {
             condensed: !contacts.is_empty()
                 && !contacts.iter().any(Contact::needs_ghosts)
                 && !body.flows()
-                && motions <= MOST_MOTIONS,
+                && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction().is_some()),
             precision,
         })
     }
 
-    fn pick(self, in_plane: f64, in_space: f64) -> f64 {
+    fn by_dimension(self, in_plane: f64, in_space: f64) -> f64 {
         if self.dimension == 2 { in_plane } else { in_space }
     }
 
     /// Bytes of the matrix in compressed rows, where a node and its neighbours are 7 nodes in 2D and 15 in 3D.
-    pub fn matrix(self) -> f64 {
-        12.0 * self.unknowns as f64 * self.pick(7.0 * 2.0, 15.0 * 3.0)
+    pub fn matrix_bytes(self) -> f64 {
+        12.0 * self.unknowns as f64 * self.by_dimension(7.0 * 2.0, 15.0 * 3.0)
     }
 
     fn iterations(self, Iterations { without, contact, friction }: Iterations) -> f64 {
@@ -104,22 +104,22 @@ impl ProblemSize {
     /// The precision of factors: single where it is requested, or where it takes less time. In 3D two or three corrections
     /// reach the accuracy of one solve in double precision, in 2D four to seven (docs/speed.md).
     pub fn factor_precision(self) -> Precision {
-        let pays = || {
+        let is_faster = || {
             let time = |precision| self.seconds_of(self.factor(precision));
             self.dimension == 3
-                && self.factor(Precision::Double).memory > BEYOND_CACHES
+                && self.factor(Precision::Double).memory > CACHE_SIZE
                 && time(Precision::Single) < time(Precision::Double)
         };
         match self.precision {
             FactorPrecision::Single if self.is_condensed() => Precision::Single,
-            FactorPrecision::Auto if self.is_condensed() && pays() => Precision::Single,
+            FactorPrecision::Auto if self.is_condensed() && is_faster() => Precision::Single,
             _ => Precision::Double,
         }
     }
 
     /// Whether a factor is shared by all ranks.
     fn is_shared(self) -> bool {
-        self.interface <= MOST_ON_INTERFACE
+        self.interface <= MAX_INTERFACE_UNKNOWNS
     }
 
     /// Whether steps are condensed to the contact, if the matrix is factored.
@@ -141,30 +141,30 @@ impl ProblemSize {
         }
         if self.is_shared() {
             // Each rank factors its part and the dense matrix of the interface, and reads both in each half of a solve.
-            let part = self.factor_of(self.unknowns as f64 / ranks, precision);
+            let subdomain = self.factor_of(self.unknowns as f64 / ranks, precision);
             let interface = self.interface as f64;
             return Cost {
-                memory: ranks * (part.memory + 4.0 * interface.powi(2)),
-                set_up: part.set_up + 1.5e-11 * interface.powi(3) / ranks,
-                step: part.step + 1.0e-9 * interface.powi(2) + STEP_MESSAGES,
+                memory: ranks * (subdomain.memory + 4.0 * interface.powi(2)),
+                set_up: subdomain.set_up + 1.5e-11 * interface.powi(3) / ranks,
+                step: subdomain.step + 1.0e-9 * interface.powi(2) + STEP_MESSAGE_TIME,
             };
         }
-        Cost { set_up: whole.set_up / ranks, step: MUMPS * whole.step / ranks, ..whole }
+        Cost { set_up: whole.set_up / ranks, step: MUMPS_FACTOR * whole.step / ranks, ..whole }
     }
 
     /// The cost of a factor of `n` unknowns on one rank.
     fn factor_of(self, n: f64, precision: Precision) -> Cost {
-        let entries = self.pick(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
+        let entries = self.by_dimension(7.0 * n * n.max(2.0).log2(), 28.0 * n.powf(4.0 / 3.0));
         let [memory, set_up, step] = match precision {
             Precision::Double => [
                 8.0,
-                self.pick(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 0.9e-9 * n * n),
-                self.pick(1.8e-9, 1.2e-9),
+                self.by_dimension(10e-6 * n + 10e-9 * n.powf(1.5), 5e-6 * n + 0.9e-9 * n * n),
+                self.by_dimension(1.8e-9, 1.2e-9),
             ],
             Precision::Single => [
                 4.0,
-                self.pick(5e-6 * n + 3e-9 * n.powf(1.5), 5e-6 * n + 0.25e-9 * n * n),
-                self.pick(8.0e-9, 1.7e-9),
+                self.by_dimension(5e-6 * n + 3e-9 * n.powf(1.5), 5e-6 * n + 0.25e-9 * n * n),
+                self.by_dimension(8.0e-9, 1.7e-9),
             ],
         };
         Cost { memory: memory * entries, set_up, step: step * entries }
@@ -175,10 +175,10 @@ impl ProblemSize {
         let n = self.unknowns as f64;
         let multigrid = |memory: f64, set_up: f64, iterations: Iterations, cycle: f64| {
             let iterations = self.iterations(iterations);
-            let messages = if self.ranks > 1 { MESSAGES } else { 0.0 };
+            let messages = if self.ranks > 1 { CYCLE_MESSAGE_TIME } else { 0.0 };
             let ranks = self.ranks as f64;
             Cost {
-                memory: memory * self.matrix(),
+                memory: memory * self.matrix_bytes(),
                 set_up: n * set_up / ranks + SET_UP_CYCLES * messages,
                 step: iterations * (n * cycle / ranks + messages),
             }
@@ -187,15 +187,15 @@ impl ProblemSize {
             Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
             Preconditioner::Gamg => multigrid(
                 2.2,
-                self.pick(7e-6, 22e-6),
+                self.by_dimension(7e-6, 22e-6),
                 Iterations { without: 20.0, contact: 30.0, friction: 300.0 },
-                self.pick(100e-9, 180e-9),
+                self.by_dimension(100e-9, 180e-9),
             ),
             Preconditioner::Boomeramg => multigrid(
                 3.5,
-                self.pick(1.5e-6, 5e-6),
+                self.by_dimension(1.5e-6, 5e-6),
                 Iterations { without: 14.0, contact: 20.0, friction: 200.0 },
-                self.pick(120e-9, 300e-9),
+                self.by_dimension(120e-9, 300e-9),
             ),
         }
     }
@@ -211,14 +211,14 @@ impl ProblemSize {
     }
 
     /// Whether this many ranks take no less time than one, with this preconditioner.
-    pub(super) fn ranks_are_in_vain(self, preconditioner: Preconditioner) -> bool {
+    pub(super) fn ranks_do_not_help(self, preconditioner: Preconditioner) -> bool {
         if self.ranks == 1 {
             return false;
         }
         let one = self.on_one_rank();
-        let alone = one.seconds(Preconditioner::Auto.choose(one).0);
-        let other = OTHER * self.steps as f64 * self.unknowns as f64;
-        self.seconds(preconditioner) + other / self.ranks as f64 >= alone + other
+        let on_one = one.seconds(Preconditioner::Auto.choose(one).0);
+        let other = OTHER_TIME * self.steps as f64 * self.unknowns as f64;
+        self.seconds(preconditioner) + other / self.ranks as f64 >= on_one + other
     }
 }
 
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_factor_in_space_soon_outgrows_multigrid() {
+    fn a_large_factor_in_3d_costs_more_than_multigrid() {
         let problem = ProblemSize {
             dimension: 3,
             unknowns: 1_000_000,
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_rank_pays_where_its_work_outweighs_messages() {
+    fn a_second_rank_is_faster_if_its_work_takes_longer_than_messages() {
         let square = |cells: usize, ranks: usize| ProblemSize {
             dimension: 2,
             unknowns: 2 * (cells + 1) * (cells + 1),
@@ -257,9 +257,9 @@ mod tests {
             friction: false,
             precision: FactorPrecision::Auto,
         };
-        let is_in_vain = |cells, ranks| square(cells, ranks).ranks_are_in_vain(Preconditioner::Cholesky);
-        assert!(is_in_vain(8, 2) && !is_in_vain(8, 1), "messages take longer than steps");
-        assert!([32, 128, 256, 512].iter().all(|&cells| !is_in_vain(cells, 2)));
+        let does_not_help = |cells, ranks| square(cells, ranks).ranks_do_not_help(Preconditioner::Cholesky);
+        assert!(does_not_help(8, 2) && !does_not_help(8, 1), "messages take longer than steps");
+        assert!([32, 128, 256, 512].iter().all(|&cells| !does_not_help(cells, 2)));
         let [one, two] = [1, 2].map(|ranks| square(256, ranks).cost(Preconditioner::Cholesky));
         assert!(two.step < 0.65 * one.step && two.memory < 1.1 * one.memory, "{one:?} {two:?}");
     }

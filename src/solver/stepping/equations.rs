@@ -14,7 +14,7 @@ pub trait StepMatrix {
 
     /// Approximates `z = K^-1 r` on the subspace last set, for matrices for which PETSc creates no preconditioner. Collective.
     fn precondition(&self, _r: &DistributedVector, _z: &mut DistributedVector) -> Result<()> {
-        Err(Error::Internal("a matrix that PETSc preconditions was asked to do it".into()))
+        Err(Error::Internal("a matrix for which PETSc creates the preconditioner has none of its own".into()))
     }
 
     /// Sets the subspace of later solves, given the projection on it; returns whether a preconditioner was created
@@ -75,7 +75,7 @@ pub struct ContactEquations<'a, const D: usize> {
     /// Whether the equations are those of the contact points alone, with all other velocities in equilibrium with theirs.
     pub equilibrated: bool,
     /// Counts of the work done so far.
-    pub effort: Effort,
+    pub counts: SolveCounts,
 }
 
 /// Work vectors of a contact step.
@@ -105,7 +105,7 @@ impl Scratch {
 
 /// Counts of the work of Newton's method in a step.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Effort {
+pub struct SolveCounts {
     /// Calls of the residual.
     pub residuals: usize,
     /// Krylov iterations.
@@ -120,7 +120,7 @@ pub struct Effort {
     pub sets: Vec<f64>,
 }
 
-impl Effort {
+impl SolveCounts {
     /// Resets all counts; `sets` keeps its memory.
     pub fn restart(&mut self) {
         self.sets.clear();
@@ -136,10 +136,8 @@ impl Effort {
 }
 
 /// The message that a set of branches recurred.
-pub(super) fn cycle(period: usize) -> String {
-    format!(
-        "Newton's method came back to the branches of the contact graph that it had {period} iterations before"
-    )
+pub(super) fn cycle_message(period: usize) -> String {
+    format!("Newton's method cycles: the branches of the contact graphs recur after {period} iterations")
 }
 
 /// Adds to `out` the contribution that `add` computes from the nodal values of `x`.
@@ -181,7 +179,7 @@ impl<const D: usize> ContactEquations<'_, D> {
 
 impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     fn residual(&mut self, x: &DistributedVector, residual: &mut DistributedVector) -> Result<()> {
-        self.effort.residuals += 1;
+        self.counts.residuals += 1;
         self.scratch.velocity.copy_from(x)?;
         {
             let mut velocity = self.scratch.velocity.owned_mut()?;
@@ -196,13 +194,13 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
             Some(correction) => correction,
             none => none.insert(open.like()?),
         };
-        let mut operator = Inside { matrix: self.matrix, contacts: self.contacts };
+        let mut operator = InteriorOperator { matrix: self.matrix, contacts: self.contacts };
         open.copy_from(residual)?;
         operator.project(open)?;
         let outcome = self.linear_solver.solve_accurately(&mut operator, open, correction)?;
-        self.effort.linear_iterations += outcome.iterations;
+        self.counts.linear_iterations += outcome.iterations;
         if !outcome.converged() {
-            return Err(Error::Failed(outcome.words().into()));
+            return Err(Error::Failed(outcome.description().into()));
         }
         velocity.add_scaled(-1.0, correction)?;
         self.write_residual(residual)
@@ -231,9 +229,9 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
         let mine = digests.fold(0, |sum: u64, digest| sum.rotate_left(7) ^ digest);
         // Half the bits suffice to distinguish sets, and their sum over ranks is exact.
         let [all] = self.session.sum([(mine >> 32) as f64]);
-        self.effort.sets.push(all);
-        match self.effort.period() {
-            Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle(period))),
+        self.counts.sets.push(all);
+        match self.counts.period() {
+            Some(period) if self.stop_at_cycles => Err(Error::Failed(cycle_message(period))),
             _ => Ok(()),
         }
     }
@@ -263,29 +261,29 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
     ) -> Result<()> {
         let Scratch { velocity, open, ghosted, .. } = &mut *self.scratch;
         let cells = self.cells.as_mut().map(|cells| &mut **cells as &mut dyn CellForces);
-        let skew = cells.is_some()
+        let is_unsymmetric = cells.is_some()
             && self.session.total(cells.as_ref().map_or(0, |cells| usize::from(!cells.is_symmetric()))) > 0;
         let coupled = self.contacts.iter().any(|contact| contact.friction().is_some())
             && self.session.total(usize::from(self.contacts.iter().any(Contact::is_coupled))) > 0;
-        let coupled = coupled || skew;
-        let mut operator = Reduced { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
+        let coupled = coupled || is_unsymmetric;
+        let mut operator = ReducedJacobian { matrix: self.matrix, cells, contacts: self.contacts, ghosted };
         open.copy_from(residual)?;
         operator.reduce(open)?;
         if operator.may_project() {
-            let made = self.matrix.set_subspace(&mut |column| operator.project(column))?;
-            self.effort.refreshed += usize::from(made);
+            let rebuilt = self.matrix.set_subspace(&mut |column| operator.project(column))?;
+            self.counts.refreshed += usize::from(rebuilt);
         }
         let outcome = if coupled {
-            self.effort.coupled += 1;
+            self.counts.coupled += 1;
             self.linear_solver.solve_unsymmetric(&mut operator, open, velocity)?
         } else {
             self.linear_solver.solve(&mut operator, open, velocity)?
         };
-        self.effort.linear_iterations += outcome.linear.iterations;
-        self.effort.indefinite += usize::from(outcome.indefinite);
-        self.effort.refreshed += usize::from(outcome.refreshed);
+        self.counts.linear_iterations += outcome.linear.iterations;
+        self.counts.indefinite += usize::from(outcome.indefinite);
+        self.counts.refreshed += usize::from(outcome.refreshed);
         if !outcome.linear.converged() {
-            return Err(Error::Failed(outcome.linear.words().into()));
+            return Err(Error::Failed(outcome.linear.description().into()));
         }
         direction.copy_from(velocity)?;
         if self.contacts.iter().any(|c| c.law.has_vertical_parts() || c.friction().is_some()) {
@@ -302,14 +300,14 @@ impl<const D: usize> NonlinearProblem for ContactEquations<'_, D> {
 /// `P Q (K + F' + C') P` for velocities, where `F` are the forces of cells, `P` removes the motions of points on vertical parts of
 /// their graphs, and `Q` eliminates the unknown pressures of sliding points from the equations; `Q` is the identity unless friction
 /// depends on these pressures.
-struct Reduced<'a, const D: usize> {
+struct ReducedJacobian<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
     cells: Option<&'a mut dyn CellForces>,
     contacts: &'a [Contact<D>],
     ghosted: &'a mut Option<[DistributedVector; 2]>,
 }
 
-impl<const D: usize> Reduced<'_, D> {
+impl<const D: usize> ReducedJacobian<'_, D> {
     fn multiply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix.multiply(x, y)?;
         if let Some(cells) = &mut self.cells {
@@ -328,7 +326,7 @@ impl<const D: usize> Reduced<'_, D> {
     }
 }
 
-impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
+impl<const D: usize> ProjectedOperator for ReducedJacobian<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.multiply(x, y)?;
         self.reduce(y)
@@ -350,12 +348,12 @@ impl<const D: usize> ProjectedOperator for Reduced<'_, D> {
 }
 
 /// `P K P`, where `P` removes the motions of all contact points.
-struct Inside<'a, const D: usize> {
+struct InteriorOperator<'a, const D: usize> {
     matrix: &'a dyn StepMatrix,
     contacts: &'a [Contact<D>],
 }
 
-impl<const D: usize> ProjectedOperator for Inside<'_, D> {
+impl<const D: usize> ProjectedOperator for InteriorOperator<'_, D> {
     fn apply(&mut self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
         self.matrix.multiply(x, y)?;
         self.project(y)
@@ -377,15 +375,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn branches_that_come_back_after_others_have_a_period() {
-        let period = |sets: &[f64]| Effort { sets: sets.to_vec(), ..Effort::default() }.period();
+    fn a_set_of_branches_that_recurs_after_others_has_a_period() {
+        let period = |sets: &[f64]| SolveCounts { sets: sets.to_vec(), ..SolveCounts::default() }.period();
         assert_eq!(period(&[]), None);
         assert_eq!(period(&[1.0]), None);
-        assert_eq!(period(&[1.0, 2.0, 3.0]), None, "all of them new");
-        assert_eq!(period(&[1.0, 2.0, 2.0]), None, "they stay");
+        assert_eq!(period(&[1.0, 2.0, 3.0]), None, "no set recurs");
+        assert_eq!(period(&[1.0, 2.0, 2.0]), None, "the set is unchanged");
         assert_eq!(period(&[1.0, 2.0, 1.0]), Some(2));
         assert_eq!(period(&[5.0, 1.0, 2.0, 3.0, 1.0]), Some(3));
-        assert_eq!(period(&[1.0, 2.0, 1.0, 3.0, 1.0]), Some(2), "the last time counts");
-        assert!(cycle(2).contains("that it had 2 iterations before"));
+        assert_eq!(period(&[1.0, 2.0, 1.0, 3.0, 1.0]), Some(2), "the latest occurrence counts");
+        assert!(cycle_message(2).contains("recur after 2 iterations"));
     }
 }

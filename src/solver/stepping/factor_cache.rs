@@ -18,9 +18,9 @@ use crate::{
 use std::mem::swap;
 
 /// Largest number of stored matrices, including the one in use.
-const MOST: usize = 8;
+const MAX_MATRICES: usize = 8;
 /// Bytes that they may occupy on a rank.
-const ROOM: f64 = 512e6;
+const MAX_BYTES: f64 = 512e6;
 
 /// A matrix with its preconditioner.
 pub(super) struct Cached {
@@ -44,14 +44,14 @@ pub(super) enum Krylov {
 
 impl Krylov {
     /// A solver like the one in use, not set up.
-    pub(super) fn another<const D: usize>(
-        used: &Solver,
+    pub(super) fn new_like<const D: usize>(
+        active: &Solver,
         session: &Session,
         chosen: Preconditioner,
         mesh: &Mesh<D>,
         like: &DistributedVector,
     ) -> Result<Self> {
-        Ok(match used {
+        Ok(match active {
             Solver::Linear(_) => Self::Linear(linear(session, chosen, mesh)?),
             Solver::Condensed(_) => Self::Condensed(Box::default()),
             Solver::Newton(_) => Self::Newton(Box::new(projected(session, chosen, mesh, like)?), Vec::new()),
@@ -59,15 +59,15 @@ impl Krylov {
     }
 
     /// Swaps the contents with the solver in use.
-    pub(super) fn exchange(&mut self, used: &mut Solver) {
-        match (self, used) {
-            (Self::Linear(mine), Solver::Linear(used)) => swap(mine, used),
-            (Self::Newton(mine, mine_scales), Solver::Newton(newton)) => {
+    pub(super) fn swap_with(&mut self, active: &mut Solver) {
+        match (self, active) {
+            (Self::Linear(own), Solver::Linear(active)) => swap(own, active),
+            (Self::Newton(own, own_scales), Solver::Newton(newton)) => {
                 let Newton { linear_solver, scales, .. } = &mut **newton;
-                swap(&mut **mine, linear_solver);
-                swap(mine_scales, scales);
+                swap(&mut **own, linear_solver);
+                swap(own_scales, scales);
             }
-            (Self::Condensed(mine), Solver::Condensed(used)) => used.exchange(mine),
+            (Self::Condensed(own), Solver::Condensed(active)) => active.swap_factored(own),
             _ => {}
         }
     }
@@ -75,31 +75,31 @@ impl Krylov {
 
 /// Matrices with their preconditioners that are not in use, the most recently used at the end.
 pub(super) struct FactorCache {
-    kept: Vec<Cached>,
-    most: usize,
+    entries: Vec<Cached>,
+    capacity: usize,
 }
 
 impl FactorCache {
     /// An empty cache for this number of matrices besides the one in use.
-    pub(super) fn new(most: usize) -> Self {
-        Self { kept: Vec::new(), most }
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { entries: Vec::new(), capacity }
     }
 
     /// Stores an entry; returns the least recently used one if there are too many.
-    pub(super) fn put(&mut self, cached: Cached) -> Option<Cached> {
-        self.kept.push(cached);
-        (self.kept.len() > self.most).then(|| self.kept.remove(0))
+    pub(super) fn insert(&mut self, cached: Cached) -> Option<Cached> {
+        self.entries.push(cached);
+        (self.entries.len() > self.capacity).then(|| self.entries.remove(0))
     }
 
     /// Removes and returns the entry of this length.
-    pub(super) fn take(&mut self, length: f64) -> Option<Cached> {
-        let at = self.kept.iter().position(|cached| cached.length == length)?;
-        Some(self.kept.remove(at))
+    pub(super) fn remove(&mut self, length: f64) -> Option<Cached> {
+        let at = self.entries.iter().position(|cached| cached.length == length)?;
+        Some(self.entries.remove(at))
     }
 }
 
 /// The power of two times `base` nearest to this length.
-pub(super) fn nearest(base: f64, length: f64) -> f64 {
+pub(super) fn nearest_cached_length(base: f64, length: f64) -> f64 {
     base * 2f64.powi((length / base).log2().round() as i32)
 }
 
@@ -120,9 +120,9 @@ impl Preconditioner {
 
     /// Number of matrices of different lengths to store, each with its preconditioner, including the one in use: as many as fit
     /// into 512 MB on each rank, at most 8.
-    pub fn kept(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
+    pub fn cache_capacity(self, dimension: usize, unknowns: usize, ranks: usize, matrix: f64) -> usize {
         let each = (matrix + self.bytes(dimension, unknowns, matrix)) / ranks as f64;
-        ((ROOM / each.max(1.0)) as usize).clamp(1, MOST)
+        ((MAX_BYTES / each.max(1.0)) as usize).clamp(1, MAX_MATRICES)
     }
 }
 
@@ -132,15 +132,15 @@ mod tests {
     use crate::solver::stepping::{FactorPrecision, ProblemSize};
 
     #[test]
-    fn lengths_go_to_the_nearest_power_of_two_times_the_base() {
+    fn cached_lengths_are_powers_of_two_times_the_base() {
         for (length, cached) in [(0.01, 0.01), (0.08, 0.08), (0.012, 0.01), (0.015, 0.02), (0.0072, 0.01)] {
-            assert_eq!(nearest(0.01, length), cached);
+            assert_eq!(nearest_cached_length(0.01, length), cached);
         }
     }
 
     #[test]
-    fn small_problems_keep_many_lengths_and_large_ones_what_they_use() {
-        let kept = |unknowns: usize, ranks| {
+    fn the_capacity_decreases_with_the_size_of_the_problem() {
+        let capacity = |unknowns: usize, ranks| {
             let precision = FactorPrecision::Auto;
             let problem = ProblemSize {
                 dimension: 3,
@@ -153,9 +153,14 @@ mod tests {
                 friction: false,
                 precision,
             };
-            Preconditioner::Auto.resolve(problem).0.kept(3, unknowns, ranks, 540.0 * unknowns as f64)
+            Preconditioner::Auto.resolve(problem).0.cache_capacity(
+                3,
+                unknowns,
+                ranks,
+                540.0 * unknowns as f64,
+            )
         };
-        assert_eq!([kept(5_000, 1), kept(100_000, 1), kept(1_000_000, 1)], [8, 3, 1]);
-        assert_eq!(kept(1_000_000, 8), 2);
+        assert_eq!([capacity(5_000, 1), capacity(100_000, 1), capacity(1_000_000, 1)], [8, 3, 1]);
+        assert_eq!(capacity(1_000_000, 8), 2);
     }
 }

@@ -7,7 +7,7 @@ use super::linear_solver::FrictionIteration;
 pub(super) struct Fallback {
     pub search: Search,
     /// Ratio of the parameters of the graphs to the resistance of the body; which branches recur depends on it.
-    pub stiffer: f64,
+    pub stiffness_factor: f64,
     pub iteration: FrictionIteration,
 }
 
@@ -23,8 +23,8 @@ pub(super) enum Search {
     Equilibrated,
 }
 
-const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> Fallback {
-    Fallback { search, stiffer, iteration }
+const fn fallback(search: Search, stiffness_factor: f64, iteration: FrictionIteration) -> Fallback {
+    Fallback { search, stiffness_factor, iteration }
 }
 
 /// The fallbacks that are tried in turn until a step is solved, each from the start value of the step.
@@ -34,18 +34,18 @@ const fn attempt(search: Search, stiffer: f64, iteration: FrictionIteration) -> 
 /// and measures their error. The last fallback, fixed-point iteration, avoids cycles between pressure and friction; it is used if
 /// friction depends on the pressure.
 const FALLBACKS: [Fallback; 12] = [
-    attempt(Search::FullSteps, 1.0, FrictionIteration::Newton),
-    attempt(Search::Equilibrated, 1.0, FrictionIteration::Newton),
-    attempt(Search::Equilibrated, 10.0, FrictionIteration::Newton),
-    attempt(Search::FullSteps, 10.0, FrictionIteration::Newton),
-    attempt(Search::Backtracking, 1.0, FrictionIteration::Newton),
-    attempt(Search::FullSteps, 100.0, FrictionIteration::Newton),
-    attempt(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
-    attempt(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
-    attempt(Search::Equilibrated, 1.0, FrictionIteration::FixedPoint),
-    attempt(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
-    attempt(Search::Equilibrated, 30.0, FrictionIteration::FixedPoint),
-    attempt(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
+    fallback(Search::FullSteps, 1.0, FrictionIteration::Newton),
+    fallback(Search::Equilibrated, 1.0, FrictionIteration::Newton),
+    fallback(Search::Equilibrated, 10.0, FrictionIteration::Newton),
+    fallback(Search::FullSteps, 10.0, FrictionIteration::Newton),
+    fallback(Search::Backtracking, 1.0, FrictionIteration::Newton),
+    fallback(Search::FullSteps, 100.0, FrictionIteration::Newton),
+    fallback(Search::Backtracking, 1.0 / 30.0, FrictionIteration::Newton),
+    fallback(Search::FullSteps, 1.0, FrictionIteration::FixedPoint),
+    fallback(Search::Equilibrated, 1.0, FrictionIteration::FixedPoint),
+    fallback(Search::FullSteps, 30.0, FrictionIteration::FixedPoint),
+    fallback(Search::Equilibrated, 30.0, FrictionIteration::FixedPoint),
+    fallback(Search::Backtracking, 30.0, FrictionIteration::FixedPoint),
 ];
 
 /// The properties that determine the fallbacks of a step.
@@ -56,7 +56,7 @@ pub(super) struct Conditions {
     /// How such bounds obtain the pressure at first.
     pub friction: FrictionIteration,
     /// Whether the user has set a line search.
-    pub chosen_search: bool,
+    pub has_user_search: bool,
     /// Whether all equations except those of the contact points are linear.
     pub interior_is_linear: bool,
 }
@@ -72,7 +72,7 @@ impl Conditions {
                 FrictionIteration::FixedPoint => self.follows_pressure,
             };
             let search = match fallback.search {
-                Search::FullSteps => !self.chosen_search,
+                Search::FullSteps => !self.has_user_search,
                 Search::Equilibrated => self.interior_is_linear,
                 Search::Backtracking => true,
             };

@@ -63,7 +63,7 @@ impl Flow {
     }
 
     /// Adds the sum over all ranks to `out`, without prescribed components.
-    fn add_sum_to(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
+    fn add_to_free_components(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
         let forces = self.forces.owned()?;
         let mut targets = out.owned_mut()?;
@@ -100,7 +100,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
 impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         self.evaluate(velocity)?;
-        self.flow.add_sum_to(self.cells.fixed, forces)
+        self.flow.add_to_free_components(self.cells.fixed, forces)
     }
 
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
@@ -126,6 +126,6 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
             forces.fill(0.0);
             self.cells.add_tangents(&flow.tangents, &values, &mut forces);
         }
-        self.flow.add_sum_to(self.cells.fixed, forces)
+        self.flow.add_to_free_components(self.cells.fixed, forces)
     }
 }

@@ -34,13 +34,13 @@ impl Frames {
         let world = session.world();
         let mine: Vec<u32> = nodes.iter().map(|c| mesh.global_node(c.node as u32)).collect();
         let all = gather(world, &mine)?;
-        let seen = gather(world, &nodes.iter().map(|c| c.seen as u64).collect::<Vec<_>>())?;
+        let active = gather(world, &nodes.iter().map(|c| c.active as u64).collect::<Vec<_>>())?;
         let directions: Vec<f64> = nodes.iter().flat_map(|c| c.frame.as_flattened().to_vec()).collect();
         let directions = gather(world, &directions)?;
         let (mut unknowns, mut groups) = (Vec::new(), Vec::new());
-        for (&node, &seen) in all.iter().zip(&seen) {
+        for (&node, &active) in all.iter().zip(&active) {
             let first = unknowns.len();
-            unknowns.extend((0..seen as usize).map(|i| node as usize * D + i));
+            unknowns.extend((0..active as usize).map(|i| node as usize * D + i));
             groups.push(first..unknowns.len());
         }
         let start = session.share_start(nodes.len());
@@ -65,12 +65,12 @@ impl Frames {
         &self.directions[number * size..][..size]
     }
 
-    /// Transforms the components of the values of this rank along the axes into components along the directions, or back.
-    pub(super) fn turn(&self, values: &mut [f64], back: bool) {
+    /// Transforms components along the axes of the values of this rank into components along the directions, or, if `inverse`, back.
+    pub(super) fn rotate(&self, values: &mut [f64], inverse: bool) {
         let d = self.dimension;
         for (&node, number) in self.own_nodes.iter().zip(self.own.clone()) {
             let (frame, value) = (self.directions(number), &mut values[node * d..][..d]);
-            let entry = |i: usize, j: usize| if back { frame[j * d + i] } else { frame[i * d + j] };
+            let entry = |i: usize, j: usize| if inverse { frame[j * d + i] } else { frame[i * d + j] };
             let mut before = [0.0; 3];
             before[..d].copy_from_slice(value);
             for (i, value) in value.iter_mut().enumerate() {
@@ -80,7 +80,7 @@ impl Frames {
     }
 
     /// The same for the rows of a matrix on this rank.
-    pub(super) fn turn_matrix(&self, rows: &mut BlockRows) {
+    pub(super) fn rotate_matrix(&self, rows: &mut BlockRows) {
         let d = self.dimension;
         for (&row, number) in self.own_nodes.iter().zip(self.own.clone()) {
             let frame = self.directions(number);

@@ -1,7 +1,7 @@
 //! Time schemes: the parts of a step that are specific to a scheme.
 
 use super::{
-    bdf2, contacts::released_by_contact, flow::FlowStart, implicit::Implicit, implicit_euler,
+    bdf2, contacts::add_contact_energy, flow::FlowStart, implicit::Implicit, implicit_euler,
     lagged_euler::LaggedEuler, outcome::over_ranks,
 };
 use crate::{
@@ -131,7 +131,7 @@ impl Integrator {
             Self::LaggedEuler(scheme) => scheme.explicit,
             Self::Implicit(scheme) => scheme.solved,
         };
-        released_by_contact(body, state, step, &mut energy)?;
+        add_contact_energy(body, state, step, &mut energy)?;
         if let Self::Implicit(scheme) = self {
             energy.numerical += scheme.momentum_term(body, state, step)?;
         }

@@ -31,13 +31,13 @@ pub(super) fn refuse_fast_flow<const D: usize, const S: usize>(
     step: Step,
 ) -> Result<()> {
     let Some(mine) = body.take_flow_step_bound() else { return Ok(()) };
-    let [least] = session.largest([-mine]).map(|bound| -bound);
-    if step.length <= least {
+    let [bound] = session.largest([-mine]).map(|largest| -largest);
+    if step.length <= bound {
         return Ok(());
     }
     Err(Error::Failed(format!(
-        "the step of {} s to t = {} s is beyond {least:.4e} s, where explicit viscoplastic flow makes errors grow: the rate of a power law \
-         rises with the overstress, and this is the bound at the largest that occurs; take a shorter [time] step, \
+        "the step of {} s to t = {} s is longer than {bound:.4e} s, the stability bound of explicit viscoplastic flow at the largest \
+         overstress in the body, with which the rate of a power law increases; use a shorter [time] step, \
          scheme = \"implicit_euler\", or accept it with [solver] accept = [\"explicit_stability\"]",
         step.length, step.time
     )))

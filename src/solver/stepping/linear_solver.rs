@@ -43,34 +43,34 @@ pub(super) const LINEAR_ITERATIONS: usize = 2_000;
 impl Preconditioner {
     /// Replaces `Auto` by the faster choice for this problem, and returns the reason.
     pub fn resolve(self, problem: ProblemSize) -> (Self, String) {
-        let (chosen, mut why) = self.choose(problem);
+        let (chosen, mut reason) = self.choose(problem);
         if chosen == Self::Cholesky && problem.factor_precision() == Precision::Single {
-            why += "; factors in single precision";
+            reason += "; factors in single precision";
         }
-        if problem.ranks_are_in_vain(chosen) {
-            why += &format!("; {} ranks are no faster than 1 here", problem.ranks);
+        if problem.ranks_do_not_help(chosen) {
+            reason += &format!("; {} ranks are estimated to be no faster than 1", problem.ranks);
         }
-        (chosen, why)
+        (chosen, reason)
     }
 
     /// The choice, and the reason.
     pub(super) fn choose(self, problem: ProblemSize) -> (Self, String) {
         if self != Self::Auto {
-            return (self, "[solver] preconditioner asks for it".into());
+            return (self, "set by [solver] preconditioner".into());
         }
         let memory = problem.cost(Self::Cholesky).memory / problem.ranks as f64;
         if memory > LARGEST_FACTOR {
-            return (Self::Gamg, format!("a factor would take some {:.0} GB on each rank", memory / 1e9));
+            return (Self::Gamg, format!("a factor would need about {:.0} GB on each rank", memory / 1e9));
         }
         let [factored, multigrid] = [Self::Cholesky, Self::Gamg].map(|which| problem.seconds(which));
         let chosen = if factored <= multigrid { Self::Cholesky } else { Self::Gamg };
-        let why = format!(
-            "{} steps a matrix take some {} by a factorisation, {} by multigrid",
+        let reason = format!(
+            "estimated time of {} steps with one matrix: {} with a factorisation, {} with multigrid",
             problem.steps,
             seconds(factored),
             seconds(multigrid)
         );
-        (chosen, why)
+        (chosen, reason)
     }
 
     /// Number of iterations that take as long as rebuilding it; in 3D rebuilding never pays (measured, see
@@ -113,7 +113,7 @@ impl Preconditioner {
                 }
                 require(
                     HAS_MUMPS,
-                    "[solver] preconditioner = \"cholesky\" with so many unknowns between subdomains",
+                    "[solver] preconditioner = \"cholesky\" with this many unknowns between subdomains",
                     "MUMPS",
                     "use \"gamg\", or fewer ranks",
                 )?;
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn many_steps_pay_for_larger_factors() {
+    fn factors_are_chosen_if_many_steps_share_them() {
         assert_eq!(chosen(problem(2, 500_000, 1, 64)), Preconditioner::Cholesky);
         assert_eq!(chosen(problem(3, 100_000, 1, 1000)), Preconditioner::Cholesky);
         assert_eq!(chosen(problem(3, 100_000, 1, 1)), Preconditioner::Gamg);
@@ -194,22 +194,23 @@ mod tests {
     fn factors_in_space_are_in_single_precision_where_few_steps_share_them() {
         assert_eq!(precision_of(problem(3, 100_000, 1, 16)), Precision::Single);
         assert_eq!(precision_of(problem(3, 100_000, 1, 1000)), Precision::Double);
-        assert_eq!(precision_of(problem(3, 1_000, 1, 1)), Precision::Double, "it stays in the cache");
+        assert_eq!(precision_of(problem(3, 1_000, 1, 1)), Precision::Double, "the factor fits the cache");
         assert_eq!(precision_of(problem(2, 500_000, 1, 1)), Precision::Double);
         assert_eq!(
             precision_of(ProblemSize { contact: false, condensed: false, ..problem(3, 100_000, 1, 1) }),
             Precision::Double
         );
-        let asked = |steps| ProblemSize { precision: FactorPrecision::Single, ..problem(2, 1_000, 1, steps) };
-        assert_eq!(precision_of(asked(1000)), Precision::Single);
-        let (_, why) = Preconditioner::Cholesky.resolve(asked(1));
+        let requested =
+            |steps| ProblemSize { precision: FactorPrecision::Single, ..problem(2, 1_000, 1, steps) };
+        assert_eq!(precision_of(requested(1000)), Precision::Single);
+        let (_, why) = Preconditioner::Cholesky.resolve(requested(1));
         assert!(why.ends_with("; factors in single precision"), "{why}");
     }
 
     #[test]
-    fn friction_is_dear_for_multigrid() {
-        let gliding = problem(3, 100_000, 1, 4);
-        assert_eq!(chosen(ProblemSize { friction: true, ..gliding }), Preconditioner::Cholesky);
+    fn friction_is_expensive_for_multigrid() {
+        let sliding = problem(3, 100_000, 1, 4);
+        assert_eq!(chosen(ProblemSize { friction: true, ..sliding }), Preconditioner::Cholesky);
     }
 
     #[test]
@@ -218,14 +219,14 @@ mod tests {
             assert_eq!(chosen(problem(2, unknowns, 2, 64)), Preconditioner::Cholesky);
         }
         assert_eq!(precision_of(problem(3, 100_000, 2, 16)), Precision::Single);
-        let crowded = ProblemSize { interface: 20_000, ..problem(2, 500_000, 2, 64) };
-        assert!(problem(2, 500_000, 2, 64).is_condensed() && !crowded.is_condensed());
+        let large_interface = ProblemSize { interface: 20_000, ..problem(2, 500_000, 2, 64) };
+        assert!(problem(2, 500_000, 2, 64).is_condensed() && !large_interface.is_condensed());
         for steps in [1, 8, 1000] {
             assert_eq!(chosen(problem(2, 300, 7, steps)), Preconditioner::Cholesky);
         }
         let (_, why) = Preconditioner::Auto.resolve(problem(2, 100, 7, 64));
-        assert!(why.ends_with("; 7 ranks are no faster than 1 here"), "{why}");
-        let (asked, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
-        assert_eq!((asked, &*why), (Preconditioner::Gamg, "[solver] preconditioner asks for it"));
+        assert!(why.ends_with("; 7 ranks are estimated to be no faster than 1"), "{why}");
+        let (chosen, why) = Preconditioner::Gamg.resolve(problem(3, 9, 1, 1));
+        assert_eq!((chosen, &*why), (Preconditioner::Gamg, "set by [solver] preconditioner"));
     }
 }

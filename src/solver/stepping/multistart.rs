@@ -7,12 +7,12 @@ use crate::{
 };
 
 /// Velocities that differ by more than this share of the larger one are different.
-const DIFFERENT: f64 = 1e-6;
+const RELATIVE_DIFFERENCE: f64 = 1e-6;
 /// Uniform normal velocity of all contact points, relative to the largest velocity at which a law has a kink; every second
 /// start has random velocities instead.
-const ALIKE: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
+const UNIFORM_VELOCITIES: [f64; 6] = [1.5, 0.25, 0.75, 4.0, -0.5, -2.0];
 /// Range of the random velocities.
-const RANDOM: [f64; 2] = [-1.0, 2.0];
+const RANDOM_VELOCITIES: [f64; 2] = [-1.0, 2.0];
 
 /// Solves a step from the velocity in `trial` after solving it from this number of others; writes the new velocity there and counts
 /// the solutions that differ. Collective.
@@ -30,9 +30,9 @@ pub(super) fn solve_and_search<const D: usize, const S: usize>(
         write_start(problem, number, &mut velocity)?;
         match session.agree(solver.solve(problem, &mut velocity)) {
             Ok(_) if is_new(&others, &velocity)? => {
-                let mut kept = velocity.like()?;
-                kept.copy_from(&velocity)?;
-                others.push(kept);
+                let mut solution = velocity.like()?;
+                solution.copy_from(&velocity)?;
+                others.push(solution);
             }
             Err(error) if !error.is_failure() => return Err(error.into()),
             _ => {}
@@ -60,8 +60,8 @@ fn write_start<const D: usize, const S: usize>(
     let mut nodal = velocity.owned_mut()?;
     let ids = &problem.body.mesh.node_ids;
     for contact in &problem.body.contacts {
-        let corner = contact.corner_velocity();
-        contact.start_at(|node| corner * share(number, ids[node]), &mut nodal);
+        let scale = contact.largest_kink_velocity();
+        contact.set_start_velocities(|node| scale * start_velocity(number, ids[node]), &mut nodal);
     }
     let fixed = nodal.iter_mut().zip(&problem.body.fixed).filter(|(_, fixed)| **fixed);
     fixed.for_each(|(value, _)| *value = 0.0);
@@ -74,7 +74,7 @@ fn is_new(found: &[DistributedVector], velocity: &DistributedVector) -> Result<b
         let mut difference = velocity.like()?;
         difference.copy_from(velocity)?;
         difference.add_scaled(-1.0, other)?;
-        if difference.norm()? <= DIFFERENT * f64::max(velocity.norm()?, other.norm()?) {
+        if difference.norm()? <= RELATIVE_DIFFERENCE * f64::max(velocity.norm()?, other.norm()?) {
             return Ok(false);
         }
     }
@@ -82,11 +82,11 @@ fn is_new(found: &[DistributedVector], velocity: &DistributedVector) -> Result<b
 }
 
 /// The velocity of a node in the start with this number, the same on any number of ranks.
-fn share(number: usize, node: u32) -> f64 {
+fn start_velocity(number: usize, node: u32) -> f64 {
     if number.is_multiple_of(2) {
-        return ALIKE[number / 2 % ALIKE.len()];
+        return UNIFORM_VELOCITIES[number / 2 % UNIFORM_VELOCITIES.len()];
     }
     let key = [(number as u32).to_le_bytes(), node.to_le_bytes()].concat();
     let unit = (xxhash_rust::xxh3::xxh3_64(&key) >> 11) as f64 / (1u64 << 53) as f64;
-    RANDOM[0] + (RANDOM[1] - RANDOM[0]) * unit
+    RANDOM_VELOCITIES[0] + (RANDOM_VELOCITIES[1] - RANDOM_VELOCITIES[0]) * unit
 }

@@ -4,7 +4,7 @@ use super::{
     StepOutcome,
     bounded::Bounded,
     contacts::restore_pressures,
-    equations::{CellForces, ContactEquations, Effort, Scratch, cycle},
+    equations::{CellForces, ContactEquations, Scratch, SolveCounts, cycle_message},
     fallbacks::{Conditions, Fallback, Search},
     flow::Flow,
     linear_solver::{FrictionIteration, LINEAR_ITERATIONS, SolverSettings},
@@ -32,27 +32,27 @@ pub(super) struct Newton {
     pub linear_solver: ProjectedKsp,
     scratch: Scratch,
     /// Branches of all contact points at the start of the step and at its end.
-    before: Vec<u8>,
-    after: Vec<u8>,
+    branches_before: Vec<u8>,
+    branches_after: Vec<u8>,
     /// The parameters of each contact's graphs for the matrix in use, along the normal and of friction: equal to the resistance of
     /// the body to motions of its surface alone, and along the normal at least twice the steepest descent. With smaller parameters
     /// the residual is so steep where points change their branch that line searches fail.
     pub scales: Vec<[f64; 2]>,
-    /// The steepest descent of each contact's friction at the pressures of the last attempt.
-    falls: Vec<f64>,
+    /// The steepest decrease of each contact's friction with the sliding speed, at the pressures of the last attempt.
+    steepest_decreases: Vec<f64>,
     /// Counts of the work done for the step.
-    effort: Effort,
+    counts: SolveCounts,
     /// The velocity from which the step was started.
     start: DistributedVector,
     /// Whether the user has set a line search.
-    chosen_search: bool,
+    has_user_search: bool,
     /// Work data for cells that flow, if there are any.
     pub flow: Option<Flow>,
 }
 
-/// Largest ratio of the friction graph's descent to its parameter while a step is solved, and the initial ratio.
-const STEEPEST: f64 = 0.8;
-const STEEP: f64 = 0.5;
+/// Largest ratio of the steepest decrease of a friction graph to its parameter while a step is solved, and the initial ratio.
+const LARGEST_DECREASE_RATIO: f64 = 0.8;
+const INITIAL_DECREASE_RATIO: f64 = 0.5;
 
 /// Linear solves stop at this share of the tolerance of the step.
 const LINEAR_SHARE: f64 = 0.3;
@@ -60,9 +60,9 @@ const LINEAR_SHARE: f64 = 0.3;
 const LINEAR_REDUCTION: f64 = 1e-3;
 
 /// Fixed-point iterations after which an attempt fails.
-const FIXED_POINTS: usize = 200;
+const MAX_FIXED_POINT_ITERATIONS: usize = 200;
 
-const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance sets what is accepted";
+const INCLUSION_REMEDY: &str = "try a smaller [time] step or a tighter [solver] tolerance; [solver] inclusion_tolerance is the largest accepted value";
 
 /// Outcome of an attempt to solve a step.
 struct Attempt {
@@ -88,13 +88,13 @@ impl Newton {
             bounded: None,
             linear_solver,
             scratch: Scratch::new(like, contacts)?,
-            before: Vec::new(),
-            after: Vec::new(),
+            branches_before: Vec::new(),
+            branches_after: Vec::new(),
             scales: Vec::new(),
-            falls: Vec::new(),
-            effort: Effort::default(),
+            steepest_decreases: Vec::new(),
+            counts: SolveCounts::default(),
             start: like.like()?,
-            chosen_search: has_option("snes_linesearch_type")?,
+            has_user_search: has_option("snes_linesearch_type")?,
             flow: None,
         })
     }
@@ -107,8 +107,8 @@ impl Newton {
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        write_branches(problem.body, system.converged, &mut self.before)?;
-        self.effort.restart();
+        write_branches(problem.body, system.converged, &mut self.branches_before)?;
+        self.counts.restart();
         if let Some(bounded) = &mut self.bounded {
             let iterations = bounded.solve(problem, system, trial)?;
             return self.check_inclusion(problem, trial, iterations);
@@ -116,7 +116,7 @@ impl Newton {
         let tolerance = LINEAR_SHARE * system.tolerance;
         self.linear_solver.set_tolerances(LINEAR_REDUCTION, tolerance, LINEAR_ITERATIONS)?;
         self.start.copy_from(trial)?;
-        write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
+        write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
         let mut fallbacks = self.conditions(&problem.body.contacts).fallbacks();
         let mut next = fallbacks.next();
         let (mut iterations, mut failure) = (0, String::new());
@@ -125,16 +125,17 @@ impl Newton {
             self.set_graph_parameters(&mut problem.body.contacts, fallback);
             let attempt = self.attempt(problem, system, fallback, trial)?;
             iterations += attempt.iterations;
-            if let Some(why) = attempt.failure {
-                (failure, next) = (why, fallbacks.next());
+            if let Some(reason) = attempt.failure {
+                (failure, next) = (reason, fallbacks.next());
                 trial.copy_from(&self.start)?;
                 restore_pressures(problem.body, problem.state)?;
                 continue;
             }
-            // The pressure rose so much that the descent of the friction graph exceeds its parameter: repeat with a larger one.
-            write_largest_falls(problem.session, &problem.body.contacts, &mut self.falls);
-            let mut pairs = problem.body.contacts.iter().zip(&self.falls);
-            if pairs.all(|(contact, fall)| *fall <= STEEPEST * contact.friction_scale()) {
+            // The pressure rose so much that the friction graph decreases faster than its parameter permits: repeat with a larger one.
+            write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
+            let mut pairs = problem.body.contacts.iter().zip(&self.steepest_decreases);
+            if pairs.all(|(contact, decrease)| *decrease <= LARGEST_DECREASE_RATIO * contact.friction_scale())
+            {
                 return self.check_inclusion(problem, trial, iterations);
             }
         }
@@ -145,7 +146,7 @@ impl Newton {
         Conditions {
             follows_pressure: contacts.iter().any(follows),
             friction: self.settings.friction,
-            chosen_search: self.chosen_search,
+            has_user_search: self.has_user_search,
             interior_is_linear: self.flow.is_none() && !contacts.iter().any(Contact::needs_ghosts),
         }
     }
@@ -153,10 +154,12 @@ impl Newton {
     /// Sets the parameters of all graphs, those of friction according to its descents.
     fn set_graph_parameters<const D: usize>(&self, contacts: &mut [Contact<D>], fallback: Fallback) {
         let follows = fallback.iteration == FrictionIteration::Newton;
-        for ((contact, scales), fall) in contacts.iter_mut().zip(&self.scales).zip(&self.falls) {
-            let [normal, tangential] = scales.map(|scale| fallback.stiffer * scale);
+        for ((contact, scales), decrease) in
+            contacts.iter_mut().zip(&self.scales).zip(&self.steepest_decreases)
+        {
+            let [normal, tangential] = scales.map(|scale| fallback.stiffness_factor * scale);
             contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
-            contact.set_friction(tangential.max(fall / STEEP), follows);
+            contact.set_friction(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
         }
     }
 
@@ -173,8 +176,8 @@ impl Newton {
             return self.iterate(problem, system, fallback.search, trial);
         }
         let mut sum = 0;
-        for _ in 0..FIXED_POINTS {
-            problem.body.contacts.iter_mut().for_each(Contact::take_pressures);
+        for _ in 0..MAX_FIXED_POINT_ITERATIONS {
+            problem.body.contacts.iter_mut().for_each(Contact::update_pressures);
             let Attempt { iterations, failure } = self.iterate(problem, system, fallback.search, trial)?;
             if failure.is_some() {
                 return Ok(Attempt { iterations: sum + iterations, failure });
@@ -185,7 +188,8 @@ impl Newton {
             }
             sum += iterations.max(1);
         }
-        let failure = format!("friction bounds still change after {FIXED_POINTS} fixed-point iterations");
+        let failure =
+            format!("friction bounds still change after {MAX_FIXED_POINT_ITERATIONS} fixed-point iterations");
         Ok(Attempt { iterations: sum, failure: Some(failure) })
     }
 
@@ -202,10 +206,10 @@ impl Newton {
             let mut unknowns = trial.owned_mut()?;
             problem.body.contacts.iter().for_each(|contact| contact.unmap(&mut unknowns));
         }
-        if !self.chosen_search {
+        if !self.has_user_search {
             self.snes.search_along_steps(search != Search::FullSteps)?;
         }
-        self.effort.sets.clear();
+        self.counts.sets.clear();
         let (cells, contacts) = problem.body.cells_and_contacts();
         let mut cells = match (&mut self.flow, problem.flow_start) {
             (Some(flow), Some(start)) => Some(flow.of(cells, start)),
@@ -221,23 +225,23 @@ impl Newton {
             session,
             stop_at_cycles: search == Search::FullSteps,
             equilibrated: search == Search::Equilibrated,
-            effort: std::mem::take(&mut self.effort),
+            counts: std::mem::take(&mut self.counts),
         };
         // A tolerance relative to the first residual suffices: the right-hand side is almost zero where only an obstacle moves the
         // body.
         let tolerances = (system.tolerance, self.settings.tolerance);
-        let most = self.settings.max_newton_iterations as usize;
-        let solved = self.snes.solve(&mut equations, trial, tolerances, most);
-        self.effort = equations.effort;
-        let iterations = self.effort.sets.len();
-        let missed = !matches!(&solved, Ok(outcome) if outcome.converged());
+        let limit = self.settings.max_newton_iterations as usize;
+        let solved = self.snes.solve(&mut equations, trial, tolerances, limit);
+        self.counts = equations.counts;
+        let iterations = self.counts.sets.len();
+        let not_converged = !matches!(&solved, Ok(outcome) if outcome.converged());
         // All ranks take the same branch, on whichever rank the failure occurred.
-        let [missed] = session.largest([f64::from(u8::from(missed))]);
-        let failure = if missed == 0.0 {
+        let [not_converged] = session.largest([f64::from(u8::from(not_converged))]);
+        let failure = if not_converged == 0.0 {
             None
         } else {
             match session.agree(solved) {
-                Ok(outcome) => Some(explain(&outcome, &self.effort)),
+                Ok(outcome) => Some(explain(&outcome, &self.counts)),
                 Err(error) if error.is_failure() => Some(error.to_string()),
                 Err(error) => return Err(error.into()),
             }
@@ -261,12 +265,12 @@ impl Newton {
     ) -> Result<StepOutcome> {
         let (session, body) = (problem.session, &*problem.body);
         trial.update_ghosts()?;
-        write_branches(body, trial, &mut self.after)?;
-        let changes = self.before.iter().zip(&self.after).filter(|(a, b)| a != b).count();
+        write_branches(body, trial, &mut self.branches_after)?;
+        let changes = self.branches_before.iter().zip(&self.branches_after).filter(|(a, b)| a != b).count();
         let inclusion = self.inclusion_residual(session, body, trial)?;
         if inclusion.is_nan() || inclusion > self.settings.inclusion_tolerance {
-            let found = format!("velocity and pressure are {inclusion:.1e} off the contact graph");
-            return Err(problem.failed(&found, INCLUSION_REMEDY));
+            let reason = format!("velocity and pressure deviate from the contact graph by {inclusion:.1e}");
+            return Err(problem.failed(&reason, INCLUSION_REMEDY));
         }
         let velocity = trial.local()?;
         let mut points = [0.0; COUNTS];
@@ -276,10 +280,10 @@ impl Newton {
         }
         Ok(StepOutcome {
             newton_iterations,
-            linear_iterations: self.effort.linear_iterations,
+            linear_iterations: self.counts.linear_iterations,
             active_changes: session.total(changes),
             points: PointCount::from_array(session.sum(points)),
-            indefinite_solves: self.effort.indefinite,
+            indefinite_solves: self.counts.indefinite,
             inclusion_residual: inclusion,
             solutions: 0,
             landed_on: None,
@@ -308,21 +312,21 @@ impl Newton {
 }
 
 /// The reason why Newton's method failed, as a message.
-fn explain(outcome: &NonlinearOutcome, effort: &Effort) -> String {
-    let words = outcome.words().to_owned();
-    effort.period().map_or(words.clone(), |period| format!("{words}; {}", cycle(period)))
+fn explain(outcome: &NonlinearOutcome, counts: &SolveCounts) -> String {
+    let reason = outcome.description().to_owned();
+    counts.period().map_or(reason.clone(), |period| format!("{reason}; {}", cycle_message(period)))
 }
 
 /// Writes the steepest descent of each contact's friction at the pressures in its bounds, over all ranks. Collective.
-fn write_largest_falls<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
-    let falls = |contact: &Contact<D>| match contact.friction() {
+fn write_steepest_decreases<const D: usize>(session: &Session, contacts: &[Contact<D>], out: &mut Vec<f64>) {
+    let steepest_decrease = |contact: &Contact<D>| match contact.friction() {
         Some(law) if law.steepest_decrease() > 0.0 => {
             session.largest([contact.steepest_friction_decrease()])[0]
         }
         _ => 0.0,
     };
     out.clear();
-    out.extend(contacts.iter().map(falls));
+    out.extend(contacts.iter().map(steepest_decrease));
 }
 
 /// Writes the branches of all contact points at velocities with ghosts.

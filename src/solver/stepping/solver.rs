@@ -59,10 +59,10 @@ impl Solver {
             newton.flow = Some(Flow::new(like)?);
         }
         if settings.method == Method::Vinewtonrsls {
-            session.agree(bounded::refuse(body))?;
+            session.agree(bounded::refuse_oblique_normals(body))?;
             if body.flows() {
                 return Err(Error::Refused(
-                    "[solver] method = \"vinewtonrsls\" knows no flow, damage, bonds or memory at the end of a step: use method = \"newton\" or \
+                    "[solver] method = \"vinewtonrsls\" does not support viscoplastic flow, damage, adhesion or contact memory at the end of a step; use method = \"newton\" or \
                      [time] scheme = \"lagged_euler\""
                         .into(),
                 ));

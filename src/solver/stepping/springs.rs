@@ -13,19 +13,19 @@ use crate::{
 };
 
 /// Ratio of the stiffness of a spring to that of the matrix at its node.
-const SOFTNESS: f64 = 1e-4;
+const STIFFNESS_RATIO: f64 = 1e-4;
 /// Ratio of the resistance of a whole body to translation to that of one of its nodes, below which the resistance is negligible.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// The springs of a body.
 #[derive(Default)]
 pub(super) struct Springs {
-    /// The rigid motions that no support prevents, in words, for each body; `None` until they are needed.
-    free: Option<Vec<String>>,
+    /// Descriptions of the rigid motions of each body that no support prevents; `None` until they are needed.
+    free_motions: Option<Vec<String>>,
 }
 
 /// The rows of the matrix `K + B` on this rank.
-pub(super) struct SprungRows {
+pub(super) struct RowsWithSprings {
     pub rows: BlockRows,
     /// The stiffness of the springs `B` in N s/m for every motion of the contact nodes of this rank; `None` on all ranks where no
     /// body needs springs.
@@ -35,11 +35,12 @@ pub(super) struct SprungRows {
 impl Springs {
     /// Adds to the failure of a step the motions that only contact can prevent, if there are any.
     pub(super) fn explain(&self, failure: Agreed) -> Error {
-        match &self.free {
-            Some(free) if failure.is_failure() && !free.is_empty() => Error::Failed(format!(
-                "{failure}; contact and friction alone hold these motions, and can't where the loads make a body slide away or \
-                 lift off: {}; add supports, give a density that counts, or change the loads",
-                free.join("; ")
+        match &self.free_motions {
+            Some(motions) if failure.is_failure() && !motions.is_empty() => Error::Failed(format!(
+                "{failure}; only contact and friction resist the following rigid motions, and there is no equilibrium if the \
+                 loads make a body slide away or lift off: {}; add supports, specify a density that is not negligible, \
+                 or change the loads",
+                motions.join("; ")
             )),
             _ => failure.into(),
         }
@@ -51,7 +52,7 @@ impl Springs {
         session: &Session,
         body: &Body<D, S>,
         length: f64,
-    ) -> Result<SprungRows> {
+    ) -> Result<RowsWithSprings> {
         let rows = body.matrix(session, length)?;
         self.add(session, body, rows)
     }
@@ -62,35 +63,35 @@ impl Springs {
         session: &Session,
         body: &Body<D, S>,
         mut rows: BlockRows,
-    ) -> Result<SprungRows> {
+    ) -> Result<RowsWithSprings> {
         // Points of Gauss quadrature may touch nodes of other ranks.
         let nodes = contact_nodes(&body.contacts, &body.fixed);
         let nodes = nodes.iter().filter(|contact| contact.node < body.mesh.owned);
         let motions: Vec<(usize, [f64; D])> =
-            nodes.flat_map(|c| c.frame[..c.seen].iter().map(|motion| (c.node, *motion))).collect();
+            nodes.flat_map(|c| c.frame[..c.active].iter().map(|motion| (c.node, *motion))).collect();
         let total = body.mesh.total_nodes as f64;
         let first = body.mesh.first_node;
         let stiffness = |&(node, motion): &(usize, [f64; D])| {
             let range = rows.offsets[node]..rows.offsets[node + 1];
             let (mut own, mut together) = (0.0, 0.0);
             for at in range {
-                let share = form::<D>(&rows.values[at * D * D..][..D * D], &motion);
-                together += share;
+                let power = quadratic_form::<D>(&rows.values[at * D * D..][..D * D], &motion);
+                together += power;
                 if rows.columns[at] as usize == first + node {
-                    own = share;
+                    own = power;
                 }
             }
-            if total * together < NEGLIGIBLE * own { SOFTNESS * own } else { 0.0 }
+            if total * together < NEGLIGIBLE * own { STIFFNESS_RATIO * own } else { 0.0 }
         };
         let springs: Vec<f64> = motions.iter().map(stiffness).collect();
         if session.total(springs.iter().filter(|spring| **spring > 0.0).count()) == 0 {
-            return Ok(SprungRows { rows, springs: None });
+            return Ok(RowsWithSprings { rows, springs: None });
         }
-        if self.free.is_none() {
-            self.free = Some(free_motions(session, &body.mesh, body.fixed.as_chunks().0, &[])?);
+        if self.free_motions.is_none() {
+            self.free_motions = Some(free_motions(session, &body.mesh, body.fixed.as_chunks().0, &[])?);
         }
-        if self.free.as_ref().is_none_or(Vec::is_empty) {
-            return Ok(SprungRows { rows, springs: None });
+        if self.free_motions.as_ref().is_none_or(Vec::is_empty) {
+            return Ok(RowsWithSprings { rows, springs: None });
         }
         for ((node, motion), spring) in motions.iter().zip(&springs) {
             let range = rows.offsets[*node]..rows.offsets[node + 1];
@@ -101,11 +102,11 @@ impl Springs {
                 *value += spring * motion[k / D] * motion[k % D];
             }
         }
-        Ok(SprungRows { rows, springs: Some(springs) })
+        Ok(RowsWithSprings { rows, springs: Some(springs) })
     }
 }
 
 /// `m . (B m)` with a block `B`.
-fn form<const D: usize>(block: &[f64], motion: &[f64; D]) -> f64 {
+fn quadratic_form<const D: usize>(block: &[f64], motion: &[f64; D]) -> f64 {
     block.iter().enumerate().map(|(k, value)| motion[k / D] * value * motion[k % D]).sum()
 }

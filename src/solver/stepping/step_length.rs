@@ -3,7 +3,7 @@
 use crate::fem::{effect::Step, state::State};
 
 /// A step whose end differs from a prescribed time by at most this share of its length ends at that time.
-pub const SNAP: f64 = 1e-6;
+pub const TIME_TOLERANCE: f64 = 1e-6;
 
 /// A time that a step must not pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,7 +11,7 @@ pub struct Landing {
     /// In s.
     pub time: f64,
     /// Its name, if the log reports it.
-    pub what: Option<&'static str>,
+    pub name: Option<&'static str>,
 }
 
 /// The times at which steps of a run must end.
@@ -32,8 +32,8 @@ impl Landings {
         let multiple = |interval: f64| interval * ((after / interval).floor() + 1.0);
         let last = self.interval.map_or(self.end, multiple).min(self.end);
         match self.times.iter().find(|landing| **landing > after && **landing <= last) {
-            Some(landing) => Landing { time: *landing, what: Some("[time] land_on") },
-            None => Landing { time: last, what: None },
+            Some(landing) => Landing { time: *landing, name: Some("[time] land_on") },
+            None => Landing { time: last, name: None },
         }
     }
 
@@ -42,7 +42,7 @@ impl Landings {
         let landings = self.times.iter().copied().filter(|landing| *landing > time && *landing < self.end);
         let (mut from, mut steps) = (time, 0);
         for to in landings.chain([self.end]) {
-            steps += ((to - from) / length - SNAP).ceil().max(0.0) as u64;
+            steps += ((to - from) / length - TIME_TOLERANCE).ceil().max(0.0) as u64;
             from = to;
         }
         steps
@@ -52,8 +52,8 @@ impl Landings {
 /// A step of `length` from here, shortened or extended to end at `end` if that is near.
 pub fn next_step(state: &State, length: f64, end: f64) -> Step {
     let previous_length = state.step_length;
-    let time = on_the_grid(state.time + length, length);
-    if (end - time).abs() <= SNAP * length {
+    let time = snapped_to_multiple(state.time + length, length);
+    if (end - time).abs() <= TIME_TOLERANCE * length {
         Step { time: end, length, previous_length }
     } else if time > end {
         Step { time: end, length: end - state.time, previous_length }
@@ -62,11 +62,11 @@ pub fn next_step(state: &State, length: f64, end: f64) -> Step {
     }
 }
 
-/// The multiple of `length` that equals a time up to rounding, if there is one: sums of millions of lengths would drift away from
-/// it.
-fn on_the_grid(time: f64, length: f64) -> f64 {
+/// The multiple of `length` that equals a time up to rounding, if there is one, and otherwise the time: rounding errors of sums of
+/// millions of lengths would accumulate.
+fn snapped_to_multiple(time: f64, length: f64) -> f64 {
     let multiple = (time / length).round() * length;
-    if (time - multiple).abs() <= SNAP * length { multiple } else { time }
+    if (time - multiple).abs() <= TIME_TOLERANCE * length { multiple } else { time }
 }
 
 #[cfg(test)]
@@ -74,16 +74,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_million_steps_end_where_they_should() {
+    fn the_end_of_a_million_steps_is_exact() {
         let (length, mut time) = (1e-3, 0.0);
         for _ in 0..1_000_000 {
-            time = on_the_grid(time + length, length);
+            time = snapped_to_multiple(time + length, length);
         }
         assert_eq!(time, 1000.0);
     }
 
     #[test]
-    fn landings_come_in_their_order_and_cut_fixed_steps() {
+    fn prescribed_times_are_reached_in_order_and_shorten_fixed_steps() {
         let landings = Landings { times: vec![0.25, 0.7], interval: None, end: 1.0 };
         let times = |landings: &Landings| {
             let mut times = vec![0.0];
@@ -93,14 +93,14 @@ mod tests {
             times
         };
         assert_eq!(times(&landings), [0.0, 0.25, 0.7, 1.0]);
-        assert_eq!(landings.next(0.0).what, Some("[time] land_on"));
-        assert_eq!(landings.next(0.7).what, None);
+        assert_eq!(landings.next(0.0).name, Some("[time] land_on"));
+        assert_eq!(landings.next(0.7).name, None);
         // 0.1, 0.2, 0.25; 0.35 to 0.65, 0.7; 0.8 to 1.
         assert_eq!(landings.steps_after(0.0, 0.1), 3 + 5 + 3);
         assert_eq!(landings.steps_after(0.7, 0.1), 3);
         let with_output = Landings { interval: Some(0.5), ..landings };
         assert_eq!(times(&with_output), [0.0, 0.25, 0.5, 0.7, 1.0]);
-        let named = |times: Vec<f64>, interval| Landings { times, interval, end: 1.0 }.next(0.4).what;
+        let named = |times: Vec<f64>, interval| Landings { times, interval, end: 1.0 }.next(0.4).name;
         assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
         assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
         let none = Landings { times: Vec::new(), interval: None, end: 1.0 };
@@ -108,8 +108,8 @@ mod tests {
     }
 
     #[test]
-    fn times_between_multiples_stay_where_they_are() {
-        assert_eq!(on_the_grid(0.65, 0.1), 0.65);
-        assert_eq!(on_the_grid(0.1 + 0.2, 0.1), 3.0 * 0.1);
+    fn times_between_multiples_are_unchanged() {
+        assert_eq!(snapped_to_multiple(0.65, 0.1), 0.65);
+        assert_eq!(snapped_to_multiple(0.1 + 0.2, 0.1), 3.0 * 0.1);
     }
 }

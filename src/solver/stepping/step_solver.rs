@@ -8,7 +8,7 @@ use super::{
     problem::{REMEDY, StepProblem, System},
     resistance::{resistances_of_body, set_reference_values},
     solver::Solver,
-    springs::{Springs, SprungRows},
+    springs::{RowsWithSprings, Springs},
     step_clock::CountedMatrix,
 };
 use crate::{
@@ -28,7 +28,7 @@ pub(super) struct Lengths {
 
 /// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
 /// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
-const SHARE_OF_ROUNDING: f64 = 0.1;
+const ROUNDING_SHARE: f64 = 0.1;
 
 /// The matrix for steps of one length, and its solver.
 pub(super) struct StepSolver {
@@ -47,7 +47,7 @@ pub(super) struct StepSolver {
     /// Products with the matrix since the count of traffic was restarted, without those of PETSc's Krylov solver for linear steps.
     products: Cell<u64>,
     /// Whether a set-up failed: the linear solver in use must be replaced.
-    is_broken: bool,
+    set_up_failed: bool,
     /// Matrices with preconditioners that are not in use.
     cache: Option<FactorCache>,
     /// Springs that keep the factors of bodies supported by contact alone regular.
@@ -76,7 +76,7 @@ impl StepSolver {
             matrix_norm: 0.0,
             solver,
             products: Cell::new(0),
-            is_broken: false,
+            set_up_failed: false,
             cache: None,
             springs: Springs::default(),
         })
@@ -118,18 +118,18 @@ impl StepSolver {
         let length = self.cached_length(lengths);
         let mut is_new = false;
         if self.cached.as_ref().is_none_or(|(known, _)| *known != length) {
-            let kept = self.cache.as_mut().and_then(|cache| cache.take(length));
-            is_new = kept.is_none();
-            let (matrix, krylov) = kept.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
-            self.exchange_matrix_in_use(session, body, krylov, like)?;
+            let cached = self.cache.as_mut().and_then(|cache| cache.remove(length));
+            is_new = cached.is_none();
+            let (matrix, krylov) = cached.map(|Cached { matrix, krylov, .. }| (matrix, krylov)).unzip();
+            self.activate_solver(session, body, krylov, like)?;
             let matrix = match matrix {
                 Some(matrix) => matrix,
                 None => {
-                    self.is_broken = true;
+                    self.set_up_failed = true;
                     self.set_up(session, body, length, like)?
                 }
             };
-            self.is_broken = false;
+            self.set_up_failed = false;
             self.cached = Some((length, matrix));
         }
         if lengths.matrix != length {
@@ -151,8 +151,8 @@ impl StepSolver {
     }
 
     /// Activates another linear solver: `next`, or a new one that is not set up. The matrix in use, if there is one, is stored in
-    /// the cache with its preconditioner; the remains of a failed set-up are dropped. Collective.
-    fn exchange_matrix_in_use<const D: usize, const S: usize>(
+    /// the cache with its preconditioner; the objects of a failed set-up are dropped. Collective.
+    fn activate_solver<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &Body<D, S>,
@@ -162,20 +162,20 @@ impl StepSolver {
         let (chosen, unknowns) = (self.settings.preconditioner, body.mesh.total_nodes * D);
         let mut krylov = match next {
             Some(krylov) => krylov,
-            None if self.cached.is_none() && !self.is_broken => return Ok(()),
-            None => Krylov::another(&self.solver, session, chosen, &body.mesh, like)?,
+            None if self.cached.is_none() && !self.set_up_failed => return Ok(()),
+            None => Krylov::new_like(&self.solver, session, chosen, &body.mesh, like)?,
         };
-        krylov.exchange(&mut self.solver);
+        krylov.swap_with(&mut self.solver);
         let Some((length, matrix)) = self.cached.take() else { return Ok(()) };
         let cache = match &mut self.cache {
             Some(cache) => cache,
             none => {
                 let bytes = 12.0 * matrix.stored_entries()?;
-                let kept = chosen.kept(D, unknowns, session.ranks(), bytes);
-                none.insert(FactorCache::new(kept - 1))
+                let capacity = chosen.cache_capacity(D, unknowns, session.ranks(), bytes);
+                none.insert(FactorCache::new(capacity - 1))
             }
         };
-        cache.put(Cached { length, matrix, krylov });
+        cache.insert(Cached { length, matrix, krylov });
         Ok(())
     }
 
@@ -190,18 +190,18 @@ impl StepSolver {
     ) -> Result<Matrix> {
         let rows = matrix_rows(session, body, length)?;
         let mut matrix = session.agree(Matrix::symmetric(D, &rows))?;
-        let mut sprung = self.springs.add(session, body, rows)?;
+        let mut rows_with_springs = self.springs.add(session, body, rows)?;
         if let Solver::Condensed(condensed) = &mut self.solver {
-            if condensed.prepare(session, body, sprung, &matrix, like)? {
-                if condensed.precision_in_use()? == Precision::Single {
+            if condensed.prepare(session, body, rows_with_springs, &matrix, like)? {
+                if condensed.active_precision()? == Precision::Single {
                     matrix.multiply_often()?;
                 }
                 return Ok(matrix);
             }
             self.solver = Solver::whole(session, body, like, &self.settings)?;
-            sprung = self.springs.rows(session, body, length)?;
+            rows_with_springs = self.springs.rows(session, body, length)?;
         }
-        let SprungRows { rows, springs } = sprung;
+        let RowsWithSprings { rows, springs } = rows_with_springs;
         // The matrix for the preconditioner, if it differs from the matrix of the step.
         let mut with_springs = None;
         if springs.is_some() {
@@ -232,7 +232,7 @@ impl StepSolver {
 
     /// The matrix in use.
     fn matrix(&self) -> Result<&Matrix> {
-        let unprepared = || Error::Internal("a matrix was asked for before it was assembled".into());
+        let unprepared = || Error::Internal("a matrix was requested before it was assembled".into());
         self.step_matrix.as_ref().or(self.cached.as_ref()).map(|(_, matrix)| matrix).ok_or_else(unprepared)
     }
 
@@ -294,7 +294,7 @@ impl StepSolver {
         loop {
             let (_, matrix) =
                 self.step_matrix.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
-                    Error::Internal("a step was taken before its matrix was assembled".into())
+                    Error::Internal("a step was solved before its matrix was assembled".into())
                 })?;
             let matrix = &CountedMatrix { matrix, products: &self.products };
             let system = System { matrix, right_hand_side: forces, tolerance, converged: &state.velocity };
@@ -307,22 +307,22 @@ impl StepSolver {
                 Err(failure) if failure.is_failure() => failure,
                 solved => return solved.map_err(|error| self.springs.explain(error)),
             };
-            if self.factor_in_use()? == Some(Precision::Single) {
-                session.agree(self.factor_in_double(problem, trial))?;
+            if self.active_precision()? == Some(Precision::Single) {
+                session.agree(self.refactor_in_double(problem, trial))?;
                 continue;
             }
             if is_relaxed {
                 return Err(self.springs.explain(failure));
             }
             // The start value may be much smaller than the solution, especially at rest.
-            let mut answer = forces.like()?;
-            self.precondition(forces, &mut answer)?;
-            let floor = f64::EPSILON * self.matrix_norm * answer.norm()?;
+            let mut solution = forces.like()?;
+            self.precondition(forces, &mut solution)?;
+            let floor = f64::EPSILON * self.matrix_norm * solution.norm()?;
             if !floor.is_finite() || floor <= tolerance {
                 return Err(self.springs.explain(failure));
             }
             if !self.is_nonlinear() {
-                trial.copy_from(&answer)?;
+                trial.copy_from(&solution)?;
             }
             (tolerance, is_relaxed) = (floor, true);
         }
@@ -356,20 +356,20 @@ impl StepSolver {
         let product = f64::EPSILON * self.matrix_norm * motion;
         Ok((self.settings.tolerance * norm)
             .max(f64::MIN_POSITIVE)
-            .max(SHARE_OF_ROUNDING * *rounding)
+            .max(ROUNDING_SHARE * *rounding)
             .max(product))
     }
 
     /// The precision of the factor in use, if steps are condensed to the contact.
-    fn factor_in_use(&mut self) -> Result<Option<Precision>> {
+    fn active_precision(&mut self) -> Result<Option<Precision>> {
         match &mut self.solver {
-            Solver::Condensed(condensed) => condensed.precision_in_use().map(Some),
+            Solver::Condensed(condensed) => condensed.active_precision().map(Some),
             _ => Ok(None),
         }
     }
 
     /// Replaces a factor whose single precision was insufficient, and resets the step to its start. Collective.
-    fn factor_in_double<const D: usize, const S: usize>(
+    fn refactor_in_double<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         trial: &mut DistributedVector,
@@ -377,7 +377,7 @@ impl StepSolver {
         let (length, matrix) =
             self.step_matrix.as_ref().or(self.cached.as_ref()).map_or((0.0, None), |(l, m)| (*l, Some(m)));
         let (Solver::Condensed(condensed), Some(matrix)) = (&mut self.solver, matrix) else { return Ok(()) };
-        condensed.start_again(trial)?;
+        condensed.restore_start(trial)?;
         restore_pressures(problem.body, problem.state)?;
         condensed.precision = Precision::Double;
         let rows = self.springs.rows(problem.session, problem.body, length)?;
@@ -396,7 +396,7 @@ fn solve_linear<const D: usize, const S: usize>(
     ksp.set_tolerances(0.0, tolerance, LINEAR_ITERATIONS)?;
     let outcome = problem.session.agree(ksp.solve(problem.forces, trial))?;
     if !outcome.converged() {
-        return Err(problem.failed(outcome.words(), REMEDY));
+        return Err(problem.failed(outcome.description(), REMEDY));
     }
     Ok(StepOutcome { linear_iterations: outcome.iterations, ..StepOutcome::default() })
 }

@@ -3,7 +3,7 @@
 use super::{
     StepOutcome,
     contacts::{commit_tractions, prepare_contacts},
-    factor_cache::nearest,
+    factor_cache::nearest_cached_length,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
@@ -131,15 +131,15 @@ impl Stepper {
         body: &mut Body<D, S>,
         step: Step,
     ) -> Result<()> {
-        let cached = self.integrator.steady_length(nearest(self.base_length, step.length));
+        let cached = self.integrator.steady_length(nearest_cached_length(self.base_length, step.length));
         let lengths = Lengths { matrix: self.integrator.matrix_length(step), cached };
         if self.solver.is_prepared_for(lengths) {
             return Ok(());
         }
         let start = Instant::now();
         let _stage = self.stages.assembly.enter()?;
-        let made = self.solver.prepare(session, body, lengths, &self.right_hand_side)?;
-        self.set_ups += u64::from(made);
+        let is_new = self.solver.prepare(session, body, lengths, &self.right_hand_side)?;
+        self.set_ups += u64::from(is_new);
         self.clock.assembly += start.elapsed();
         if self.clock.first_assembly.is_zero() {
             self.clock.first_assembly = self.clock.assembly;

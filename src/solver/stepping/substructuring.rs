@@ -3,7 +3,7 @@
 //!
 //! The interface consists of the nodes that cells of several ranks touch: without them, subdomains are not coupled. With the
 //! interface and the contact unknowns of a rank ordered last, its rows give `-K_lf K_ff^-1 K_fl`, and the sum over all ranks,
-//! beside the entries of the matrix between these unknowns, is the Schur complement of interface and contact. It is small and
+//! plus the entries of the matrix between these unknowns, is the Schur complement of interface and contact. It is small and
 //! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps the whole factor. All sums are in the
 //! order of the ranks, so that runs on the same number of ranks repeat each bit.
 
@@ -24,11 +24,11 @@ use mpi::{
 };
 use std::ops::Range;
 
-/// A component of a node of the interface or contact that is eliminated in the interior.
+/// Marks a component of a node of interface or contact that is eliminated in the interior.
 const NONE: u32 = u32::MAX;
 
 /// Unknowns of the interface and of the contact up to which their dense matrix fits on each rank.
-pub(super) const MOST_ON_INTERFACE: usize = 12_000;
+pub(super) const MAX_INTERFACE_UNKNOWNS: usize = 12_000;
 
 /// The unknowns of interface and contact, numbered over all ranks: first those of the interface, then those of the contact.
 #[derive(Debug)]
@@ -51,19 +51,19 @@ pub(super) struct Substructures {
 }
 
 impl Substructures {
-    /// The interface of the subdomains of a mesh, beside contact nodes with these frames. Collective.
+    /// The interface of the subdomains of a mesh, and contact nodes with these frames. Collective.
     pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>, frames: &Frames) -> Result<Self> {
         let shared = interface_nodes(session, mesh)?;
         let mut nodes = [&shared[..], frames.nodes()].concat();
         nodes.sort_unstable();
         nodes.dedup();
         let mut numbers = vec![NONE; nodes.len() * D];
-        let place = |node: u32| nodes.binary_search(&node).unwrap_or(nodes.len());
+        let position = |node: u32| nodes.binary_search(&node).unwrap_or(nodes.len());
         let contact: Vec<usize> =
-            frames.unknowns.iter().map(|unknown| place((unknown / D) as u32) * D + unknown % D).collect();
+            frames.unknowns.iter().map(|unknown| position((unknown / D) as u32) * D + unknown % D).collect();
         contact.iter().for_each(|&at| numbers[at] = 0);
         let mut interface = 0;
-        for at in shared.iter().flat_map(|&node| place(node) * D..(place(node) + 1) * D) {
+        for at in shared.iter().flat_map(|&node| position(node) * D..(position(node) + 1) * D) {
             if numbers[at] == NONE {
                 numbers[at] = interface;
                 interface += 1;
@@ -232,11 +232,11 @@ impl Factors {
         // The choice may differ between processors.
         let is_double = gather(world, &[u8::from(interior.precision() == Precision::Double)])?;
         if is_double.contains(&0) && is_double.contains(&1) {
-            let again = match interior.precision() {
+            let interior_factor = match interior.precision() {
                 Precision::Single => factor(Precision::Double),
                 Precision::Double => Ok(interior),
             };
-            interior = agree(world, again)?;
+            interior = agree(world, interior_factor)?;
         }
         drop(local);
         Shared::new(world, substructures, interior, &skeleton)
@@ -259,16 +259,16 @@ impl Factors {
     }
 
     /// The position of each contact unknown, given in these numbers of all ranks, in [`Factors::last_mut`].
-    pub(super) fn places(&self, unknowns: &[usize]) -> Vec<usize> {
+    pub(super) fn positions(&self, unknowns: &[usize]) -> Vec<usize> {
         match self {
             Self::Whole(factor) => {
-                let mut place = vec![0; factor.order().len()];
+                let mut positions = vec![0; factor.order().len()];
                 factor
                     .last_unknowns()
                     .iter()
                     .enumerate()
-                    .for_each(|(at, &unknown)| place[unknown as usize] = at);
-                unknowns.iter().map(|&unknown| place[unknown]).collect()
+                    .for_each(|(at, &unknown)| positions[unknown as usize] = at);
+                unknowns.iter().map(|&unknown| positions[unknown]).collect()
             }
             Self::Shared(_) => (0..unknowns.len()).collect(),
         }
@@ -382,7 +382,9 @@ impl Shared {
 
     fn forward(&mut self, right_hand_side: &[f64]) -> Result<()> {
         if right_hand_side.len() > self.local.len() {
-            return Err(Error::Internal("a right-hand side that is none of the subdomain".into()));
+            return Err(Error::Internal(
+                "the right-hand side does not have the size of the subdomain".into(),
+            ));
         }
         let (own, ghosts) = self.local.split_at_mut(right_hand_side.len());
         own.copy_from_slice(right_hand_side);
@@ -421,7 +423,7 @@ pub(super) struct SharedFactor {
 impl SharedFactor {
     /// For matrices on the nodes of a mesh; `None` where the dense matrix of the interface would be too large. Collective.
     pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Option<Self>> {
-        if interface_nodes(session, mesh)?.len() * D > MOST_ON_INTERFACE {
+        if interface_nodes(session, mesh)?.len() * D > MAX_INTERFACE_UNKNOWNS {
             return Ok(None);
         }
         let substructures = Substructures::new(session, mesh, &Frames::new::<D>(session, mesh, &[])?)?;

@@ -11,7 +11,7 @@ const ALIGNED: f64 = 1e-9;
 
 impl<const D: usize> Contact<D> {
     /// The first position in m where the law is not merely a bound on a velocity component, if there is one.
-    pub fn more_than_bounds(&self) -> Option<&[f64; D]> {
+    pub fn oblique_normal(&self) -> Option<&[f64; D]> {
         let is_bound = self.law.velocity_bound(NodeContext::default()).is_some();
         let free = self.points.iter().filter(|p| p.unknown != Unknown::Held);
         let is_simple = |axis: Option<usize>| is_bound && axis.is_some();
@@ -26,7 +26,7 @@ impl<const D: usize> Contact<D> {
             else {
                 continue;
             };
-            let (at, bound) = (point.first(Newton) * D + axis, bound / point.stretch);
+            let (at, bound) = (point.first(Newton) * D + axis, bound / point.free_length);
             if point.direction[axis] > 0.0 {
                 upper[at] = upper[at].min(bound);
             } else {
@@ -40,8 +40,8 @@ impl<const D: usize> Contact<D> {
     pub fn set_reactions(&mut self, velocity: &[f64], residual: &[f64]) {
         let law = &self.law;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
-            let bound = law.velocity_bound(point.context).unwrap_or(f64::INFINITY) / point.stretch;
-            let reaction = -point.along(Newton, residual) / (point.weight * point.stretch);
+            let bound = law.velocity_bound(point.context).unwrap_or(f64::INFINITY) / point.free_length;
+            let reaction = -point.along(Newton, residual) / (point.weight * point.free_length);
             point.pressure = if point.along(Newton, velocity) >= bound { reaction.max(0.0) } else { 0.0 };
         }
     }

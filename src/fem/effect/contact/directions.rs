@@ -13,10 +13,10 @@ use std::collections::BTreeMap;
 pub struct ContactNode<const D: usize> {
     /// Local number.
     pub node: usize,
-    /// Orthonormal directions; laws act along the first `seen` of them.
+    /// Orthonormal directions; laws act along the first `active` of them.
     pub frame: [Vector<D>; D],
     /// Number of directions along which laws act: zero where supports fix the node.
-    pub seen: usize,
+    pub active: usize,
 }
 
 /// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag for each local component.
@@ -24,32 +24,32 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) ->
     let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
     for contact in contacts {
         for point in &contact.points {
-            let seen = match point.unknown {
+            let active = match point.unknown {
                 Unknown::Parameter => Some(point.direction),
                 Unknown::Velocity => None,
                 Unknown::Held => Some([0.0; D]),
             };
-            nodes.entry(point.node()).or_default().push(seen);
+            nodes.entry(point.node()).or_default().push(active);
         }
         let tangential = contact.friction.iter().flat_map(|friction| &friction.points);
         tangential.for_each(|point| nodes.entry(point.node()).or_default().push(None));
     }
     let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
     let axes: Vec<Vector<D>> = (0..D).map(axis).collect();
-    let frame = |(node, seen): (usize, Vec<Option<Vector<D>>>)| match seen[..] {
+    let frame = |(node, active): (usize, Vec<Option<Vector<D>>>)| match active[..] {
         [Some(direction)] if direction == [0.0; D] => {
-            ContactNode { node, frame: std::array::from_fn(axis), seen: 0 }
+            ContactNode { node, frame: std::array::from_fn(axis), active: 0 }
         }
         [Some(direction)] => {
             let rest = span_without(&axes, &[direction]).0;
             let frame = std::array::from_fn(|i| if i == 0 { direction } else { rest[i - 1] });
-            ContactNode { node, frame, seen: 1 }
+            ContactNode { node, frame, active: 1 }
         }
         _ => {
             let free = |i: &usize| !fixed[node * D + i];
             let order: Vec<usize> = (0..D).filter(free).chain((0..D).filter(|i| !free(i))).collect();
             let frame = std::array::from_fn(|i| axis(order[i]));
-            ContactNode { node, frame, seen: (0..D).filter(free).count() }
+            ContactNode { node, frame, active: (0..D).filter(free).count() }
         }
     };
     nodes.into_iter().map(frame).collect()
@@ -65,8 +65,8 @@ impl<const D: usize> Contact<D> {
             point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()
         };
         let points = self.points.iter().filter(|_| presses).flat_map(normal);
-        let rubs = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
-        let tangents = rubs
+        let frictions = self.friction.iter().filter(|friction| presses || !friction.law.follows_pressure());
+        let tangents = frictions
             .flat_map(|friction| &friction.points)
             .flat_map(|point| point.tangents[..point.count].iter().map(|tangent| (point.node(), *tangent)));
         points.chain(tangents).collect()

@@ -13,7 +13,7 @@ impl<const D: usize> Contact<D> {
     /// With the penetrations `d`, the energy `e` of the law and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
     /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored energy, work on the obstacle, numerical part. Friction `q` on an obstacle
     /// with the velocity `w` absorbs `k q . v = k q . (v - w) + k q . w`: dissipation, work on the obstacle.
-    pub fn release(&self, velocity: &[f64], length: f64) -> [f64; 3] {
+    pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> [f64; 3] {
         let mut sums = [0.0; 3];
         for point in &self.points {
             let v = point.normal_component(Body, velocity);
@@ -21,7 +21,7 @@ impl<const D: usize> Contact<D> {
             let work = length * pressure * v;
             let change = point.context.step_length * v;
             let after = point.context.penetration + change;
-            let mismatch = length * v - change - point.shift;
+            let mismatch = length * v - change - point.blend_offset;
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
             let stored = self.law.energy(after).zip(self.law.energy(before)).map(|(e, before)| e - before);
             let numerical = match stored {

@@ -76,7 +76,7 @@ impl<const D: usize> Friction<D> {
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, so that the bound of this friction law is not known; free the normal component there, or use tresca"
                 )));
             }
-            if !held && point.stretch < 1.0 - ROUNDING {
+            if !held && point.free_length < 1.0 - ROUNDING {
                 return Err(Error::Refused(format!(
                     "friction at {place:?} m: a support fixes a component that is neither along the normal of the contact nor perpendicular to it, so that no free direction is tangential; fix all components there, or none"
                 )));
@@ -122,7 +122,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// Uses the pressures of `points` in the bounds.
-    pub(super) fn take_pressures(&mut self, points: &[Point<D>]) {
+    pub(super) fn update_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
     }
 
@@ -136,7 +136,7 @@ impl<const D: usize> Friction<D> {
     pub(super) fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
         let (law, scale) = (self.law, self.scale);
         if self.follows {
-            self.take_pressures(points);
+            self.update_pressures(points);
         }
         for point in &mut self.points {
             let unknown = point.along(Newton, values);

@@ -31,7 +31,7 @@ impl<const D: usize> Contact<D> {
             } else {
                 self.law.pressure(point.normal_component(Newton, values), point.context)
             };
-            point.add_along(Newton, pressure / (self.scale * point.stretch), values);
+            point.add_along(Newton, pressure / (self.scale * point.free_length), values);
         }
         if let Some(friction) = &self.friction {
             friction.unmap(values);
@@ -47,7 +47,7 @@ impl<const D: usize> Contact<D> {
             point.pressure = found.pressure;
             // In two terms: the parameter may be much larger than the velocity, which would be lost in its rounding.
             point.add_along(Newton, -along, values);
-            point.add_along(Newton, found.velocity / point.stretch, values);
+            point.add_along(Newton, found.velocity / point.free_length, values);
         }
         if let Some(friction) = &mut self.friction {
             friction.map(&self.points, values);
@@ -127,7 +127,7 @@ impl<const D: usize> Contact<D> {
         let scale = self.scale;
         for point in self.points.iter_mut().filter(|p| p.unknown == Unknown::Parameter) {
             let along = point.along(Newton, values);
-            point.change = scale * point.stretch * (1.0 - point.theta) * along;
+            point.change = scale * point.free_length * (1.0 - point.theta) * along;
             point.add_along(Newton, (point.theta - 1.0) * along, values);
         }
         if let Some(friction) = &mut self.friction {
@@ -150,7 +150,7 @@ impl<const D: usize> Contact<D> {
     /// are to be called after [`linearise_parameters`](Self::linearise_parameters).
     pub fn add_slopes(&self, direction: &[f64], forces: &mut [f64]) {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
-        let change = |point: &Point<D>| point.slope * point.stretch * point.along(Newton, direction);
+        let change = |point: &Point<D>| point.slope * point.free_length * point.along(Newton, direction);
         self.add_changes(direction, change, forces);
         if let Some(friction) = &self.friction {
             friction.add_slopes(&self.points, direction, forces);
@@ -197,7 +197,8 @@ impl<const D: usize> Contact<D> {
         debug_assert!(self.derivatives >= Derivatives::Linearised);
         for point in self.points.iter().filter(|p| p.unknown == Unknown::Parameter) {
             let change = if point.theta == 0.0 {
-                point.along(Newton, open) / (self.scale * point.weight * point.stretch * point.stretch)
+                point.along(Newton, open)
+                    / (self.scale * point.weight * point.free_length * point.free_length)
             } else {
                 (1.0 / point.theta - 1.0) * point.along(Newton, values)
             };

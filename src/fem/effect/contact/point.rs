@@ -45,7 +45,7 @@ pub(super) struct Point<const D: usize> {
     /// At nodal points: the normal without prescribed components, scaled to length 1.
     pub direction: Vector<D>,
     /// Length of the normal without prescribed components before scaling.
-    pub stretch: f64,
+    pub free_length: f64,
     pub unknown: Unknown,
     /// Initial position, in m.
     pub place: Vector<D>,
@@ -56,7 +56,7 @@ pub(super) struct Point<const D: usize> {
     /// Growth of the gap in the step, in m.
     pub growth: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
-    pub shift: f64,
+    pub blend_offset: f64,
     /// Pressure in Pa at the last evaluation, where the unknown is the parameter.
     pub pressure: f64,
     /// Ratio of the change of velocity to the change of the unknown, at the last linearisation: `c V'(s)`.
@@ -77,13 +77,13 @@ impl<const D: usize> Point<D> {
             weight,
             force: [[0.0; D]; D],
             direction: [0.0; D],
-            stretch: 0.0,
+            free_length: 0.0,
             unknown: Unknown::Velocity,
             place: [0.0; D],
             context: NodeContext::default(),
             penetration_before: 0.0,
             growth: 0.0,
-            shift: 0.0,
+            blend_offset: 0.0,
             pressure: 0.0,
             theta: 1.0,
             slope: 0.0,
@@ -106,10 +106,10 @@ impl<const D: usize> Point<D> {
         let mut point = Self::new(&[node], &[1.0], normal, weight, fixed);
         let free: Vector<D> =
             std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
-        point.stretch = norm(&free);
+        point.free_length = norm(&free);
         // A smaller length is a rounding error in the normal of a face that supports fix.
-        if point.stretch > 1e-9 {
-            point.direction = free.map(|x| x / point.stretch);
+        if point.free_length > 1e-9 {
+            point.direction = free.map(|x| x / point.free_length);
             point.unknown = Unknown::Parameter;
         } else {
             point.force = [[0.0; D]; D];
@@ -201,7 +201,7 @@ impl<const D: usize> Point<D> {
     /// The point of the law's graph for the unknown `along` the direction.
     #[inline]
     pub(super) fn resolve(&self, law: &NormalResponse, scale: f64, along: f64) -> Resolved {
-        law.resolve(scale * self.stretch * along, scale, self.context)
+        law.resolve(scale * self.free_length * along, scale, self.context)
     }
 
     /// The magnitude of the normal velocity in m/s that would close the gap in the step; 0 for laws without a gap.

@@ -25,7 +25,7 @@ impl<const D: usize> Contact<D> {
             let along = point.normal_component(Body, displacement);
             point.context = NodeContext { penetration: along - gap, step_length: length };
             point.penetration_before = along - before;
-            point.shift = 0.0;
+            point.blend_offset = 0.0;
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
@@ -39,9 +39,9 @@ impl<const D: usize> Contact<D> {
             return Ok(());
         }
         for point in &mut self.points {
-            debug_assert!(point.shift == 0.0, "the point was prepared");
-            point.shift = point.normal_component(Body, shift);
-            point.context.penetration += point.shift;
+            debug_assert!(point.blend_offset == 0.0, "the point was prepared");
+            point.blend_offset = point.normal_component(Body, shift);
+            point.context.penetration += point.blend_offset;
             point.context.step_length = blend.length;
         }
         let before = step.time - step.length;

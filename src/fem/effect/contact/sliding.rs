@@ -47,9 +47,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Sets the pressures in the friction bounds to those of the points.
-    pub fn take_pressures(&mut self) {
+    pub fn update_pressures(&mut self) {
         if let Some(friction) = &mut self.friction {
-            friction.take_pressures(&self.points);
+            friction.update_pressures(&self.points);
         }
     }
 

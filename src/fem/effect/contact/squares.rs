@@ -18,14 +18,14 @@ impl<const D: usize> Contact<D> {
     /// Adds the normals at the points to nodal values.
     pub fn add_normals(&self, nodal: &mut [f64]) {
         for point in self.points.iter().filter(|_| !self.needs_ghosts) {
-            point.add_along(Body, point.stretch, nodal);
+            point.add_along(Body, point.free_length, nodal);
         }
     }
 
     /// `integral of w_nu^2` over the boundary on this rank; nodal quadrature.
     pub fn normal_square(&self, nodal: &[f64]) -> f64 {
         let points = self.points.iter().filter(|_| !self.needs_ghosts);
-        points.map(|p| p.weight * (p.stretch * p.along(Body, nodal)).powi(2)).sum()
+        points.map(|p| p.weight * (p.free_length * p.along(Body, nodal)).powi(2)).sum()
     }
 
     /// Adds a unit velocity along a tangent at each point with friction to nodal values.

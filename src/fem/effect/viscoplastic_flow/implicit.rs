@@ -55,7 +55,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 add_to(&mut batch.elastic_stress, lane, -1.0, &release);
                 outcome.has_flowed = true;
                 if let Some(tangents) = &mut outcome.tangents {
-                    tangents.push(batch.first + lane, &loss(law, &tangent, length), *symmetric);
+                    tangents.push(batch.first + lane, &tangent_change(law, &tangent, length), *symmetric);
                 }
             }
             self.stress.set_trial(batch.number, lane, after);
@@ -65,7 +65,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
         }
     }
 
-    /// Adds what flow takes up in a solved step, and the terms of the scheme.
+    /// Adds the dissipation of flow in a solved step, and the numerical terms of the scheme.
     pub(super) fn add_energy_of_implicit_flow<const D: usize>(
         &self,
         blend: Blend,
@@ -105,8 +105,8 @@ fn add_to<const S: usize>(stresses: &mut Pack<S>, lane: usize, factor: f64, adde
     stresses.set(lane, sum);
 }
 
-/// `(T - I) k' E`: what flow takes from the derivative of the stress by the strain rate.
-fn loss<const S: usize>(law: &FlowLaw, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
+/// `(T - I) k' E`: the change by flow of the derivative of the stress with respect to the strain rate.
+fn tangent_change<const S: usize>(law: &FlowLaw, tangent: &Tangent<S>, length: f64) -> Tangent<S> {
     // E is symmetric, so that it may be applied to the rows.
     std::array::from_fn(|i| {
         let mut row = tangent[i];
