@@ -1,4 +1,4 @@
-//! A job that is built, stepped and looked at in memory: the square of Wang and Cheng (2022), on few cells and with half of its load.
+//! A job in memory whose velocity is read after each step: the square of Wang and Cheng (2022), on few cells and with half of its load.
 //!
 //! ```text
 //! cargo run --release --example job_in_memory

@@ -1,25 +1,25 @@
 //! Clarke solves dynamic contact of viscoplastic bodies with nonmonotone boundary laws (Clarke subdifferentials), on any number of
 //! MPI ranks.
 //!
-//! The program `solver` is the usual way in. This library is for programs that look at the fields between steps, or that bring laws
-//! of their own. A module uses only modules that stand above it:
+//! Most users run the program `solver`. This library is for programs that read the fields between steps, or that define their own
+//! laws. A module uses only modules above it in this table:
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`error`] | errors with their exit codes |
-//! | [`linear_algebra`] | vectors and tensors at a point, packs of cells, PETSc's objects, direct factors |
-//! | [`parallel`] | MPI and PETSc: sessions, outcomes that all ranks share, messages of unknown size |
+//! | [`error`] | the error type with its exit codes |
+//! | [`linear_algebra`] | vectors and tensors at a point, packs of cells, handles of PETSc objects, direct factors |
+//! | [`parallel`] | sessions of MPI and PETSc, outcomes that are identical on all ranks, messages of unknown size |
 //! | [`laws`] | constitutive laws at a point, with their keys in the job file |
-//! | [`job`] | the TOML document: parsed, validated, defaults filled |
-//! | [`mesh`] | meshes made, read, split among ranks |
-//! | [`fem`] | linear elements; the effects that act on a body |
+//! | [`job`] | the TOML document: parsing, validation, defaults, description |
+//! | [`mesh`] | mesh generators, mesh files, partition |
+//! | [`fem`] | linear elements; bodies and the physical effects on them |
 //! | [`solver`] | time schemes, Newton's method on the contact graphs, certificates |
 //! | [`io`] | fields, tables, checkpoints, partitioned meshes |
-//! | [`run`] | from a job to a body; the time loop |
+//! | [`run`] | set-up of a body from a job; the time loop |
 //! | [`postprocessing`] | studies of accuracy against cost, reports |
 //! | [`cli`] | the command line |
 //!
-//! A job in memory, stepped and looked at (`examples/job_in_memory.rs`):
+//! A job in memory whose fields are read after each step (`examples/job_in_memory.rs`):
 //!
 //! ```no_run
 #![doc = include_str!("../examples/job_in_memory.rs")]

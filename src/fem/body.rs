@@ -11,7 +11,8 @@ use crate::{
     fem::{
         effect::{
             Contact, Curvature, Effect, Energy, Evaluation, FlowProperties, Form, History, HistoryStore,
-            Load, Outcome, PeakSquares, Peaks, Phases, Step, StressError, SurfaceEffect, Term,
+            Load, Outcome, PeakSquares, Peaks, Phases, STORED_IN_CONTACT, Step, StressError, SurfaceEffect,
+            Term,
         },
         space::{Batch, Geometry, Needs, Nodal, assemble},
         state::State,
@@ -155,7 +156,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
         with_nodal(state, |nodal| {
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
-            energy.stored_in_contact = stored.sum::<Result<f64>>()?;
+            energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
             let effects = self.surface_effects.iter();
             effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
             let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };

@@ -5,18 +5,14 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            self, Adhesion, Bonded, Contact, ContactConditions, ContactMemory, Damage, Effect, ElasticLaw,
-            Inertia, Load, SurfaceEffect, Traction, ViscoplasticFlow, ViscousStress, choose_unknowns,
-            fixed_components,
+            Contact, ContactConditions, Load, Traction, choose_unknowns, effects, fixed_components,
+            surface_effects,
         },
-        space::{Geometry, surface_points},
+        space::{Geometry, facets},
         state::State,
     },
     job::{self, Job, Material},
-    laws::{
-        contact::{Gap, NormalResponse},
-        material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
-    },
+    laws::contact::{Gap, NormalResponse},
     linear_algebra::tensor::Vector,
     mesh::Mesh,
     parallel::session::Session,
@@ -33,7 +29,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
     let fixed = session.agree(fixed_components(&mesh, &job.support, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry))?;
+    let effects = session.agree(effects(&materials, &geometry.runs))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {
@@ -51,7 +47,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         }
         contacts.push(laws);
     }
-    let surface_effects = surface_effects(session, job, &mesh)?;
+    let surface_effects = surface_effects(session, &job.contact, &mesh)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -87,74 +83,6 @@ fn materials<'a, const D: usize>(
     (used.into_iter().map(|at| given[at]).collect(), of_region)
 }
 
-fn effects<const D: usize, const S: usize>(
-    materials: &[&Material],
-    geometry: &Geometry<D>,
-) -> Result<Vec<Box<dyn Effect<D, S>>>> {
-    let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
-    if let Some(density) = by_material(materials, |m| m.density) {
-        effects.push(Box::new(Inertia { density }));
-    }
-    if let Some(law) = by_material(materials, elastic_law::<S>) {
-        effects.push(Box::new(effect::Elasticity { law }));
-    }
-    if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
-        effects.push(Box::new(ViscousStress { tensor }));
-    }
-    let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
-    if let Some(laws) = ByMaterial::new(flow) {
-        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, &geometry.runs)));
-    }
-    let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
-    if let Some(laws) = by_material(materials, damage) {
-        effects.push(Box::new(Damage::new(laws, &geometry.runs)));
-    }
-    Ok(effects)
-}
-
-/// Effects at nodes of boundaries other than contact. Collective.
-fn surface_effects<const D: usize>(
-    session: &Session,
-    job: &Job,
-    mesh: &Mesh<D>,
-) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
-    let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
-    let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for contact in &job.contact {
-        let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
-        if let Some(law) = contact.memory {
-            foundations.push((law, points()?));
-        }
-        if let Some(law) = contact.adhesion {
-            bonded.push(Bonded { law, points: points()? });
-        }
-    }
-    if !bonded.is_empty() {
-        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
-    }
-    if !foundations.is_empty() {
-        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh))?));
-    }
-    Ok(effects)
-}
-
-fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
-    ByMaterial::new(materials.iter().map(|m| law(m)).collect())
-}
-
-fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
-    let tensor = material.elasticity?.tensor(Hypothesis::of(S));
-    Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
-}
-
-fn flow_law<const S: usize>(material: &Material) -> Result<Option<FlowLaw>> {
-    let Some(law) = &material.viscoplasticity else { return Ok(None) };
-    let Some(elasticity) = &material.elasticity else {
-        return Err(Error::Refused(Viscoplasticity::WITHOUT_ELASTICITY.into()));
-    };
-    Ok(Some(law.prepare(elasticity, Hypothesis::of(S))))
-}
-
 /// The law of a contact, and the gap beyond which it acts.
 pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     let law = contact.normal.response()?;
@@ -163,14 +91,6 @@ pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     }
     let distance = || Gap::Distance(contact.normal.gap().cloned().unwrap_or_default());
     Ok((law, contact.obstacle.clone().unwrap_or_else(distance)))
-}
-
-fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
-    let mut all: Vec<u32> =
-        names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
 }
 
 fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {

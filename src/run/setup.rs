@@ -11,7 +11,7 @@ use crate::{
     parallel::session::Session,
     solver::{
         certificate::{Certificates, Verdict},
-        stepping::Stepper,
+        stepping::{Stepper, StepperSettings},
     },
 };
 
@@ -42,7 +42,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
     let shared = steps::steps_a_matrix(job);
-    let scheme = Stepper::new(session, &mut body, &state, job.time.scheme, &job.solver, shared);
+    let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };
+    let scheme = Stepper::new(session, &mut body, &state, settings);
     let mut scheme = session.agree(scheme).map_err(|error| match error.exit() {
         Exit::Internal if !job.solver.petsc.is_empty() => loaded.fault(
             "solver.petsc",

@@ -8,11 +8,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::{
-        body::Body,
-        effect::{Energy, Step},
-        state::State,
-    },
+    fem::{body::Body, effect::Step, state::State},
     io::output::history::Totals,
     job::{Job, Loaded, Time},
     linear_algebra::tensor::larger,
@@ -107,5 +103,5 @@ fn totals_at_start<const D: usize, const S: usize>(
 ) -> Result<Totals, Agreed> {
     let rest = Step { time: state.time, length: 0.0, previous_length: 0.0 };
     let (mine, _) = session.agree(body.energy(state, rest))?;
-    Ok(Totals::at_start(Energy::from_array(session.sum(mine.to_array()))))
+    Ok(Totals::at_start(mine.map_values(|values| session.sum(values))))
 }

@@ -2,7 +2,7 @@
 
 use crate::{assert_close, case::Case, results::Results, thorough};
 use clarke::{
-    fem::effect::{Energy, Role},
+    fem::effect::{ENERGIES, Role},
     linear_algebra::tensor::larger,
 };
 
@@ -14,8 +14,8 @@ fn steps() -> usize {
 /// Stored plus dissipated energy minus supplied energy, relative to the supplied energy.
 fn missing(results: &Results) -> f64 {
     let history = results.table("history.csv");
-    let energies = Energy::COLUMNS.into_iter().zip(Energy::ROLES).filter(|(_, role)| *role != Role::Work);
-    let kept: f64 = energies.map(|(column, _)| history.last(column)).sum();
+    let energies = ENERGIES.iter().filter(|kind| kind.role != Role::Work);
+    let kept: f64 = energies.map(|kind| history.last(kind.column)).sum();
     (kept - history.last("external_work")).abs()
         / history.numbers("viscous_dissipation").last().expect("a step")
 }

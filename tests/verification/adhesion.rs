@@ -3,6 +3,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation, sum};
+use clarke::fem::effect::{DEBONDING, KINETIC};
 use clarke::{
     linear_algebra::tensor::larger,
     mesh::{
@@ -131,7 +132,7 @@ fn follows<const D: usize, const S: usize>(
         let off = bonding(&run).iter().map(|b| (b - mass.bonding).abs()).fold(0.0, larger);
         assert!(off < 2e-3, "step {}: the bonding is off by {off}", run.state.step);
     }
-    let area = run.totals.energy.debonding / mass.dissipated;
+    let area = run.totals.energy[DEBONDING] / mass.dissipated;
     assert!(area > 0.0 && run.totals.max_energy_imbalance < 1e-9, "{:e}", run.totals.max_energy_imbalance);
     (mass, run)
 }
@@ -145,7 +146,7 @@ fn torn_and_slid(session: &Session) {
     for bond in [bond, Bond { viscosity: 0.005, ..bond }, slow] {
         let (mass, run) = follows::<2, 4>(session, &plane, 0.9, bond, [0.0, 1.0]);
         let broken = 1.0 - mass.bonding;
-        assert!((run.totals.energy.debonding / (1.2 * mass.dissipated) - 1.0).abs() < 1e-3);
+        assert!((run.totals.energy[DEBONDING] / (1.2 * mass.dissipated) - 1.0).abs() < 1e-3);
         assert!(mass.peak >= 0.99 * (bond.stiffness * bond.energy).sqrt() && broken > 0.9, "{broken}");
         dissipated.push(mass.dissipated / broken);
     }
@@ -197,7 +198,7 @@ fn bound(session: &Session) {
         let mut run = simulation::<2, 4>(session, &text(step), &crossed([3, 2]));
         while run.advance(session).expect("a step").is_some() {}
         assert_eq!(run.state.step, 60);
-        run.totals.energy.kinetic
+        run.totals.energy[KINETIC]
     };
     let (below, beyond) = (grown(0.98), grown(1.005));
     assert!(below < 10.0 && beyond > 1e4, "{below:e} {beyond:e}");

@@ -2,6 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
+use clarke::fem::effect::{CONTACT, KINETIC, WORK};
 use clarke::{
     fem::{effect::Step, space::surface_points},
     linear_algebra::tensor::{cross, dot, larger, norm},
@@ -63,7 +64,7 @@ fn moved<const D: usize, const S: usize>(
         assert!(outcome.inclusion_residual <= 1e-7, "{:e}\n{job}", outcome.inclusion_residual);
         found.push(run.state.velocity.owned().expect("velocity").to_vec());
     }
-    (found, run.totals.energy.contact)
+    (found, run.totals.energy[CONTACT])
 }
 
 /// In the frame of the belt, the floor is at rest: all velocities differ by that of the belt, and friction dissipates the same
@@ -138,8 +139,8 @@ fn conveyed<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
         assert!(stuck > 4);
         // Half of the work of the belt becomes kinetic energy, the other half is dissipated by friction, up to an error of first
         // order in the step.
-        let (kinetic, work) = (run.totals.energy.kinetic, run.totals.energy.work);
-        let dissipated = run.totals.energy.contact;
+        let (kinetic, work) = (run.totals.energy[KINETIC], run.totals.energy[WORK]);
+        let dissipated = run.totals.energy[CONTACT];
         assert!(
             (work / kinetic - 2.0).abs() < 0.05 && (dissipated / kinetic - 1.0).abs() < 0.05,
             "{:?}",
@@ -243,7 +244,7 @@ fn rolled<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D
         };
         let [_, touching] = hold_against(session, &run, centre, surface);
         assert!(touching > 0.0, "it touches\n{job}");
-        assert!(run.totals.energy.contact > 0.0 && run.totals.energy.work > 0.0, "{:?}", run.totals);
+        assert!(run.totals.energy[CONTACT] > 0.0 && run.totals.energy[WORK] > 0.0, "{:?}", run.totals);
     }
 }
 
@@ -262,7 +263,7 @@ fn braked(session: &Session) {
     let mut last = [0.0; 2];
     while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{e}\n{job}")) {
         assert!(run.totals.energy_imbalance <= 1e-10, "{:e}\n{job}", run.totals.energy_imbalance);
-        last = [outcome.energy.contact, outcome.energy.work];
+        last = [outcome.energy[CONTACT], outcome.energy[WORK]];
     }
     let spin = 20.0 * run.state.time;
     let surface = |place: &[f64; 3]| [-spin * (place[1] - 0.05), spin * (place[0] + 0.3), 0.0];

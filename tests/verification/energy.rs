@@ -2,6 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
+use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, ELASTIC, VISCOPLASTIC, VISCOUS, WORK};
 use clarke::{io::output::history::Totals, mesh::GlobalMesh, parallel::session::Session};
 
 const JOBS: u64 = 60;
@@ -261,8 +262,8 @@ fn balanced<const D: usize, const S: usize>(
             outcome.energy
         );
         assert!(inclusion < 1e-6, "step {steps}: inclusion residual {inclusion:e}\n{text}");
-        assert!(outcome.energy.viscous >= 0.0 && outcome.energy.viscoplastic >= 0.0);
-        assert!(outcome.energy.damage >= 0.0 && outcome.energy.debonding >= 0.0);
+        assert!(outcome.energy[VISCOUS] >= 0.0 && outcome.energy[VISCOPLASTIC] >= 0.0);
+        assert!(outcome.energy[DAMAGE] >= 0.0 && outcome.energy[DEBONDING] >= 0.0);
     }
     assert_eq!(steps, STEPS);
     assert!(run.totals.turnover > 1e-6, "something happens\n{text}");
@@ -320,13 +321,13 @@ pub fn random_jobs(session: &Session) {
         let (totals, job) = run(number, "lagged_euler");
         jobs.push(job);
         let present = [
-            totals.energy.elastic,
-            totals.energy.viscous,
-            totals.energy.viscoplastic,
-            totals.energy.contact,
-            totals.energy.work,
-            totals.energy.damage,
-            totals.energy.debonding,
+            totals.energy[ELASTIC],
+            totals.energy[VISCOUS],
+            totals.energy[VISCOPLASTIC],
+            totals.energy[CONTACT],
+            totals.energy[WORK],
+            totals.energy[DAMAGE],
+            totals.energy[DEBONDING],
         ];
         active.iter_mut().zip(present).for_each(|(count, energy)| *count += u64::from(energy != 0.0));
     }

@@ -2,6 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, noise, simulation};
+use clarke::fem::effect::ELASTIC;
 use clarke::{
     mesh::generate::{Diagonal, rectangle},
     parallel::session::Session,
@@ -79,7 +80,7 @@ pub fn at_rest(session: &Session) {
         let mut run = simulation::<2, 4>(session, &text, &mesh);
         while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")).is_some() {}
         assert_eq!(run.state.step, 80, "{text}");
-        assert!(run.totals.max_inclusion_residual <= 1e-6 && run.totals.energy.elastic > 0.05, "{text}");
+        assert!(run.totals.max_inclusion_residual <= 1e-6 && run.totals.energy[ELASTIC] > 0.05, "{text}");
     }
 }
 

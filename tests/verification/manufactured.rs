@@ -4,6 +4,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation, stir};
 use crate::wave::{Field, Wave};
+use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     mesh::{
         GlobalMesh,
@@ -280,7 +281,7 @@ pub fn measured<const D: usize, const S: usize>(
     let velocity = errors(session, &run, &run.state.velocity.local().expect("velocity"), time.value(1, end));
     let displacement =
         errors(session, &run, &run.state.displacement.local().expect("displacement"), time.value(0, end));
-    assert_eq!(run.totals.energy.viscoplastic != 0.0, job.contains("maxwell"), "whether it flows");
+    assert_eq!(run.totals.energy[VISCOPLASTIC] != 0.0, job.contains("maxwell"), "whether it flows");
     assert!(run.totals.max_energy_imbalance < 1e-9);
     [velocity[0], velocity[1], displacement[0], displacement[1]]
 }

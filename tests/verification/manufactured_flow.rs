@@ -5,6 +5,7 @@
 use crate::manufactured::{VISCOSITY, elasticity, rule};
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation, stir};
+use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     mesh::{
         GlobalMesh,
@@ -259,7 +260,7 @@ fn errors<const D: usize, const S: usize>(
 ) -> [f64; 2] {
     let mut run = simulation::<D, S>(session, &job, mesh);
     while run.advance(session).expect("step").is_some() {}
-    assert!(run.totals.energy.viscoplastic > 0.0 && run.totals.max_energy_imbalance < 1e-9);
+    assert!(run.totals.energy[VISCOPLASTIC] > 0.0 && run.totals.max_energy_imbalance < 1e-9);
     let stress = run.body.stress(&run.state).expect("stress");
     let (scale, normals) = if D == 2 { (2.0, if S == 3 { 2 } else { 3 }) } else { (6.0, 3) };
     let mut sums = [0.0; 4];

@@ -2,6 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
+use clarke::fem::effect::CONTACT;
 use clarke::{
     job::Job, linear_algebra::tensor::larger, mesh::GlobalMesh, parallel::session::Session, run::Simulation,
     solver::certificate::Certificates,
@@ -90,7 +91,11 @@ fn follows<const D: usize, const S: usize>(
         }
         assert!(run.totals.energy_imbalance < 1e-10, "{:?}", run.totals);
     }
-    assert!((run.totals.energy.contact / taken - 1.0).abs() < 1e-3, "{} {taken}", run.totals.energy.contact);
+    assert!(
+        (run.totals.energy[CONTACT] / taken - 1.0).abs() < 1e-3,
+        "{} {taken}",
+        run.totals.energy[CONTACT]
+    );
     let lifted = depths.iter().filter(|depth| **depth < -1e-3).count();
     assert!(lifted > STEPS / 10 && lifted < STEPS * 9 / 10, "off the foundation in {lifted} steps");
     assert!(largest > 0.1 * DAMPING * SPEED, "memory matters: {largest} Pa");

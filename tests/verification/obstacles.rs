@@ -3,6 +3,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, simulation};
+use clarke::fem::effect::{CONTACT, ELASTIC, VISCOUS, WORK};
 use clarke::{
     linear_algebra::tensor::larger,
     mesh::{
@@ -73,15 +74,15 @@ fn balanced<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh
                 let (imbalance, inclusion) = (run.totals.energy_imbalance, outcome.inclusion_residual);
                 assert!(imbalance <= 1e-10, "{name}: energy imbalance {imbalance:e}\n{text}");
                 assert!(inclusion <= 1e-9, "{name}: inclusion residual {inclusion:e}\n{text}");
-                touched += usize::from(outcome.energy.work != 0.0);
+                touched += usize::from(outcome.energy[WORK] != 0.0);
                 open = open.max(outcome.points.open);
             }
             assert!(
                 touched > 10 && open > 0 && open < points,
                 "{name}: {touched} steps, {open} open\n{text}"
             );
-            let given = run.totals.energy.work;
-            assert!(given != 0.0 && run.totals.energy.elastic > 0.0, "{name} does no work\n{text}");
+            let given = run.totals.energy[WORK];
+            assert!(given != 0.0 && run.totals.energy[ELASTIC] > 0.0, "{name} does no work\n{text}");
         }
     }
 }
@@ -224,7 +225,7 @@ fn mixed_laws<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMe
     let [corner] = session.sum([corner as f64]);
     assert!(corner > 0.0, "both laws act at once somewhere on the edge\n{text}");
     let totals = &run.totals;
-    [totals.energy.elastic, totals.energy.contact, totals.energy.viscous, totals.energy.work]
+    [totals.energy[ELASTIC], totals.energy[CONTACT], totals.energy[VISCOUS], totals.energy[WORK]]
 }
 
 /// An elastic bar of 1 m with a wave speed of 10 m/s hits a wall at a distance of 1 cm at 0.1 m/s: it is in contact from 0.1 s to

@@ -5,6 +5,7 @@ use crate::manufactured::{Case, Touch, job_of};
 use crate::run_on;
 use crate::scenes::simulation;
 use crate::schemes::observed;
+use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, VISCOPLASTIC};
 use clarke::{
     io::output::history::Totals,
     mesh::{
@@ -31,43 +32,43 @@ pub const EFFECTS: [Acting; 7] = [
         name: "linear flow",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5 }",
         contact: "",
-        sign: |totals| totals.energy.viscoplastic,
+        sign: |totals| totals.energy[VISCOPLASTIC],
     },
     Acting {
         name: "flow by a power, with hardening",
         material: "viscoplasticity.perzyna = { relaxation = 2.0, yield_stress = 0.5, exponent = 2.0, hardening_modulus = 1.5 }",
         contact: "",
-        sign: |totals| totals.energy.viscoplastic,
+        sign: |totals| totals.energy[VISCOPLASTIC],
     },
     Acting {
         name: "flow on a cone",
         material: "viscoplasticity.drucker_prager = { relaxation = 2.0, friction_coefficient = 0.3, cohesion = 0.4 }",
         contact: "",
-        sign: |totals| totals.energy.viscoplastic,
+        sign: |totals| totals.energy[VISCOPLASTIC],
     },
     Acting {
         name: "creep that hardens",
         material: "viscoplasticity.norton = { rate = 0.02, reference_stress = 1.0, exponent = 3.0, hardening_strain = 0.1 }",
         contact: "",
-        sign: |totals| totals.energy.viscoplastic,
+        sign: |totals| totals.energy[VISCOPLASTIC],
     },
     Acting {
         name: "damage",
         material: "damage = { threshold = 0.1, viscosity = 5.0 }",
         contact: "",
-        sign: |totals| totals.energy.damage,
+        sign: |totals| totals.energy[DAMAGE],
     },
     Acting {
         name: "adhesion",
         material: "",
         contact: "[contact.adhesion]\nstiffness = 3.0\nenergy = 0.1\nviscosity = 2.0\n",
-        sign: |totals| totals.energy.debonding,
+        sign: |totals| totals.energy[DEBONDING],
     },
     Acting {
         name: "memory",
         material: "",
         contact: "[contact.memory]\nstiffness_rate = 4.0\ndecay_time = 0.5\n",
-        sign: |totals| totals.energy.contact.abs(),
+        sign: |totals| totals.energy[CONTACT].abs(),
     },
 ];
 

@@ -3,6 +3,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, simulation};
 use crate::unloading::tangent;
+use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, VISCOPLASTIC};
 use clarke::{io::output::history::Totals, parallel::session::Session, run::Simulation};
 
 /// A softening effect: its tables, a test that it was active, and whether nonsymmetric derivatives must have occurred.
@@ -22,35 +23,35 @@ const ALL: [Softening; 5] = [
         name: "damage",
         material: "damage = { threshold = 0.05, viscosity = 2, exponent = 2, largest = 0.7 }\n",
         contact: "",
-        sign: |totals| totals.energy.damage,
+        sign: |totals| totals.energy[DAMAGE],
         skew: false,
     },
     Softening {
         name: "damage of what flows",
         material: FLOW,
         contact: "",
-        sign: |totals| totals.energy.damage.min(totals.energy.viscoplastic),
+        sign: |totals| totals.energy[DAMAGE].min(totals.energy[VISCOPLASTIC]),
         skew: true,
     },
     Softening {
         name: "bonds",
         material: "",
         contact: "[contact.adhesion]\nstiffness = 2000\ntangential_stiffness = 900\nenergy = 0.05\nviscosity = 0.02\n",
-        sign: |totals| totals.energy.debonding,
+        sign: |totals| totals.energy[DEBONDING],
         skew: false,
     },
     Softening {
         name: "short bonds that give way at once",
         material: "",
         contact: "[contact.adhesion]\nstiffness = 2000\ntangential_stiffness = 900\nenergy = 0.01\nlength = 0.004\n",
-        sign: |totals| totals.energy.debonding,
+        sign: |totals| totals.energy[DEBONDING],
         skew: true,
     },
     Softening {
         name: "memory",
         material: "",
         contact: "[contact.memory]\nstiffness_rate = 20000\ndecay_time = 0.2\n",
-        sign: |totals| totals.energy.contact.abs(),
+        sign: |totals| totals.energy[CONTACT].abs(),
         skew: false,
     },
 ];

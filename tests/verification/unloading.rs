@@ -2,6 +2,7 @@
 
 use crate::run_on;
 use crate::scenes::{any_mesh, crossed, noise, set_nodal, simulation, sum};
+use clarke::fem::effect::VISCOPLASTIC;
 use clarke::{
     fem::effect::Tangents,
     job::Job,
@@ -31,7 +32,7 @@ fn permanent_set(session: &Session, steps: u64) {
     let mut before = histories(&run);
     while run.advance(session).expect("step").is_some() {
         let now = histories(&run);
-        let dissipated = run.totals.energy.viscoplastic;
+        let dissipated = run.totals.energy[VISCOPLASTIC];
         assert!(run.totals.max_energy_imbalance < 1e-12, "{}", run.totals.max_energy_imbalance);
         if run.state.time * 30.0 < 20.0 {
             assert_eq!((&now, dissipated), (&before, 0.0), "elastic up to the yield stress");
@@ -67,8 +68,8 @@ fn to_and_fro(session: &Session, law: &str) {
     let (mut limited, mut dissipated) = (0, 0.0);
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{job}")).is_some() {
         assert!(run.totals.max_energy_imbalance < 1e-9, "{law}: {}", run.totals.max_energy_imbalance);
-        assert!(run.totals.energy.viscoplastic >= dissipated, "{law}: negative dissipation");
-        dissipated = run.totals.energy.viscoplastic;
+        assert!(run.totals.energy[VISCOPLASTIC] >= dissipated, "{law}: negative dissipation");
+        dissipated = run.totals.energy[VISCOPLASTIC];
         limited += usize::from(tangent(session, &mut run, law));
     }
     assert!(dissipated > 0.1 && limited > 2, "{law}: {dissipated} J, {limited} steps with limited flow");

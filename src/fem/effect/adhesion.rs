@@ -1,12 +1,17 @@
 use super::{
-    Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, Tangents,
-    evolution::Evolution, node_history::NodeHistory,
+    Curvature, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Role, Step, StressError,
+    SurfaceEffect, Tangents, evolution::Evolution, node_history::NodeHistory,
 };
 use crate::{
     fem::space::{Nodal, SurfacePoint},
     laws::contact,
     linear_algebra::tensor::{add_scaled, dot},
 };
+
+/// Stored in stretched adhesive bonds.
+pub const STORED_IN_BONDS: EnergyKind = EnergyKind::new(9, Role::Stored, "adhesion_energy");
+/// Dissipated by bonds that break.
+pub const DEBONDING: EnergyKind = EnergyKind::new(10, Role::Dissipated, "adhesion_dissipation");
 
 /// Adhesion on contact boundaries, with one bonding `b` for each node.
 ///
@@ -104,7 +109,7 @@ impl<const D: usize> Adhesion<D> {
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
             let [drive, threshold, viscosity] = self.drive(group, displacement);
             [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
-            energy.debonding += (before * before - *after * *after) * self.potential(group, displacement);
+            energy[DEBONDING] += (before * before - *after * *after) * self.potential(group, displacement);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(displacement), &point.normal);
                 point.add(point.weight * *after * *after, &traction, forces);
@@ -202,12 +207,12 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
                 let displacement = point.value(nodal.displacement);
                 let share = point.weight * bonding * bonding;
                 let potential = law.potential(&displacement, normal);
-                energy.stored_in_bonds += share * potential;
+                energy[STORED_IN_BONDS] += share * potential;
                 if at == Evaluation::Converged {
                     let change = point.value(nodal.velocity).map(|v| step.length * v);
                     let before = std::array::from_fn(|i| displacement[i] - change[i]);
                     let gain = potential - law.potential(&before, normal);
-                    energy.numerical += share * (gain + dot(&law.traction(&before, normal), &change));
+                    energy[NUMERICAL] += share * (gain + dot(&law.traction(&before, normal), &change));
                 }
             }
         }
@@ -221,11 +226,11 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
             let (before, after) = (before * before, after * after);
             let ends = [nodal.previous_displacement, nodal.displacement];
             let potentials = ends.map(|displacement| self.potential(group, displacement));
-            energy.debonding += (before - after) * 0.5 * (potentials[0] + potentials[1]);
-            energy.numerical += 0.5 * (before + after) * (potentials[1] - potentials[0]);
+            energy[DEBONDING] += (before - after) * 0.5 * (potentials[0] + potentials[1]);
+            energy[NUMERICAL] += 0.5 * (before + after) * (potentials[1] - potentials[0]);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(nodal.displacement), &point.normal);
-                energy.numerical +=
+                energy[NUMERICAL] +=
                     step.length * point.weight * after * dot(&traction, &point.value(nodal.velocity));
             }
         }

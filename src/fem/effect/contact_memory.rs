@@ -1,6 +1,6 @@
 use super::{
-    Blend, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect, Tangents,
-    node_history::NodeHistory,
+    Blend, CONTACT, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect,
+    Tangents, node_history::NodeHistory,
 };
 use crate::{
     error::{Error, Result},
@@ -115,7 +115,7 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
 
     fn add_energy(&self, _: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy) {
         for ((_, point), pressure) in self.points.iter().zip(&self.pressure.converged) {
-            energy.contact += point.weight * pressure * step.length * point.along(nodal.velocity);
+            energy[CONTACT] += point.weight * pressure * step.length * point.along(nodal.velocity);
         }
     }
 

@@ -1,6 +1,6 @@
 use super::{
-    Curvature, Effect, Energy, Evaluation, HistoryStore, Outcome, Phases, Step, StressError,
-    cell_history::CellHistory, evolution::Evolution,
+    Curvature, Effect, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Phases, Role, Step,
+    StressError, cell_history::CellHistory, evolution::Evolution,
 };
 use crate::{
     fem::space::{Batch, CellRun, Needs},
@@ -10,6 +10,9 @@ use crate::{
         tensor::{Mandel, add_scaled},
     },
 };
+
+/// Dissipated by damage.
+pub const DAMAGE: EnergyKind = EnergyKind::new(8, Role::Dissipated, "damage_dissipation");
 
 /// Isotropic damage `d`, one number for each cell whose material has the law: the elastic and viscoplastic stress is multiplied by
 /// `1 - d`, viscous stress is not.
@@ -46,7 +49,7 @@ impl Damage {
         for lane in 0..batch.count {
             let release_rate = law.release_rate(&batch.elastic_stress.lane(lane));
             after[lane] = law.advance(before[lane], release_rate, step.length);
-            energy.damage += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
+            energy[DAMAGE] += batch.cells.volume[lane] * release_rate * (after[lane] - before[lane]);
         }
         batch.integrity.weaken(left(after));
     }
@@ -164,8 +167,8 @@ impl<const D: usize, const S: usize> Effect<D, S> for Damage {
             let stresses = [&batch.elastic_stress_before, &batch.elastic_stress];
             let [first, last] = stresses.map(|stress| law.release_rate(&stress.lane(lane)));
             let growth = batch.cells.volume[lane] * (after[lane] - before[lane]);
-            energy.damage += 0.5 * growth * (first + last);
-            energy.numerical += 0.5 * growth * (last - first);
+            energy[DAMAGE] += 0.5 * growth * (first + last);
+            energy[NUMERICAL] += 0.5 * growth * (last - first);
         }
     }
 

@@ -1,5 +1,6 @@
 use super::{
-    Curvature, Effect, ElasticLaw, Energy, Evaluation, Outcome, Phases, Step, StressError, Term, isotropic,
+    Curvature, Effect, ElasticLaw, Energy, EnergyKind, Evaluation, NUMERICAL, Outcome, Phases, Role, Step,
+    StressError, Term, isotropic,
 };
 use crate::{
     fem::space::{Batch, Integrity, Needs},
@@ -9,6 +10,9 @@ use crate::{
         tensor::{add_scaled, dot},
     },
 };
+
+/// Elastic energy.
+pub const ELASTIC: EnergyKind = EnergyKind::new(1, Role::Stored, "elastic_energy");
 
 /// Elastic stress `E e(u)`: of the converged displacement, `E e(u_{n-1})` in (24), or of that at the end of the step, `u_n = u~ + k' v_n`,
 /// where `E e(u~)` is known at the start of the step and `k' E` is part of the matrix.
@@ -62,10 +66,10 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
         let Some(law) = self.law.get(batch.material) else { return };
         let square = |strains| isotropic::square(&law.tensor, batch.cells, &batch.integrity, strains);
         if !law.with_history {
-            energy.elastic += 0.5 * square(&batch.strain);
+            energy[ELASTIC] += 0.5 * square(&batch.strain);
         }
         if at == Evaluation::Converged {
-            energy.numerical += 0.5 * step.length * step.length * square(&batch.strain_rate);
+            energy[NUMERICAL] += 0.5 * step.length * step.length * square(&batch.strain_rate);
         }
     }
 
@@ -78,7 +82,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Elasticity {
             let beside = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
             let jump = 0.5 * dot(&change, &law.tensor.apply(&change));
             let work = dot(&law.tensor.apply(&strain), &beside);
-            energy.numerical += share[lane] * batch.cells.volume[lane] * (work - jump);
+            energy[NUMERICAL] += share[lane] * batch.cells.volume[lane] * (work - jump);
         }
     }
 

@@ -1,8 +1,11 @@
-use super::{Effect, Energy, Evaluation, Outcome, Phases, Step, Term, mass};
+use super::{Effect, Energy, EnergyKind, Evaluation, NUMERICAL, Outcome, Phases, Role, Step, Term, mass};
 use crate::{
     fem::space::{Batch, Needs},
     laws::material::ByMaterial,
 };
+
+/// Kinetic energy.
+pub const KINETIC: EnergyKind = EnergyKind::new(0, Role::Stored, "kinetic_energy");
 
 /// Inertia with consistent mass: `(1/k) M (v_n - v_{n-1})` in (25).
 #[derive(Debug)]
@@ -36,7 +39,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
 
     fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(&density) = self.density.get(batch.material) else { return };
-        energy.kinetic += 0.5 * mass::square(density, batch.cells, &batch.velocity);
-        energy.numerical -= 0.5 * mass::square(density, batch.cells, &batch.velocity_change);
+        energy[KINETIC] += 0.5 * mass::square(density, batch.cells, &batch.velocity);
+        energy[NUMERICAL] -= 0.5 * mass::square(density, batch.cells, &batch.velocity_change);
     }
 }

@@ -1,5 +1,6 @@
 //! Tractions and body forces.
 
+use super::{EnergyKind, Role};
 use crate::{
     error::{Error, Result},
     fem::space::{Geometry, cell_rule, facet_rule},
@@ -7,6 +8,9 @@ use crate::{
     linear_algebra::tensor::{Vector, norm},
     mesh::{Mesh, shape::facet_normal},
 };
+
+/// Work of loads and of obstacles that move.
+pub const WORK: EnergyKind = EnergyKind::new(5, Role::Work, "external_work");
 
 /// A force per area on facets of this rank.
 #[derive(Debug)]

@@ -1,6 +1,9 @@
-//! Effects: the physical terms that act on a body. A run holds only the effects its job calls for; one file an effect.
+//! Effects: the physical terms that act on a body. A run contains only the effects that its job requests.
 //!
-//! An effect is called only in the phases that it names in [`Effect::phases`].
+//! Each effect is one file with its declaration of energies. This file is the list of all: modules, energies and construction from
+//! the tables of a job.
+//!
+//! An effect is called only in the phases that it declares in [`Effect::phases`].
 
 mod adhesion;
 mod cell_history;
@@ -28,19 +31,28 @@ mod term;
 mod viscoplastic_flow;
 mod viscous_stress;
 
-pub use adhesion::{Adhesion, Bonded};
+use crate::{
+    error::{Error, Result},
+    fem::space::{CellRun, facets, surface_points},
+    job::{self, Material},
+    laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
+    mesh::Mesh,
+    parallel::session::Session,
+};
+
+pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    COUNTS, Contact, ContactConditions, ContactNode, PointCount, Quadrature, ReferenceValues,
-    choose_unknowns, contact_nodes,
+    CONTACT, COUNTS, Contact, ContactConditions, ContactNode, PointCount, Quadrature, ReferenceValues,
+    STORED_IN_CONTACT, choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
-pub use damage::Damage;
-pub use elasticity::Elasticity;
-pub use energy::{Energy, Role};
+pub use damage::{DAMAGE, Damage};
+pub use elasticity::{ELASTIC, Elasticity};
+pub use energy::{Energy, EnergyKind, NUMERICAL, Role};
 pub use history::{History, HistoryStore};
-pub use inertia::Inertia;
+pub use inertia::{Inertia, KINETIC};
 pub use interior::{Effect, Phases};
-pub use load::{Load, Traction};
+pub use load::{Load, Traction, WORK};
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use step::{Blend, Evaluation, Step};
@@ -49,5 +61,91 @@ pub use support::fixed_components;
 pub use surface::SurfaceEffect;
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
-pub use viscoplastic_flow::ViscoplasticFlow;
-pub use viscous_stress::ViscousStress;
+pub use viscoplastic_flow::{VISCOPLASTIC, ViscoplasticFlow};
+pub use viscous_stress::{VISCOUS, ViscousStress};
+
+/// All energies in the order of the columns of `history.csv`. New ones are added at the end.
+pub const ENERGIES: &[EnergyKind] = &[
+    KINETIC,
+    ELASTIC,
+    VISCOUS,
+    VISCOPLASTIC,
+    CONTACT,
+    WORK,
+    NUMERICAL,
+    STORED_IN_CONTACT,
+    DAMAGE,
+    STORED_IN_BONDS,
+    DEBONDING,
+];
+
+const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");
+
+/// The effects in the interior of bodies of these materials, on runs of cells of one material. A table that is absent creates none.
+pub fn effects<const D: usize, const S: usize>(
+    materials: &[&Material],
+    runs: &[CellRun],
+) -> Result<Vec<Box<dyn Effect<D, S>>>> {
+    let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
+    if let Some(density) = by_material(materials, |m| m.density) {
+        effects.push(Box::new(Inertia { density }));
+    }
+    if let Some(law) = by_material(materials, elastic_law::<S>) {
+        effects.push(Box::new(Elasticity { law }));
+    }
+    if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
+        effects.push(Box::new(ViscousStress { tensor }));
+    }
+    let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
+    if let Some(laws) = ByMaterial::new(flow) {
+        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, runs)));
+    }
+    let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
+    if let Some(laws) = by_material(materials, damage) {
+        effects.push(Box::new(Damage::new(laws, runs)));
+    }
+    Ok(effects)
+}
+
+/// The effects at nodes of contact boundaries in addition to contact. Collective.
+pub fn surface_effects<const D: usize>(
+    session: &Session,
+    contacts: &[job::Contact],
+    mesh: &Mesh<D>,
+) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
+    let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
+    let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
+    for contact in contacts {
+        let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
+        if let Some(law) = contact.memory {
+            foundations.push((law, points()?));
+        }
+        if let Some(law) = contact.adhesion {
+            bonded.push(Bonded { law, points: points()? });
+        }
+    }
+    if !bonded.is_empty() {
+        effects.push(Box::new(Adhesion::new(bonded, mesh.owned)));
+    }
+    if !foundations.is_empty() {
+        effects.push(Box::new(session.agree(ContactMemory::new(foundations, mesh))?));
+    }
+    Ok(effects)
+}
+
+fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
+    ByMaterial::new(materials.iter().map(|m| law(m)).collect())
+}
+
+fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
+    let tensor = material.elasticity?.tensor(Hypothesis::of(S));
+    Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
+}
+
+fn flow_law<const S: usize>(material: &Material) -> Result<Option<FlowLaw>> {
+    let Some(law) = &material.viscoplasticity else { return Ok(None) };
+    let Some(elasticity) = &material.elasticity else {
+        return Err(Error::Refused(Viscoplasticity::WITHOUT_ELASTICITY.into()));
+    };
+    Ok(Some(law.prepare(elasticity, Hypothesis::of(S))))
+}

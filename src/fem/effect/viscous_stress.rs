@@ -1,8 +1,11 @@
-use super::{Effect, Energy, Evaluation, Phases, Step, Term, isotropic};
+use super::{Effect, Energy, EnergyKind, Evaluation, Phases, Role, Step, Term, isotropic};
 use crate::{
     fem::space::{Batch, Integrity, Needs},
     laws::material::{ByMaterial, Isotropic},
 };
+
+/// Dissipated by viscosity.
+pub const VISCOUS: EnergyKind = EnergyKind::new(2, Role::Dissipated, "viscous_dissipation");
 
 /// Viscous stress `A e(v_n)` in (25), implicit.
 #[derive(Debug)]
@@ -34,6 +37,6 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscousStress {
     fn add_energy(&self, _: Evaluation, step: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(tensor) = self.tensor.get(batch.material) else { return };
         let whole = Integrity::default();
-        energy.viscous += step.length * isotropic::square(tensor, batch.cells, &whole, &batch.strain_rate);
+        energy[VISCOUS] += step.length * isotropic::square(tensor, batch.cells, &whole, &batch.strain_rate);
     }
 }

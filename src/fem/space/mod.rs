@@ -14,4 +14,4 @@ pub use batch::{Batch, Integrity, Needs, Nodal};
 pub use geometry::{CellRun, Geometry, Simplex, SimplexPack};
 pub use kernels::Corners;
 pub use quadrature::{CellRule, FacetRule, cell_rule, facet_rule};
-pub use surface::{SurfacePoint, surface_points};
+pub use surface::{SurfacePoint, facets, surface_points};

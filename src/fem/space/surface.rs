@@ -7,6 +7,15 @@ use crate::{
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
 
+/// The facets of this rank on boundaries with these names, each once.
+pub fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
+    let mut all: Vec<u32> =
+        names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// A node of a boundary with the normal and the measure of the boundary that it stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint<const D: usize> {

@@ -3,7 +3,7 @@
 use super::csv::{CsvFile, Number, Numbers};
 use crate::{
     error::Result,
-    fem::effect::{Energy, Peaks, Role},
+    fem::effect::{CONTACT, ENERGIES, Energy, EnergyKind, NUMERICAL, Peaks, Role},
     linear_algebra::tensor::larger,
     solver::stepping::{StepLevel, StepOutcome},
 };
@@ -17,12 +17,64 @@ const STEP_COLUMNS: &str =
 const BEFORE_IMBALANCE: usize = 6;
 
 /// Energies in the order of the file.
-fn in_columns<T: Copy>(energies: [T; Energy::COUNT], imbalance: T) -> [T; Energy::COUNT + 1] {
+fn in_columns<T>(energy: impl Fn(EnergyKind) -> T, imbalance: impl Fn() -> T) -> [T; ENERGIES.len() + 1] {
     std::array::from_fn(|at| match at.cmp(&BEFORE_IMBALANCE) {
-        Ordering::Less => energies[at],
-        Ordering::Equal => imbalance,
-        Ordering::Greater => energies[at - 1],
+        Ordering::Less => energy(ENERGIES[at]),
+        Ordering::Equal => imbalance(),
+        Ordering::Greater => energy(ENERGIES[at - 1]),
     })
+}
+
+/// Energies in checkpoints, by their columns; absent ones are zero.
+mod by_column {
+    use super::{ENERGIES, Energy};
+    use serde::{
+        Deserializer, Serializer,
+        de::{IgnoredAny, MapAccess, Visitor},
+        ser::SerializeStruct,
+    };
+    use std::fmt;
+
+    const COLUMNS: [&str; ENERGIES.len()] = {
+        let mut columns = [""; ENERGIES.len()];
+        let mut at = 0;
+        while at < columns.len() {
+            columns[at] = ENERGIES[at].column;
+            at += 1;
+        }
+        columns
+    };
+
+    pub(super) fn serialize<S: Serializer>(energy: &Energy, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_struct("Energy", COLUMNS.len())?;
+        ENERGIES.iter().try_for_each(|kind| map.serialize_field(kind.column, &energy[*kind]))?;
+        map.end()
+    }
+
+    pub(super) fn deserialize<'de, T: Deserializer<'de>>(deserializer: T) -> Result<Energy, T::Error> {
+        deserializer.deserialize_struct("Energy", &COLUMNS, Columns)
+    }
+
+    struct Columns;
+
+    impl<'de> Visitor<'de> for Columns {
+        type Value = Energy;
+
+        fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+            out.write_str("energies")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Energy, A::Error> {
+            let mut energy = Energy::default();
+            while let Some(column) = map.next_key::<String>()? {
+                match ENERGIES.iter().find(|kind| kind.column == column) {
+                    Some(kind) => energy[*kind] = map.next_value()?,
+                    None => drop(map.next_value::<IgnoredAny>()?),
+                }
+            }
+            Ok(energy)
+        }
+    }
 }
 
 /// Sums and maxima over the steps of a run; saved in checkpoints.
@@ -32,7 +84,7 @@ fn in_columns<T: Copy>(energies: [T; Energy::COUNT], imbalance: T) -> [T; Energy
 #[serde(default, deny_unknown_fields)]
 pub struct Totals {
     /// The stored energies, and the sums of the others since time 0; for the terms of the scheme, minus their sum.
-    #[serde(flatten)]
+    #[serde(flatten, with = "by_column")]
     pub energy: Energy,
     /// Initial energy plus the absolute values of the supplied energies: work of loads and of obstacles, and energy returned by
     /// foundations with memory.
@@ -69,20 +121,20 @@ pub struct Totals {
 impl Totals {
     /// The totals at time 0, with the energy of the initial state.
     pub fn at_start(energy: Energy) -> Self {
-        let mut stored = energy.to_array();
-        for (energy, role) in stored.iter_mut().zip(Energy::ROLES) {
-            *energy = if role == Role::Stored { *energy } else { 0.0 };
+        let (mut stored, mut turnover) = (Energy::default(), 0.0);
+        for &kind in ENERGIES.iter().filter(|kind| kind.role == Role::Stored) {
+            stored[kind] = energy[kind];
+            turnover += energy[kind];
         }
-        let turnover = stored.iter().sum();
-        Self { energy: Energy::from_array(stored), supplied: turnover, turnover, ..Self::default() }
+        Self { energy: stored, supplied: turnover, turnover, ..Self::default() }
     }
 
     /// Adds a step.
     pub fn add(&mut self, outcome: &StepOutcome) {
         let energy = &outcome.energy;
         let mut sides = [0.0; 4];
-        let mut totals = self.energy.to_array();
-        for ((total, now), role) in totals.iter_mut().zip(energy.to_array()).zip(Energy::ROLES) {
+        for &kind in ENERGIES {
+            let (role, now, total) = (kind.role, energy[kind], &mut self.energy[kind]);
             let side = &mut sides[role as usize];
             *side += now;
             match role {
@@ -97,10 +149,9 @@ impl Totals {
                 self.turnover = larger(self.turnover, total.abs());
             }
         }
-        self.energy = Energy::from_array(totals);
         let [stored, dissipated, work, numerical] = sides;
         let open = stored + dissipated - work - numerical;
-        self.supplied += work.abs() + larger(-energy.contact, 0.0);
+        self.supplied += work.abs() + larger(-energy[CONTACT], 0.0);
         self.energy_imbalance = if self.turnover == 0.0 { 0.0 } else { open.abs() / self.turnover };
         self.max_energy_imbalance = larger(self.max_energy_imbalance, self.energy_imbalance);
         self.max_inclusion_residual = larger(self.max_inclusion_residual, outcome.inclusion_residual);
@@ -129,7 +180,7 @@ impl Totals {
 
     /// Energy generated by the scheme, relative to the supplied energy; 0 if the scheme dissipates energy.
     pub fn energy_of_scheme(&self) -> f64 {
-        let made = larger(-self.energy.numerical, 0.0);
+        let made = larger(-self.energy[NUMERICAL], 0.0);
         if made == 0.0 { 0.0 } else { made / self.supplied }
     }
 }
@@ -142,7 +193,7 @@ impl History {
     /// Creates the file, or continues it after this step.
     pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
         let path = folder.join("history.csv");
-        let energies = in_columns(Energy::COLUMNS, "energy_imbalance").join(",");
+        let energies = in_columns(|kind| kind.column, || "energy_imbalance").join(",");
         let header = format!("{STEP_COLUMNS},{energies}");
         Ok(Self(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?))
     }
@@ -164,7 +215,7 @@ impl History {
             outcome.linear_iterations,
             outcome.active_changes,
             Number(outcome.inclusion_residual),
-            Numbers(&in_columns(totals.energy.to_array(), totals.energy_imbalance))
+            Numbers(&in_columns(|kind| totals.energy[kind], || totals.energy_imbalance))
         ))
     }
 
@@ -177,29 +228,25 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::effect::{ELASTIC, KINETIC, VISCOUS, WORK};
 
     #[test]
     fn a_balanced_step_has_no_imbalance_and_a_wrong_sign_shows() {
-        let energy = Energy {
-            kinetic: 1.0,
-            elastic: 2.0,
-            viscous: 3.0,
-            work: 6.5,
-            numerical: -0.5,
-            ..Energy::default()
-        };
+        let balanced = [(KINETIC, 1.0), (ELASTIC, 2.0), (VISCOUS, 3.0), (WORK, 6.5), (NUMERICAL, -0.5)];
+        let mut energy = Energy::from(balanced);
         let mut totals = Totals::default();
         totals.add(&StepOutcome { energy, ..StepOutcome::default() });
         assert_eq!(totals.energy_imbalance, 0.0);
         let mut wrong = Totals::default();
-        wrong.add(&StepOutcome { energy: Energy { work: -6.5, ..energy }, ..StepOutcome::default() });
+        energy[WORK] = -6.5;
+        wrong.add(&StepOutcome { energy, ..StepOutcome::default() });
         assert_eq!(wrong.energy_imbalance, 2.0);
     }
 
     #[test]
     fn imbalances_are_relative_to_the_most_energy_turned_over_so_far() {
         let step = |kinetic, work| StepOutcome {
-            energy: Energy { kinetic, work, ..Energy::default() },
+            energy: Energy::from([(KINETIC, kinetic), (WORK, work)]),
             ..StepOutcome::default()
         };
         let mut totals = Totals::default();
@@ -210,11 +257,12 @@ mod tests {
 
     #[test]
     fn totals_are_kept_by_column_and_those_of_older_checkpoints_are_read() {
-        let energy = Energy::from_array(std::array::from_fn(|at| 0.5 + at as f64));
+        let mut energy = Energy::default();
+        (0..).zip(ENERGIES).for_each(|(at, &kind)| energy[kind] = 0.5 + f64::from(at));
         let totals = Totals { energy, turnover: 20.0, newton_iterations: 3, ..Totals::default() };
         let mut kept = serde_json::to_value(totals).expect("an object");
-        for (column, value) in Energy::COLUMNS.into_iter().zip(energy.to_array()) {
-            assert_eq!(kept[column], value, "{column}");
+        for &kind in ENERGIES {
+            assert_eq!(kept[kind.column], energy[kind], "{kind:?}");
         }
         assert_eq!(serde_json::from_value::<Totals>(kept.clone()).ok(), Some(totals));
         kept["heat"] = 1.0.into();
@@ -225,24 +273,21 @@ mod tests {
             "turnover": 9.0, "newton_iterations": 10, "pace": null }"#;
         let read: Totals = serde_json::from_str(older).expect("totals without damage and adhesion");
         let expected = [1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 3.0, 0.0, 0.0, 0.0];
-        assert_eq!(read.energy.to_array()[..expected.len()], expected);
+        assert!(ENERGIES.iter().map(|&kind| read.energy[kind]).eq(expected), "{read:?}");
         assert_eq!((read.turnover, read.newton_iterations), (9.0, 10));
     }
 
     #[test]
     fn what_is_not_finite_in_one_step_shows_ever_after() {
-        let good = StepOutcome {
-            energy: Energy { kinetic: 1.0, work: 1.0, ..Energy::default() },
-            ..StepOutcome::default()
-        };
-        let mut energy = good.energy.to_array();
-        for (at, bad) in (0..energy.len()).flat_map(|at| [(at, f64::NAN), (at, f64::INFINITY)]) {
-            energy = good.energy.to_array();
-            energy[at] = bad;
+        let good =
+            StepOutcome { energy: Energy::from([(KINETIC, 1.0), (WORK, 1.0)]), ..StepOutcome::default() };
+        for (&kind, bad) in ENERGIES.iter().flat_map(|kind| [(kind, f64::NAN), (kind, f64::INFINITY)]) {
+            let mut energy = good.energy;
+            energy[kind] = bad;
             let mut totals = Totals::default();
             totals.add(&good);
             assert!(totals.are_finite());
-            totals.add(&StepOutcome { energy: Energy::from_array(energy), ..good });
+            totals.add(&StepOutcome { energy, ..good });
             assert!(!totals.are_finite() && !totals.max_energy_imbalance.is_finite(), "{energy:?}");
             totals.add(&good);
             assert!(!totals.are_finite(), "{energy:?}");

@@ -5,16 +5,17 @@
 //! `validate` checks before these structs are filled.
 
 mod boundary;
-mod contact;
 mod material;
 mod mesh;
 mod output;
 mod time;
 
-pub use crate::laws::contact::Quadrature;
+pub use crate::laws::{
+    contact::{Contact, Quadrature},
+    material::Material,
+};
 pub use boundary::{Axis, BodyForce, Fix, FixedDirections, Initial, Support, Traction};
-pub use contact::Contact;
-pub use material::{Material, Region};
+pub use material::Region;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
 pub use time::{

@@ -2,7 +2,7 @@
 
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
-use crate::laws::material::{Damage, Elasticity, Hypothesis, Viscoplasticity, Viscosity};
+use crate::laws::material::{Elasticity, Hypothesis, Material, Viscoplasticity, Viscosity};
 
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.45;
@@ -23,9 +23,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             let message = format!("[{path}] has no density, no elasticity and no viscosity");
             findings.fault(&path, message, format!("add density, [{path}.elasticity] or [{path}.viscosity]"));
         }
-        for (key, message) in
-            [("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY), ("damage", Damage::WITHOUT_ELASTICITY)]
-        {
+        for (key, message) in Material::REQUIRING_ELASTICITY {
             if present(key) && !present("elasticity") {
                 findings.fault(&format!("{path}.{key}"), message, format!("add [{path}.elasticity]"));
             }

@@ -1,7 +1,8 @@
 //! Contact laws: pure functions at a point of the contact boundary, with their keys in the job file.
 //!
 //! Each normal or friction law has a file in this folder and an entry in one of the lists in `laws.rs`. The file defines its
-//! parameters, as in the job file, its formula and derivative, and the combinations that are refused.
+//! parameters, as in the job file, its formula and derivative, and the combinations that are refused. This file also has the keys of
+//! the table `[[contact]]`.
 
 mod adhesion;
 mod compliance;
@@ -22,6 +23,9 @@ mod table;
 mod tresca;
 mod unilateral;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 pub use adhesion::Adhesion;
 pub use compliance::Compliance;
 pub use coulomb::Coulomb;
@@ -40,3 +44,37 @@ pub use slip_weakening::SlipWeakening;
 pub use table::{ContactTable, Quadrature};
 pub use tresca::Tresca;
 pub use unilateral::{Bound, Unilateral};
+
+/// Boundaries that may touch an obstacle, and their contact laws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// The names of the boundaries.
+    #[schemars(length(min = 1), example = ["bottom"])]
+    pub on: Vec<String>,
+    /// The points of a facet at which the contact laws are evaluated.
+    #[serde(default)]
+    pub quadrature: Quadrature,
+    /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
+    pub normal: NormalLaw,
+    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance` and `unilateral`; other normal
+    /// laws have no distance to an obstacle. Absent: `gap` applies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Gap>,
+    /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<FrictionLaw>,
+    /// Adhesion to an obstacle at rest: bonds that form at displacement zero, resist opening and sliding, and break. The bonding b
+    /// at a node, 1 for intact and 0 for broken bonds, starts at 1 and decreases as `viscosity b' = -max(b (stiffness R(opening)^2
+    /// + tangential_stiffness R(sliding)^2) - energy, 0)`, where R(s) = min(s, length). Broken bonds are not restored. The traction
+    /// is `b^2 stiffness R(opening)` along the normal and `b^2 tangential_stiffness R(sliding)` against the sliding. The output
+    /// `contact_pressure` is the pressure of the normal law without the traction of adhesion. Absent: no adhesion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adhesion: Option<Adhesion>,
+    /// Memory of the foundation: a pressure that depends on the history of the normal displacement and is added to the pressure of
+    /// the normal law, `integral from 0 to t of stiffness_rate exp(-(t - s) / decay_time) max(normal displacement(s), 0) ds`. Field
+    /// files contain it as `memory_pressure`; the output `contact_pressure` is the pressure of the normal law only. The work of
+    /// both pressures is part of `contact_dissipation`, which is negative while the foundation returns energy. Absent: no memory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
+}

@@ -1,7 +1,8 @@
 //! Material laws: pure functions at a point, with their keys in the job file.
 //!
 //! Each law has a file in this folder, with its parameters as in the job file, their units and ranges, its formula and source, and
-//! the combinations that are refused. Viscoplastic laws are listed in `viscoplasticity/law.rs`.
+//! the combinations that are refused. This file is the list of all: modules and the keys of the table `[material]`. Viscoplastic
+//! laws are listed in `viscoplasticity/law.rs`.
 
 mod by_material;
 mod damage;
@@ -10,9 +11,46 @@ mod isotropic;
 mod viscoplasticity;
 mod viscosity;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use isotropic::Isotropic;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
+
+/// A material. An effect is simulated only if its table or key is present.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// The hypothesis of a plane problem. Required in 2D, not allowed in 3D.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hypothesis: Option<Hypothesis>,
+    /// Mass density. Absent: no inertia, the problem is quasistatic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
+    pub density: Option<f64>,
+    /// Isotropic linear elasticity. Absent: no elastic stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elasticity: Option<Elasticity>,
+    /// Linear viscosity. Absent: no viscous stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscosity: Option<Viscosity>,
+    /// Viscoplastic flow, which relaxes the elastic stress; requires elasticity. Absent: no viscoplastic flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscoplasticity: Option<Viscoplasticity>,
+    /// Isotropic damage d of each cell, from 0 (sound) to `largest`; requires elasticity. Damage multiplies the elastic stress,
+    /// relaxed by viscoplastic flow, by 1 - d and leaves the viscous stress unchanged. It grows as `viscosity d' = (1 - d)^exponent
+    /// max(Y - threshold, 0)`, where `Y = s : E^-1 s / 2` is the elastic energy per volume at the stress s of undamaged material,
+    /// and never decreases. Absent: no damage.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Damage>,
+}
+
+impl Material {
+    /// The keys of laws that require elasticity, with the message where it is absent.
+    pub const REQUIRING_ELASTICITY: [(&str, &str); 2] =
+        [("viscoplasticity", Viscoplasticity::WITHOUT_ELASTICITY), ("damage", Damage::WITHOUT_ELASTICITY)];
+}

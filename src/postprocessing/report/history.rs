@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::{Energy, Role},
+    fem::effect::{ENERGIES, Role},
 };
 
 const TIME: Axis = Axis { quantity: "t", unit: "s" };
@@ -52,8 +52,7 @@ pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
 /// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
 pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     let columns = |roles: &[Role]| -> Vec<&str> {
-        let all = Energy::COLUMNS.into_iter().zip(Energy::ROLES);
-        all.filter(|(_, role)| roles.contains(role)).map(|(column, _)| column).collect()
+        ENERGIES.iter().filter(|kind| roles.contains(&kind.role)).map(|kind| kind.column).collect()
     };
     let spent = [columns(&[Role::Work]), columns(&[Role::Dissipated, Role::Numerical])].concat();
     let mut out = Vec::new();

@@ -236,17 +236,13 @@ impl Condensed {
         factored.as_ref().map_or(0, bytes)
     }
 
-    /// Solves a step from the velocity in `trial`, and writes the new one there. If it fails with a factor in single precision,
-    /// [`Condensed::restore_start`] resets `trial`. Collective.
+    /// Solves a step from the velocity in `trial` with a factor in double precision, and writes the new velocity there. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        if self.active_precision()? == Precision::Single {
-            return self.refine(problem, system, trial);
-        }
         let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
         elimination.forward(system.right_hand_side)?;
         nodes.restrict::<D>(system.converged, converged)?;
@@ -262,8 +258,9 @@ impl Condensed {
         Ok(outcome)
     }
 
-    /// The same with a factor in single precision, by corrections; fails if these do not converge. Collective.
-    fn refine<const D: usize, const S: usize>(
+    /// The same with a factor in single precision, by corrections. If these do not converge, it fails, and
+    /// [`Condensed::restore_start`] resets `trial`. Collective.
+    pub(super) fn refine<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,

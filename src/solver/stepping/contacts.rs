@@ -4,7 +4,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Energy, Step},
+        effect::{CONTACT, Energy, NUMERICAL, Step, WORK},
         state::State,
     },
 };
@@ -19,9 +19,9 @@ pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     let velocity = state.velocity.local()?;
     for contact in &body.contacts {
         let [dissipated, numerical, work] = contact.energy_of_step(&velocity, step.length);
-        energy.contact += dissipated;
-        energy.numerical += numerical;
-        energy.work += work;
+        energy[CONTACT] += dissipated;
+        energy[NUMERICAL] += numerical;
+        energy[WORK] += work;
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Energy, Evaluation, Peaks, Step},
+        effect::{Blend, Energy, Evaluation, NUMERICAL, Peaks, Step},
         state::State,
     },
     job::Scheme,
@@ -133,7 +133,7 @@ impl Integrator {
         };
         add_contact_energy(body, state, step, &mut energy)?;
         if let Self::Implicit(scheme) = self {
-            energy.numerical += scheme.momentum_term(body, state, step)?;
+            energy[NUMERICAL] += scheme.momentum_term(body, state, step)?;
         }
         Ok(over_ranks(session, energy, peaks))
     }

@@ -41,4 +41,4 @@ pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
 pub use step_length::{Landing, Landings, TIME_TOLERANCE, next_step};
-pub use stepper::Stepper;
+pub use stepper::{Stepper, StepperSettings};

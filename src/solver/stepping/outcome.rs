@@ -33,5 +33,5 @@ pub struct StepOutcome {
 /// Sums and largest values over all ranks. Collective.
 pub(super) fn over_ranks(session: &Session, energy: Energy, peaks: Peaks) -> (Energy, Peaks) {
     let [von_mises, strain] = session.largest([peaks.von_mises, peaks.strain]);
-    (Energy::from_array(session.sum(energy.to_array())), Peaks { von_mises, strain })
+    (energy.map_values(|values| session.sum(values)), Peaks { von_mises, strain })
 }

@@ -292,6 +292,7 @@ impl StepSolver {
         let mut tolerance = self.tolerance(problem, trial)?;
         let mut is_relaxed = false;
         loop {
+            let is_single = self.active_precision()? == Some(Precision::Single);
             let (_, matrix) =
                 self.step_matrix.as_ref().or(self.cached.as_ref()).ok_or_else(|| {
                     Error::Internal("a step was solved before its matrix was assembled".into())
@@ -301,13 +302,14 @@ impl StepSolver {
             let solved = match &mut self.solver {
                 Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
                 Solver::Newton(newton) => newton.solve(problem, system, trial),
+                Solver::Condensed(condensed) if is_single => condensed.refine(problem, system, trial),
                 Solver::Condensed(condensed) => condensed.solve(problem, system, trial),
             };
             let failure = match session.agree(solved) {
                 Err(failure) if failure.is_failure() => failure,
                 solved => return solved.map_err(|error| self.springs.explain(error)),
             };
-            if self.active_precision()? == Some(Precision::Single) {
+            if is_single {
                 session.agree(self.refactor_in_double(problem, trial))?;
                 continue;
             }

@@ -17,7 +17,7 @@ use crate::{
     error::Result,
     fem::{
         body::{Body, PassBytes},
-        effect::Step,
+        effect::{Step, WORK},
         state::State,
     },
     job::{Accept, Scheme},
@@ -25,6 +25,17 @@ use crate::{
     parallel::session::Session,
 };
 use std::time::Instant;
+
+/// The choices of a job that determine a [`Stepper`].
+#[derive(Debug, Clone, Copy)]
+pub struct StepperSettings<'a> {
+    /// The time scheme.
+    pub scheme: Scheme,
+    /// The solver of its steps.
+    pub solver: &'a SolverSettings,
+    /// Estimated number of steps that share a matrix.
+    pub steps: u64,
+}
 
 /// A time scheme with its solver and work vectors.
 pub struct Stepper {
@@ -56,15 +67,12 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Prepares the vectors and the solver for steps of which about `steps` share a matrix; the matrix is set by the first step.
-    /// Collective.
+    /// Prepares the vectors and the solver; the matrix is set by the first step. Collective.
     pub fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
-        scheme: Scheme,
-        settings: &SolverSettings,
-        steps: u64,
+        StepperSettings { scheme, solver: settings, steps }: StepperSettings<'_>,
     ) -> Result<Self> {
         Ok(Self {
             scheme,
@@ -275,7 +283,7 @@ impl Stepper {
         (outcome.energy, outcome.peaks) = self.integrator.energy(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         if let Some(load) = &self.load {
-            outcome.energy.work += step.length * load.dot(&state.velocity)?;
+            outcome.energy[WORK] += step.length * load.dot(&state.velocity)?;
             self.traffic.balance += 2 * vector_bytes(body);
         }
         self.clock.balance += balancing.elapsed();

@@ -4,7 +4,16 @@ use super::{
     Contact,
     point::{Point, Vectors::Body},
 };
-use crate::{error::Result, linear_algebra::tensor::larger};
+use crate::{
+    error::Result,
+    fem::effect::{EnergyKind, Role},
+    linear_algebra::tensor::larger,
+};
+
+/// Dissipated by contact, or absorbed by contact memory.
+pub const CONTACT: EnergyKind = EnergyKind::new(4, Role::Dissipated, "contact_dissipation");
+/// Stored in contact (compliant foundations).
+pub const STORED_IN_CONTACT: EnergyKind = EnergyKind::new(7, Role::Stored, "contact_energy");
 
 impl<const D: usize> Contact<D> {
     /// Energy in J that a step of this length dissipated, its numerical part, and the work of the obstacle on the body, from

@@ -49,6 +49,7 @@ use point::{Point, Vectors::Body, gauss_points};
 pub use crate::laws::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
+pub use energy::{CONTACT, STORED_IN_CONTACT};
 pub use reference::ReferenceValues;
 pub use unknowns::choose_unknowns;
 

@@ -2,10 +2,10 @@
 //!
 //! `s_{n-1} = E e(u_{n-2}) + H_{n-1}` is not stored: `u_{n-2} = u_{n-1} - k_{n-1} v_{n-1}`.
 
-use super::ViscoplasticFlow;
+use super::{VISCOPLASTIC, ViscoplasticFlow};
 use crate::{
     fem::{
-        effect::{Outcome, Step},
+        effect::{NUMERICAL, Outcome, Step},
         space::{Batch, Integrity, SimplexPack},
     },
     laws::material::{Flow, FlowLaw},
@@ -100,8 +100,8 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 after[lane] = before[lane] + step.length * growths[lane];
             }
         }
-        outcome.energy.viscoplastic += dissipated;
-        outcome.energy.numerical += numerical;
+        outcome.energy[VISCOPLASTIC] += dissipated;
+        outcome.energy[NUMERICAL] += numerical;
         if overstress > 0.0 {
             outcome.fastest_flow = outcome.fastest_flow.max(law.fastest_rate::<S>(overstress));
         }
@@ -176,7 +176,7 @@ mod tests {
         }
         let histories = Effect::<D, S>::histories(&effect);
         let histories = histories.iter().flat_map(|store| store.history().values.into_owned()).collect();
-        (forces, histories, [outcome.energy.viscoplastic, outcome.energy.numerical], flowing)
+        (forces, histories, [outcome.energy[VISCOPLASTIC], outcome.energy[NUMERICAL]], flowing)
     }
 
     fn check<const D: usize, const S: usize>(hypothesis: Hypothesis) {

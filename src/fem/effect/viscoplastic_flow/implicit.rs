@@ -4,10 +4,10 @@
 //! finds: what does not yield keeps `H_n = H_{n-1}`. A cell that did not flow in the step before starts with implicit Euler, as a run
 //! does.
 
-use super::ViscoplasticFlow;
+use super::{VISCOPLASTIC, ViscoplasticFlow};
 use crate::{
     fem::{
-        effect::{Blend, Energy, Outcome, Step},
+        effect::{Blend, Energy, NUMERICAL, Outcome, Step},
         space::Batch,
     },
     laws::material::{Extrapolated, Flow, FlowLaw, Tangent},
@@ -92,9 +92,9 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 dissipated = if two_steps { 0.5 * (taken + dot(&before, &flow)) } else { taken }.max(0.0);
             }
             let share = share[lane] * batch.cells.volume[lane];
-            energy.viscoplastic += share * dissipated;
+            energy[VISCOPLASTIC] += share * dissipated;
             let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
-            energy.numerical += share * own;
+            energy[NUMERICAL] += share * own;
         }
     }
 }

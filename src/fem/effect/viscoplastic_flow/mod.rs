@@ -2,13 +2,16 @@ mod explicit;
 mod implicit;
 
 use super::{
-    Curvature, Effect, Energy, Evaluation, FlowProperties, HistoryStore, Outcome, Phases, Step, StressError,
-    Term, cell_history::CellHistory, isotropic,
+    Curvature, ELASTIC, Effect, Energy, EnergyKind, Evaluation, FlowProperties, HistoryStore, Outcome,
+    Phases, Role, Step, StressError, Term, cell_history::CellHistory, isotropic,
 };
 use crate::{
     fem::space::{Batch, CellRun, Integrity, Needs},
     laws::material::{ByMaterial, Flow, FlowLaw},
 };
+
+/// Absorbed by viscoplastic flow: dissipated, or stored by hardening.
+pub const VISCOPLASTIC: EnergyKind = EnergyKind::new(3, Role::Dissipated, "viscoplastic_dissipation");
 
 /// Viscoplastic flow, by the stress `H` that it leaves in the elastic stress `E e(u) + H`, one tensor for each cell that flows, and the
 /// viscoplastic strain that hardening cells accumulate.
@@ -86,7 +89,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for ViscoplasticFlow<S> {
         let Some(law) = self.laws.get(batch.material) else { return };
         let Some(history) = self.stress.converged(batch.number) else { return };
         let (strain, integrity) = (&batch.strain, &batch.integrity);
-        energy.elastic +=
+        energy[ELASTIC] +=
             0.5 * isotropic::inverse_square(law.elasticity(), batch.cells, integrity, strain, history);
     }
 
