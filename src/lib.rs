@@ -9,7 +9,7 @@
 //! | [`error`] | the error type with its exit codes |
 //! | [`linear_algebra`] | vectors and tensors at a point, packs of cells, handles of PETSc objects, direct factors |
 //! | [`parallel`] | sessions of MPI and PETSc, outcomes that are identical on all ranks, messages of unknown size |
-//! | [`laws`] | constitutive laws at a point, with their keys in the job file |
+//! | [`laws`] | constitutive laws at a point and time schemes, with their keys in the job file |
 //! | [`job`] | the TOML document: parsing, validation, defaults, description |
 //! | [`mesh`] | mesh generators, mesh files, partition |
 //! | [`fem`] | linear elements; bodies and the physical effects on them |

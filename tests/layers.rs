@@ -1,5 +1,5 @@
-//! Rules of the source: modules use only modules above them, the files of a module have no circular imports, and `unsafe` occurs in
-//! few files only.
+//! Rules of the source: modules use only modules above them, the files of a module have no circular imports, functions have few
+//! parameters, and `unsafe` occurs in few files only.
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::{
@@ -475,6 +475,67 @@ fn names_handed_on_and_names_in_tests_make_no_circle() {
     let tests = "use super::{B, C}; pub struct T;";
     let files = [("src/a/mod.rs", parent), ("src/a/b.rs", b), ("src/a/c.rs", c), ("src/a/tests.rs", tests)];
     assert_eq!(circles_of(&files), [""; 0]);
+}
+
+/// Largest number of parameters of a function besides `self`.
+const MAX_PARAMETERS: usize = 5;
+
+/// The functions with their numbers of parameters besides `self`, without functions that C calls.
+fn parameters(stream: TokenStream, found: &mut Vec<(String, usize)>) {
+    let tokens: Vec<TokenTree> = stream.into_iter().collect();
+    for (at, token) in tokens.iter().enumerate() {
+        if let TokenTree::Group(group) = token {
+            parameters(group.stream(), found);
+        }
+        let is_called_by_c = at > 1 && is_word(&tokens[at - 2], "extern");
+        let Some(TokenTree::Ident(name)) = tokens.get(at + 1) else { continue };
+        if !is_word(token, "fn") || is_called_by_c {
+            continue;
+        }
+        // The list after the generic parameters, whose bounds may have parentheses.
+        let mut depth = 0;
+        let list = tokens[at + 2..].iter().enumerate().find_map(|(next, token)| match token {
+            TokenTree::Punct(p) if p.as_char() == '<' => {
+                depth += 1;
+                None
+            }
+            TokenTree::Punct(p) if p.as_char() == '>' && !is(&tokens[at + 1 + next], '-') => {
+                depth -= 1;
+                None
+            }
+            TokenTree::Group(list) if depth == 0 => Some(list.stream()),
+            _ => None,
+        });
+        let list: Vec<TokenTree> = list.into_iter().flatten().collect();
+        let (mut depth, mut is_arrow) = (0, false);
+        let parts = list.split(|token| {
+            depth += i32::from(is(token, '<')) - i32::from(is(token, '>') && !is_arrow);
+            is_arrow = is(token, '-');
+            depth == 0 && is(token, ',')
+        });
+        let is_parameter = |part: &&[TokenTree]| {
+            !part.is_empty() && !part.iter().take(4).any(|token| is_word(token, "self"))
+        };
+        found.push((name.to_string(), parts.filter(is_parameter).count()));
+    }
+}
+
+#[test]
+fn functions_have_few_parameters() {
+    let (mut seen, mut faults) = (0, Vec::new());
+    for (path, text) in sources() {
+        let mut found = Vec::new();
+        parameters(tokens(&text), &mut found);
+        seen += found.len();
+        let many = found.into_iter().filter(|(_, count)| *count > MAX_PARAMETERS);
+        faults.extend(many.map(|(name, count)| format!("{path}: {name} has {count} parameters")));
+    }
+    assert!(seen > 2000, "only {seen} functions were seen");
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    let mut found = Vec::new();
+    let text = "fn f<T: Fn(u8, u8) -> u8>(&'a mut self, a: [u8; 2], b: A<C, D>, c: impl Fn(u8) -> u8) {}";
+    parameters(tokens(text), &mut found);
+    assert_eq!(found, [("f".to_owned(), 3)]);
 }
 
 /// The lines with the word `unsafe`, and whether the word starts a block.

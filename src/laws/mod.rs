@@ -1,7 +1,9 @@
-//! Constitutive laws at a point, with their keys in the job file: no mesh, no MPI.
+//! Constitutive laws at a point and time schemes, with their keys in the job file: no mesh, no MPI.
 
 pub mod nearest;
 pub mod expression;
 pub mod law;
 pub mod contact;
 pub mod material;
+pub mod step;
+pub mod schemes;

@@ -1,4 +1,4 @@
-use super::step::Blend;
+use crate::laws::step::Blend;
 
 /// An implicit step for a scalar internal variable that changes in one direction only, such as damage or bonding.
 ///

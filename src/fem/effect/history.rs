@@ -1,6 +1,6 @@
 //! What effects keep from one step to the next.
 
-use super::step::Evaluation;
+use crate::laws::step::Evaluation;
 use std::borrow::Cow;
 
 /// Values that an effect keeps for cells or nodes, as files hold them.

@@ -22,7 +22,6 @@ mod mass;
 mod node_history;
 mod outcome;
 mod peaks;
-mod step;
 mod step_error;
 mod support;
 mod surface;
@@ -40,6 +39,7 @@ use crate::{
     parallel::session::Session,
 };
 
+pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
     CONTACT, COUNTS, Contact, ContactConditions, ContactNode, PointCount, Quadrature, ReferenceValues,
@@ -55,7 +55,6 @@ pub use interior::{Effect, Phases};
 pub use load::{Load, Traction, WORK};
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
-pub use step::{Blend, Evaluation, Step};
 pub use step_error::{Curvature, StressError};
 pub use support::fixed_components;
 pub use surface::SurfaceEffect;

@@ -13,14 +13,13 @@ mod time;
 pub use crate::laws::{
     contact::{Contact, Quadrature},
     material::Material,
+    schemes::Scheme,
 };
 pub use boundary::{Axis, BodyForce, Fix, FixedDirections, Initial, Support, Traction};
 pub use material::Region;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, Output, Probe, Profile};
-pub use time::{
-    Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Scheme, Solver, Time,
-};
+pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};
 
 use std::collections::BTreeMap;
 

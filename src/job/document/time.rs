@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::laws::schemes::Scheme;
+
 /// The end of the run, the steps and the time scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -27,55 +29,6 @@ pub struct Time {
     /// Adaptive steps, whose lengths are controlled by their estimated error. Absent: fixed steps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Adaptive>,
-}
-
-/// Defines [`Scheme`] by a list: the meaning of each scheme, its name in job files and its properties.
-macro_rules! schemes {
-    ($($(#[$about:meta])* $scheme:ident = $name:literal {
-        order: $order:literal, is_implicit: $is_implicit:literal, is_two_step: $is_two_step:literal
-    })*) => {
-        /// The time scheme.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-        pub enum Scheme {
-            $($(#[$about])* #[serde(rename = $name)] $scheme,)*
-        }
-
-        impl Scheme {
-            /// Its name in job files.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$scheme => $name,)* }
-            }
-
-            /// Its order of convergence in time for smooth solutions.
-            pub fn order(self) -> u32 {
-                match self { $(Self::$scheme => $order,)* }
-            }
-
-            /// Whether every stress is taken at the end of the step.
-            pub fn is_implicit(self) -> bool {
-                match self { $(Self::$scheme => $is_implicit,)* }
-            }
-
-            /// Whether a step starts from the last two states.
-            pub fn is_two_step(self) -> bool {
-                match self { $(Self::$scheme => $is_two_step,)* }
-            }
-        }
-    };
-}
-
-schemes! {
-    /// First order in time: the scheme (24)-(25) of Wang and Cheng (2022). Elastic and viscoplastic stress, damage, adhesion and
-    /// contact memory are taken from the previous step. Stable only for steps below explicit_step_bound, which `solver check`
-    /// prints.
-    #[default]
-    LaggedEuler = "lagged_euler" { order: 1, is_implicit: false, is_two_step: false }
-    /// First order in time: all stresses are taken at the end of the step. The step has no stability bound. Suitable for large
-    /// steps and impacts.
-    ImplicitEuler = "implicit_euler" { order: 1, is_implicit: true, is_two_step: false }
-    /// Second order in time. All stresses are taken at the end of the step, from a backward difference over two steps. The step has
-    /// no stability bound. Suitable for smooth motions; where velocities jump (impacts, sudden loads), the solution may overshoot.
-    Bdf2 = "bdf2" { order: 2, is_implicit: true, is_two_step: true }
 }
 
 /// Adaptive steps, whose lengths are controlled by their estimated error.

@@ -1,16 +1,26 @@
-//! The lists of normal and friction laws, from which a job chooses.
+//! The normal and friction laws, from which a job chooses: modules and lists.
+
+mod compliance;
+mod coulomb;
+mod damped_response;
+mod exponential_damper;
+mod graph;
+mod slip_weakening;
+mod tresca;
+mod unilateral;
+
+pub use compliance::Compliance;
+pub use coulomb::Coulomb;
+pub use damped_response::{DampedResponse, Symmetry};
+pub use exponential_damper::ExponentialDamper;
+pub use graph::Graph;
+pub use slip_weakening::SlipWeakening;
+pub use tresca::Tresca;
+pub use unilateral::{Bound, Unilateral};
 
 use super::{
-    compliance::Compliance,
-    coulomb::Coulomb,
-    damped_response::DampedResponse,
-    exponential_damper::ExponentialDamper,
     friction_law::{FrictionBound, Slip, friction_laws},
-    graph::Graph,
     normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response, normal_laws},
-    slip_weakening::SlipWeakening,
-    tresca::Tresca,
-    unilateral::Unilateral,
 };
 use crate::{
     error::Result,

@@ -2,7 +2,7 @@
 //!
 //! Each law has a file in this folder, with its parameters as in the job file, their units and ranges, its formula and source, and
 //! the combinations that are refused. This file is the list of all: modules and the keys of the table `[material]`. Viscoplastic
-//! laws are listed in `viscoplasticity/law.rs`.
+//! laws are listed in `viscoplasticity.rs`.
 
 mod by_material;
 mod damage;

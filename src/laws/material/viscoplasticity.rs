@@ -1,13 +1,12 @@
 //! Viscoplastic laws `G(s) = -E X(s)`: relaxation of stress by flow.
 //!
-//! Each law has a file in the folder `viscoplasticity` and an entry in the list of `viscoplasticity/law.rs`. The file defines its
+//! Each law has a file in the folder `viscoplasticity` and a module and an entry in the list of this file. Its file defines its
 //! [`Parameters`], as in the job file, and its [`Flow`], which evaluates it. No other module contains the name of a law.
 
 mod drucker_prager;
 #[cfg(test)]
 mod fastest_rates;
 mod flow;
-mod law;
 mod maxwell;
 mod norton;
 mod perzyna;
@@ -16,9 +15,153 @@ mod tangent;
 
 pub use drucker_prager::DruckerPrager;
 pub use flow::{Flow, Parameters};
-pub use law::{FlowLaw, Viscoplasticity};
 pub use maxwell::{Dashpots, Maxwell};
 pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
 pub use return_mapping::{Extrapolated, Returned};
 pub use tangent::Tangent;
+
+use crate::{
+    laws::{
+        law::LawFault,
+        material::{Elasticity, Hypothesis, Isotropic},
+    },
+    linear_algebra::{
+        simd::{LANES, Pack},
+        tensor::Mandel,
+    },
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The choice of laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the chosen law.
+macro_rules! laws {
+    ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
+        /// The viscoplastic law.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        pub enum Viscoplasticity {
+            $($(#[$about])* #[serde(rename = $name)] $law($law),)*
+        }
+
+        impl Viscoplasticity {
+            /// The message where elasticity is missing.
+            pub const WITHOUT_ELASTICITY: &'static str = "viscoplasticity requires elasticity: it relaxes the elastic stress";
+
+            /// The names of the laws in the job, each with its [`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS).
+            pub const NAMES: &'static [(&'static str, Option<[&'static str; 2]>)] =
+                &[$(($name, $law::NOT_IN_PLANE_STRESS),)*];
+
+            /// See [`Parameters::prepare`].
+            pub fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> FlowLaw {
+                match self {
+                    $(Self::$law(law) => FlowLaw::$law(law.prepare(elasticity, hypothesis)),)*
+                }
+            }
+
+            /// See [`Parameters::fault`].
+            pub fn fault(&self) -> Option<LawFault> {
+                match self {
+                    $(Self::$law(law) => law.fault(),)*
+                }
+            }
+
+            /// See [`Parameters::keeps_volume`].
+            pub fn keeps_volume(&self) -> bool {
+                match self {
+                    $(Self::$law(law) => law.keeps_volume(),)*
+                }
+            }
+        }
+
+        /// A law in its material.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum FlowLaw {
+            $($(#[$about])* $law(<$law as Parameters>::Flow),)*
+        }
+
+        macro_rules! chosen {
+            ($self:ident, $chosen:ident => $what:expr) => {
+                match $self {
+                    $(Self::$law($chosen) => $what,)*
+                }
+            };
+        }
+    };
+}
+
+laws! {
+    /// Perzyna's overstress law with the von Mises yield condition and optional hardening.
+    Perzyna = "perzyna",
+    /// Maxwell's linear relaxation of stress.
+    Maxwell = "maxwell",
+    /// Overstress law with the yield condition of Drucker and Prager, whose yield stress increases with pressure. For 3D and plane
+    /// strain.
+    DruckerPrager = "drucker_prager",
+    /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
+    Norton = "norton",
+}
+
+impl Flow for FlowLaw {
+    #[inline]
+    fn elasticity(&self) -> &Isotropic {
+        chosen!(self, law => law.elasticity())
+    }
+
+    #[inline]
+    fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64) {
+        chosen!(self, law => law.rate(s, accumulated))
+    }
+
+    #[inline(always)]
+    fn rates<const S: usize>(
+        &self,
+        stresses: &Pack<S>,
+        accumulated: &[f64; LANES],
+        growths: &mut [f64; LANES],
+    ) -> Option<Pack<S>> {
+        chosen!(self, law => law.rates(stresses, accumulated, growths))
+    }
+
+    fn flow_to_end<const S: usize>(
+        &self,
+        trial: &Mandel<S>,
+        length: f64,
+        accumulated: f64,
+        tangent: Option<&mut Tangent<S>>,
+    ) -> Option<(Mandel<S>, f64)> {
+        chosen!(self, law => law.flow_to_end(trial, length, accumulated, tangent))
+    }
+
+    fn has_symmetric_tangent<const S: usize>(&self) -> bool {
+        chosen!(self, law => law.has_symmetric_tangent::<S>())
+    }
+
+    fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
+        chosen!(self, law => law.fastest_rate::<S>(overstress))
+    }
+
+    fn is_power_law(&self) -> bool {
+        chosen!(self, law => law.is_power_law())
+    }
+
+    #[inline]
+    fn overstress<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> f64 {
+        chosen!(self, law => law.overstress(s, accumulated))
+    }
+
+    fn hardens(&self) -> bool {
+        chosen!(self, law => law.hardens())
+    }
+
+    fn equivalent_stress<const S: usize>(&self, s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
+        chosen!(self, law => law.equivalent_stress(s))
+    }
+
+    fn strength(&self, accumulated: f64) -> f64 {
+        chosen!(self, law => law.strength(accumulated))
+    }
+
+    fn hardening_modulus(&self) -> f64 {
+        chosen!(self, law => law.hardening_modulus())
+    }
+}

@@ -1,8 +1,8 @@
 //! Time schemes: the parts of a step that are specific to a scheme.
 
 use super::{
-    bdf2, contacts::add_contact_energy, flow::FlowStart, implicit::Implicit, implicit_euler,
-    lagged_euler::LaggedEuler, outcome::over_ranks,
+    contacts::add_contact_energy, flow::FlowStart, implicit::Implicit, lagged_euler::LaggedEuler,
+    outcome::over_ranks,
 };
 use crate::{
     error::Result,
@@ -31,12 +31,10 @@ pub(super) enum Integrator {
 impl Integrator {
     /// The integrator of a scheme, for vectors with the layout of those of the state.
     pub(super) fn new(scheme: Scheme, state: &State) -> Result<Self> {
-        let blend = match scheme {
-            Scheme::LaggedEuler => return Ok(Self::LaggedEuler(LaggedEuler::default())),
-            Scheme::ImplicitEuler => implicit_euler::blend,
-            Scheme::Bdf2 => bdf2::blend,
-        };
-        Ok(Self::Implicit(Box::new(Implicit::new(state, blend)?)))
+        Ok(match scheme.formula() {
+            None => Self::LaggedEuler(LaggedEuler::default()),
+            Some(blend) => Self::Implicit(Box::new(Implicit::new(state, blend)?)),
+        })
     }
 
     /// The length for which the matrix of a step is assembled.

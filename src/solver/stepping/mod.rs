@@ -1,7 +1,6 @@
 //! Steps in time: the equations of a step, their solution, and the schemes.
 
 mod adaptive;
-mod bdf2;
 mod bounded;
 mod condensed;
 mod condensed_matrix;
@@ -14,7 +13,6 @@ mod fallbacks;
 mod flow;
 mod frames;
 mod implicit;
-mod implicit_euler;
 mod integrator;
 mod lagged_euler;
 mod linear_solver;

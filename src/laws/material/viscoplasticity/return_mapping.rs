@@ -12,7 +12,7 @@ mod extrapolated;
 
 pub use extrapolated::Extrapolated;
 
-use super::{flow::Flow, law::FlowLaw, tangent::Tangent};
+use super::{FlowLaw, flow::Flow, tangent::Tangent};
 use crate::linear_algebra::tensor::{Mandel, add_scaled};
 
 /// How a step ends where stress flows.

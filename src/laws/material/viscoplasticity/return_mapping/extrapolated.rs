@@ -17,8 +17,8 @@
 use super::Returned;
 use crate::{
     laws::material::viscoplasticity::{
+        FlowLaw,
         flow::Flow,
-        law::FlowLaw,
         tangent::{Tangent, add_product},
     },
     linear_algebra::tensor::{Mandel, add_scaled, dot},

@@ -7,7 +7,7 @@
 //!
 //! Unconditionally stable, of first order.
 
-use crate::fem::effect::{Blend, Step};
+use crate::laws::step::{Blend, Step};
 
 /// The blend from which a step starts: the previous state.
 pub(super) fn blend(step: Step) -> Blend {

@@ -1,6 +1,6 @@
 //! Coulomb friction: the bound is `coefficient p` with the positive part `p` of the contact pressure.
 
-use super::friction_law::FrictionBound;
+use crate::laws::contact::friction_law::FrictionBound;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Tresca friction: a given bound on the friction traction.
 
-use super::friction_law::FrictionBound;
+use crate::laws::contact::friction_law::FrictionBound;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

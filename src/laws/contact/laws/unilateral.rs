@@ -3,7 +3,7 @@
 //! Within a step both are graphs over the normal velocity that are zero up to a velocity and vertical there: the velocity that
 //! closes the gap at the end of the step, or zero.
 
-use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{
     error::Result,
     laws::{expression::Scalar, law::LawFault},

@@ -4,7 +4,7 @@
 //! on. For `v < 0` it is mirrored: `even` as in (72), `odd` (dissipative in both directions), or zero (`one_sided`: the
 //! foundation does not pull).
 
-use super::{normal_law::NormalParameters, polyline::Polyline};
+use crate::laws::contact::{normal_law::NormalParameters, polyline::Polyline};
 use crate::{
     error::{Error, Result},
     laws::law::LawFault,

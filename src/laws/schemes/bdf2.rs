@@ -11,7 +11,7 @@
 //! (`return_mapping/extrapolated.rs` of the laws). The formula is A-stable for equal steps; it remains stable if steps grow by
 //! factors of at most `1 + √2`. (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, chapter III.5.)
 
-use crate::fem::effect::{Blend, Step};
+use crate::laws::step::{Blend, Step};
 
 /// The blend from which a step starts.
 pub(super) fn blend(step: Step) -> Blend {

@@ -1,6 +1,6 @@
 //! Contact pressure as a polyline over the normal velocity.
 
-use super::{normal_law::NormalParameters, polyline::Polyline};
+use crate::laws::contact::{normal_law::NormalParameters, polyline::Polyline};
 use crate::{error::Result, laws::law::LawFault};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

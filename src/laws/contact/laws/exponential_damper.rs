@@ -5,7 +5,7 @@
 //! stress (Flows of materials with yield, J. Rheol. 31 (1987), 385-404). The pressure never decreases with the velocity. The law
 //! stores no energy: all its work is dissipated.
 
-use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{error::Result, laws::law::increasing_root};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

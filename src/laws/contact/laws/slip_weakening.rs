@@ -3,7 +3,7 @@
 //! The bound is `(dynamic + (static - dynamic) exp(-v / decay_velocity)) p` with the positive part `p` of the contact pressure. Its
 //! steepest decrease is `(static - dynamic) / decay_velocity p`.
 
-use super::friction_law::FrictionBound;
+use crate::laws::contact::friction_law::FrictionBound;
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

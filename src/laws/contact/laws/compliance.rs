@@ -4,7 +4,7 @@
 //! it is a law of the velocity, `p(r) = stiffness * max(d + k r, 0)^exponent`, which rises: its relaxed monotonicity
 //! constant is 0.
 
-use super::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
+use crate::laws::contact::normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 use crate::{
     error::Result,
     laws::{expression::Scalar, law::increasing_root},
