@@ -3,6 +3,7 @@ use super::{
     supernodal::SupernodalFactor,
 };
 use crate::error::{Error, Result};
+use std::ops::Range;
 
 /// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last, or not at all: in
 /// double or single precision after CHOLMOD's symbolic analysis.
@@ -165,12 +166,17 @@ impl Cholesky {
     /// The diagonal block of the last unknowns, column after column, each from the diagonal down: `L_c`, whose product `L_c L_c^T` is
     /// their Schur complement. If they are not eliminated, `-K_lf K_ff^-1 K_fl`, the contribution of the others to the Schur complement.
     pub fn last_block(&self) -> Vec<f64> {
-        of_numbers!(&self.numbers, factor => factor.last_columns(&self.analysis))
+        self.last_columns(0..self.last)
     }
 
-    /// As [`last_block`](Self::last_block); frees the memory of the block, if the last unknowns are not eliminated.
-    pub fn take_last_block(&mut self) -> Vec<f64> {
-        of_numbers!(&mut self.numbers, factor => factor.take_last_columns(&self.analysis))
+    /// These columns of [`last_block`](Self::last_block).
+    pub fn last_columns(&self, columns: Range<usize>) -> Vec<f64> {
+        of_numbers!(&self.numbers, factor => factor.last_columns(&self.analysis, columns))
+    }
+
+    /// Frees the memory of the block, if the last unknowns are not eliminated.
+    pub fn drop_last_block(&mut self) {
+        of_numbers!(&mut self.numbers, factor => factor.drop_last_columns(&self.analysis));
     }
 }
 
@@ -480,7 +486,9 @@ mod tests {
             eliminate(&mut reduced, &mut left, &last);
             let whole = dense(&rows);
             let order: Vec<usize> = factor.last_unknowns().iter().map(|&unknown| unknown as usize).collect();
-            let mut entries = factor.take_last_block().into_iter();
+            let mut entries = factor.last_block().into_iter();
+            assert_eq!(factor.last_columns(3..5), factor.last_block()[12 + 11 + 10..][..9 + 8]);
+            factor.drop_last_block();
             for (at, &column) in order.iter().enumerate() {
                 for &row in &order[at..] {
                     let known = reduced[row][column] - whole[row][column];

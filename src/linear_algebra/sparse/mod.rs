@@ -18,7 +18,7 @@ mod threads;
 pub(crate) use block_rows::index;
 pub use block_rows::{BlockRows, INDEX_BITS};
 pub use cholesky::{Cholesky, Precision};
-pub use dense_factor::{DenseFactor, DensePanels};
+pub use dense_factor::{DenseFactor, DensePanels, Team};
 pub(crate) use rectangular_blocks::{Transfer, transfer};
 pub(crate) use symmetric_blocks::{Product, ScalarRows, Stored, product};
 pub(crate) use threads::one_unless_chosen;

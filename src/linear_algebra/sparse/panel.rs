@@ -25,6 +25,12 @@ pub(super) trait Real: Copy + Debug + Default + AddAssign + SubAssign + 'static 
     /// Subtracts the product of the transposed rectangle with the values of its rows, then solves with the transpose of the triangle.
     fn backward(panel: &[Self], columns: usize, values: &mut [Self]);
 
+    /// Subtracts the product of a rectangle with these numbers, one a column, from the values of its rows.
+    fn subtract_product(rectangle: &[Self], numbers: &[f64], values: &mut [f64]);
+
+    /// Adds the product of the transposed rectangle with the values of its rows to sums, one a column.
+    fn add_transposed_product(rectangle: &[Self], values: &[f64], sums: &mut [f64]);
+
     /// Replaces a panel of this many columns by its factor; `None` where its triangle is not positive definite.
     fn factor(panel: &mut [Self], columns: usize) -> Option<()>;
 
@@ -57,6 +63,30 @@ macro_rules! real {
                 }
             }
 
+            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+            pub(super) fn subtract_product(rectangle: &[$real], numbers: &[f64], values: &mut [f64]) {
+                assert_eq!(rectangle.len(), numbers.len() * values.len());
+                for (column, x) in rectangle.chunks_exact(values.len().max(1)).zip(numbers) {
+                    values.iter_mut().zip(column).for_each(|(value, l)| *value -= f64::from(*l) * x);
+                }
+            }
+
+            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+            pub(super) fn add_transposed_product(rectangle: &[$real], values: &[f64], sums: &mut [f64]) {
+                assert_eq!(rectangle.len(), sums.len() * values.len());
+                let (values, values_rest) = values.as_chunks::<8>();
+                let rows = 8 * values.len() + values_rest.len();
+                for (column, sum) in rectangle.chunks_exact(rows.max(1)).zip(sums) {
+                    let (column, column_rest) = column.as_chunks::<8>();
+                    let mut lanes = [0.0; 8];
+                    for (l, value) in column.iter().zip(values) {
+                        (0..8).for_each(|i| lanes[i] += f64::from(l[i]) * value[i]);
+                    }
+                    let rest: f64 = column_rest.iter().zip(values_rest).map(|(l, v)| f64::from(*l) * v).sum();
+                    *sum += lanes.iter().sum::<f64>() + rest;
+                }
+            }
+
             /// From the end on: columns are read from the last one on, and memory is fetched ahead where addresses go one way.
             #[inline(always)]
             fn dot(a: &[$real], b: &[$real]) -> $real {
@@ -86,6 +116,14 @@ macro_rules! real {
 
             fn backward(panel: &[Self], columns: usize, values: &mut [Self]) {
                 $solves::backward(panel, columns, values);
+            }
+
+            fn subtract_product(rectangle: &[Self], numbers: &[f64], values: &mut [f64]) {
+                $solves::subtract_product(rectangle, numbers, values);
+            }
+
+            fn add_transposed_product(rectangle: &[Self], values: &[f64], sums: &mut [f64]) {
+                $solves::add_transposed_product(rectangle, values, sums);
             }
 
             fn factor(panel: &mut [Self], columns: usize) -> Option<()> {

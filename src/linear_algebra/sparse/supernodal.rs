@@ -29,6 +29,9 @@ pub(super) struct SupernodalFactor<R> {
     pub last: Vec<f64>,
 }
 
+/// Number of columns that are updated at once: the products of large supernodes would take as much memory as their panels.
+const MAX_UPDATED: usize = 512;
+
 /// The end of a list of supernodes.
 const NONE: u32 = u32::MAX;
 
@@ -85,20 +88,21 @@ impl<R: Real> SupernodalFactor<R> {
         counts
     }
 
-    /// The entries in the columns of the last unknowns, unscaled: column after column, each from the diagonal down.
-    pub(super) fn last_columns(&self, analysis: &Analysis) -> Vec<f64> {
+    /// The entries in these columns of the last unknowns, unscaled: column after column, each from the diagonal down.
+    pub(super) fn last_columns(&self, analysis: &Analysis, wanted: Range<usize>) -> Vec<f64> {
         let last = self.last.len();
         let (first, is_partial) = (self.scales.len() - last, self.end < self.scales.len());
         let start = |column: usize| column * last - column * column.saturating_sub(1) / 2;
-        let mut columns = vec![0.0; last * (last + 1) / 2];
+        let mut columns = vec![0.0; start(wanted.end) - start(wanted.start)];
         let nodes = analysis.supernodes();
         for node in (0..nodes.len()).rev() {
             let (own, rows, panel) = (nodes.columns(node), nodes.rows(node), nodes.panel(node));
-            if own.end <= first {
+            if own.end <= first + wanted.start {
                 break;
             }
-            for column in own.clone().filter(|&column| column >= first) {
-                let (to, from) = (start(column - first), panel.start + (column - own.start) * rows.len());
+            for column in own.start.max(first + wanted.start)..own.end.min(first + wanted.end) {
+                let to = start(column - first) - start(wanted.start);
+                let from = panel.start + (column - own.start) * rows.len();
                 let scale_of_column = if is_partial { self.scales[column] } else { 1.0 };
                 for (at, &row) in rows.iter().enumerate().filter(|(_, row)| **row as usize >= column) {
                     let scale = self.scales[row as usize] * scale_of_column;
@@ -109,15 +113,13 @@ impl<R: Real> SupernodalFactor<R> {
         columns
     }
 
-    /// As [`last_columns`](Self::last_columns); frees the memory of the columns that were not eliminated.
-    pub(super) fn take_last_columns(&mut self, analysis: &Analysis) -> Vec<f64> {
-        let columns = self.last_columns(analysis);
+    /// Frees the memory of the columns of the last unknowns that were not eliminated.
+    pub(super) fn drop_last_columns(&mut self, analysis: &Analysis) {
         let nodes = analysis.supernodes();
         if let Some(node) = (0..nodes.len()).find(|&node| nodes.columns(node).start >= self.end) {
             self.values.truncate(nodes.panel(node).start);
             self.values.shrink_to_fit();
         }
-        columns
     }
 
     /// Solves `L y = b` for the unknowns that were eliminated; what is left of `b` for the others stands in `last`.
@@ -298,18 +300,21 @@ fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, valu
         while let Some(other) = lists.pop(node) {
             let (all, first) = (nodes.rows(other), lists.row[other]);
             let changed = all[first..].partition_point(|&row| (row as usize) < own.end);
-            let height = all.len() - first;
             let width = eliminated(nodes.columns(other), end).len();
             let panel_of_other = &earlier[nodes.panel(other)][..width * all.len()];
-            update.resize(usize::max(update.len(), height * changed), R::default());
-            R::own_product(panel_of_other, all.len(), first, changed, &mut update);
             lines.clear();
             lines.extend(all[first..].iter().map(|&row| line[row as usize]));
-            for (at, update) in update[..height * changed].chunks_exact(height).enumerate() {
-                let column = all[first + at] as usize - own.start;
-                let panel = &mut panel[column * rows.len()..][..rows.len()];
-                for (&line, value) in lines[at..].iter().zip(&update[at..]) {
-                    panel[line as usize] -= *value;
+            for start in (0..changed).step_by(MAX_UPDATED) {
+                let count = (changed - start).min(MAX_UPDATED);
+                let (lines, height) = (&lines[start..], lines.len() - start);
+                update.resize(usize::max(update.len(), height * count), R::default());
+                R::own_product(panel_of_other, all.len(), first + start, count, &mut update);
+                for (at, update) in update[..height * count].chunks_exact(height).enumerate() {
+                    let column = all[first + start + at] as usize - own.start;
+                    let panel = &mut panel[column * rows.len()..][..rows.len()];
+                    for (&line, value) in lines[at..].iter().zip(&update[at..]) {
+                        panel[line as usize] -= *value;
+                    }
                 }
             }
             lists.insert(other, all, first + changed);

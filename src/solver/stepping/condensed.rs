@@ -50,8 +50,6 @@ pub(super) struct Condensed {
     nodes: ContactNodes,
     /// The range of this rank in the unknowns of all ranks.
     own: std::ops::Range<usize>,
-    /// The order of elimination on this rank, once it is known.
-    order: Option<Vec<u32>>,
     /// Vectors of contact nodes: right-hand side, velocity, and velocity of the converged state.
     right_hand_side: DistributedVector,
     velocity: DistributedVector,
@@ -140,7 +138,6 @@ impl Condensed {
             precision,
             own: start..start + nodes.motions.len(),
             nodes,
-            order: None,
             right_hand_side: like.like()?,
             velocity: like.like()?,
             converged: like.like()?,
@@ -164,18 +161,15 @@ impl Condensed {
         let Elimination { factored, frames, substructures, .. } = &mut self.elimination;
         frames.rotate_matrix(&mut rows);
         *factored = None;
-        let order = self.order.as_deref();
-        let Some(factors) = Factors::new(session.world(), substructures, &rows, order, self.precision)?
-        else {
+        let Some(mut factors) = Factors::new(session.world(), substructures, &rows, self.precision)? else {
             return Ok(false);
         };
-        self.order.get_or_insert_with(|| factors.order().to_vec());
         self.precision = factors.precision();
         drop(rows);
         let Frames { unknowns, groups, .. } = frames;
         let has_springs = springs.is_some();
         let condensed = CondensedMatrix {
-            lower: factors.last_factor(),
+            lower: factors.take_last_factor(),
             positions: factors.positions(unknowns),
             nodes: groups.clone(),
             own: self.own.clone(),
@@ -219,6 +213,7 @@ impl Condensed {
         solution: &mut DistributedVector,
     ) -> Result<()> {
         self.elimination.forward(right_hand_side)?;
+        factored_mut(&mut self.elimination.factored)?.solve_contact();
         self.elimination.backward(solution)
     }
 
@@ -247,11 +242,11 @@ impl Condensed {
         elimination.forward(system.right_hand_side)?;
         nodes.restrict::<D>(system.converged, converged)?;
         nodes.restrict::<D>(trial, velocity)?;
-        let Factored { factors, condensed, .. } = factored_mut(&mut elimination.factored)?;
-        condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
-        let contact = System { matrix: condensed, right_hand_side, converged, ..system };
+        let factored = factored_mut(&mut elimination.factored)?;
+        factored.write_rest(right_hand_side)?;
+        let contact = System { matrix: &factored.condensed, right_hand_side, converged, ..system };
         let outcome = newton.solve(problem, contact, velocity)?;
-        condensed.read_times_upper(velocity, factors.last_mut())?;
+        factored.set_contact(velocity)?;
         elimination.backward(trial)?;
         nodes.prescribe::<D>(velocity, trial)?;
         trial.update_ghosts()?;
@@ -282,13 +277,13 @@ impl Condensed {
             elimination.forward(residual)?;
             nodes.restrict::<D>(trial, velocity)?;
             before.copy_from(velocity)?;
-            let Factored { factors, condensed, .. } = factored_mut(&mut elimination.factored)?;
-            condensed.write_times_lower(factors.last_mut(), right_hand_side)?;
+            let factored = factored_mut(&mut elimination.factored)?;
+            factored.write_rest(right_hand_side)?;
             right_hand_side.add_scaled(1.0, change)?;
-            condensed.multiply(before, product)?;
+            factored.condensed.multiply(before, product)?;
             right_hand_side.add_scaled(1.0, product)?;
             let tolerance = CONTACT_SHARE * system.tolerance;
-            let contact = System { matrix: condensed, right_hand_side, tolerance, converged };
+            let contact = System { matrix: &factored.condensed, right_hand_side, tolerance, converged };
             let outcome = newton.solve(problem, contact, velocity)?;
             sum = StepOutcome {
                 newton_iterations: sum.newton_iterations + outcome.newton_iterations,
@@ -300,8 +295,8 @@ impl Condensed {
             right_hand_side.add_scaled(-1.0, product)?;
             change.copy_from(velocity)?;
             change.add_scaled(-1.0, before)?;
-            condensed.multiply(change, product)?;
-            condensed.read_times_upper(change, factors.last_mut())?;
+            factored.condensed.multiply(change, product)?;
+            factored.set_contact(change)?;
             elimination.backward(correction)?;
             trial.add_scaled(1.0, correction)?;
             nodes.prescribe::<D>(velocity, trial)?;
@@ -327,6 +322,35 @@ impl Condensed {
     /// Resets `trial` to the start value of the last step with a factor in single precision.
     pub(super) fn restore_start(&self, trial: &mut DistributedVector) -> Result<()> {
         self.refinement.as_ref().map_or(Ok(()), |refinement| trial.copy_from(&refinement.start))
+    }
+}
+
+impl Factored {
+    /// Writes the forces along the motions of contact nodes that the forward substitution leaves of the right-hand side.
+    fn write_rest(&mut self, forces: &mut DistributedVector) -> Result<()> {
+        let Self { factors, condensed, .. } = self;
+        if factors.solves_contact() {
+            condensed.write_times_lower(factors.last_mut(), forces)
+        } else {
+            condensed.write(factors.last_mut(), forces)
+        }
+    }
+
+    /// Starts the backward substitution with the motions of contact nodes. Collective.
+    fn set_contact(&mut self, motions: &DistributedVector) -> Result<()> {
+        let Self { factors, condensed, .. } = self;
+        if factors.solves_contact() {
+            condensed.read_times_upper(motions, factors.last_mut())
+        } else {
+            condensed.read_amounts(motions, factors.last_mut())
+        }
+    }
+
+    /// Completes a forward substitution for the solution without contact forces.
+    fn solve_contact(&mut self) {
+        if !self.factors.solves_contact() {
+            self.condensed.solve(self.factors.last_mut());
+        }
     }
 }
 

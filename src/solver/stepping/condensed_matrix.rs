@@ -109,6 +109,14 @@ impl CondensedMatrix {
         Ok(())
     }
 
+    /// The amounts of all motions in a vector of contact nodes, in the order of the factor. Collective.
+    pub(super) fn read_amounts(&self, vector: &DistributedVector, amounts: &mut [f64]) -> Result<()> {
+        let workspace = &mut *self.workspace.borrow_mut();
+        self.read(vector, workspace)?;
+        amounts.copy_from_slice(&workspace.ordered_amounts[0]);
+        Ok(())
+    }
+
     /// Restarts the count of traffic.
     pub(super) fn restart_traffic(&self) {
         self.workspace.borrow_mut().traffic = 0;
@@ -135,7 +143,7 @@ impl CondensedMatrix {
     }
 
     /// Writes a vector of contact nodes with these amounts of the motions, given in the order of the factor.
-    fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
+    pub(super) fn write(&self, amounts: &[f64], vector: &mut DistributedVector) -> Result<()> {
         let mut values = vector.owned_mut()?;
         values.fill(0.0);
         for (motion, number) in self.motions.iter().zip(self.own.clone()) {
@@ -168,7 +176,7 @@ impl CondensedMatrix {
     }
 
     /// Replaces `x` by `L^-T L^-1 x`.
-    fn solve(&self, x: &mut [f64]) {
+    pub(super) fn solve(&self, x: &mut [f64]) {
         let size = x.len();
         for (at, column) in columns(&self.lower, size).enumerate() {
             x[at] /= column[0];

@@ -36,6 +36,9 @@ const CYCLE_MESSAGE_TIME: f64 = 100e-6;
 const SET_UP_CYCLES: f64 = 100.0;
 /// Seconds for the messages of a step with a shared factor between processes of one machine (docs/scaling.md).
 const STEP_MESSAGE_TIME: f64 = 85e-6;
+/// Seconds for the messages of a solve with the dense matrix of the interface for each of its unknowns: two for each panel of 128, of some
+/// 3 us (docs/scaling.md).
+const PANEL_MESSAGE_TIME: f64 = 6e-6 / 128.0;
 /// Factor by which a step with MUMPS takes longer than one with a factor on one rank: 233 ms on two ranks instead of 32 ms for the
 /// problem of Wang and Cheng on 256 x 256 cells, 1.25 s instead of 0.15 s on 512 x 512.
 const MUMPS_FACTOR: f64 = 8.0;
@@ -140,13 +143,16 @@ impl ProblemSize {
             return whole;
         }
         if self.is_shared() {
-            // Each rank factors its part and the dense matrix of the interface, and reads both in each half of a solve.
+            // Each rank factors its part and its share of the dense matrix of the interface, and reads both in each half of a solve.
             let subdomain = self.factor_of(self.unknowns as f64 / ranks, precision);
             let interface = self.interface as f64;
             return Cost {
-                memory: ranks * (subdomain.memory + 4.0 * interface.powi(2)),
+                memory: ranks * subdomain.memory + 4.0 * interface.powi(2),
                 set_up: subdomain.set_up + 1.5e-11 * interface.powi(3) / ranks,
-                step: subdomain.step + 1.0e-9 * interface.powi(2) + STEP_MESSAGE_TIME,
+                step: subdomain.step
+                    + 1.0e-9 * interface.powi(2) / ranks
+                    + interface * PANEL_MESSAGE_TIME
+                    + STEP_MESSAGE_TIME,
             };
         }
         Cost { set_up: whole.set_up / ranks, step: MUMPS_FACTOR * whole.step / ranks, ..whole }

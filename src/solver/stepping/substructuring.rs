@@ -4,13 +4,15 @@
 //! The interface consists of the nodes that cells of several ranks touch: without them, subdomains are not coupled. With the
 //! interface and the contact unknowns of a rank ordered last, its rows give `-K_lf K_ff^-1 K_fl`, and the sum over all ranks,
 //! plus the entries of the matrix between these unknowns, is the Schur complement of interface and contact. It is small and
-//! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps the whole factor. All sums are in the
+//! dense; ranks factor it together, with the contact unknowns of all ranks last, and each keeps its share of the rows. All sums are in the
 //! order of the ranks, so that runs on the same number of ranks repeat each bit.
 
 use super::frames::Frames;
 use crate::{
     error::{Error, Result},
-    linear_algebra::petsc::{BlockRows, Cholesky, DenseFactor, DensePanels, OwnPreconditioner, Precision},
+    linear_algebra::petsc::{
+        BlockRows, Cholesky, DenseFactor, DensePanels, OwnPreconditioner, Precision, Team,
+    },
     mesh::Mesh,
     parallel::{
         agreement::{Agreed, agree},
@@ -19,24 +21,25 @@ use crate::{
     },
 };
 use mpi::{
+    Count,
+    datatype::PartitionMut,
     topology::SimpleCommunicator,
-    traits::{Communicator, Root},
+    traits::{Communicator, CommunicatorCollectives, Root},
 };
-use std::ops::Range;
+use std::{ops::Range, rc::Rc};
 
 /// Marks a component of a node of interface or contact that is eliminated in the interior.
 const NONE: u32 = u32::MAX;
 
-/// Unknowns of the interface and of the contact up to which their dense matrix fits on each rank.
+/// Unknowns of the interface and of the contact up to which ranks share their dense matrix.
 pub(super) const MAX_INTERFACE_UNKNOWNS: usize = 12_000;
 
 /// The unknowns of interface and contact, numbered over all ranks: first those of the interface, then those of the contact.
 #[derive(Debug)]
 pub(super) struct Substructures {
     dimension: usize,
-    /// Nodes owned here, and all nodes here.
+    /// Nodes owned here.
     owned: usize,
-    local: usize,
     first_node: usize,
     ghosts: Vec<u32>,
     /// Global numbers of the nodes of interface and contact of all ranks, ascending.
@@ -48,6 +51,104 @@ pub(super) struct Substructures {
     total: usize,
     /// Local unknowns that are not eliminated here, in the order of their numbers.
     last: Vec<usize>,
+    numbering: Rc<Numbering>,
+    /// The order of elimination on this rank, once it is known.
+    order: Option<Vec<u32>>,
+}
+
+/// The numbers of the unknowns that each rank does not eliminate, ascending.
+#[derive(Debug)]
+struct Numbering {
+    /// Those of all ranks, in their order.
+    all: Vec<u32>,
+    gathering: Gathering,
+    rank: usize,
+}
+
+impl Numbering {
+    /// Collective.
+    fn new(world: &SimpleCommunicator, own: &[u32]) -> Result<Self, Agreed> {
+        let gathering = Gathering::new(world, own.len())?;
+        Ok(Self { all: gather(world, own)?, gathering, rank: world.rank() as usize })
+    }
+
+    fn of(&self, rank: usize) -> &[u32] {
+        &self.all[self.gathering.range(rank)]
+    }
+
+    /// The places of these numbers among those of a rank.
+    fn positions(&self, rank: usize, numbers: &Range<usize>) -> Range<usize> {
+        let before = |end: usize| self.of(rank).partition_point(|&number| (number as usize) < end);
+        before(numbers.start)..before(numbers.end)
+    }
+}
+
+/// All ranks, which share the dense matrix.
+struct Ranks<'a>(&'a SimpleCommunicator);
+
+impl Team for Ranks<'_> {
+    fn rank(&self) -> usize {
+        self.0.rank() as usize
+    }
+
+    fn ranks(&self) -> usize {
+        self.0.size() as usize
+    }
+
+    fn spread(&self, from: usize, values: &mut [f64]) {
+        self.0.process_at_rank(from as i32).broadcast_into(values);
+    }
+
+    fn collect(&self, to: usize, own: &[f64], all: &mut [f64]) {
+        let root = self.0.process_at_rank(to as i32);
+        if to == self.rank() { root.gather_into_root(own, all) } else { root.gather_into(own) }
+    }
+
+    fn gather(&self, own: &[f64], all: &mut [f64]) {
+        self.0.all_gather_into(own, all);
+    }
+}
+
+impl Numbering {
+    /// Adds what the interiors of all ranks contribute to a panel of the Schur complement, in the order of the ranks. Collective.
+    fn add_schur_complements(
+        &self,
+        world: &SimpleCommunicator,
+        interior: &Cholesky,
+        matrix: &mut DensePanels,
+        panel: usize,
+    ) {
+        let (columns, owner) = matrix.columns(panel);
+        let own = interior.last_columns(self.positions(self.rank, &columns));
+        let root = world.process_at_rank(owner as i32);
+        if owner != self.rank {
+            root.gather_varcount_into(&own[..]);
+            return;
+        }
+        let (mut counts, mut starts, mut total) = (Vec::new(), Vec::new(), 0);
+        for rank in 0..world.size() as usize {
+            let last = self.of(rank).len();
+            let count: usize = self.positions(rank, &columns).map(|at| last - at).sum();
+            counts.push(count as Count);
+            starts.push(total);
+            total += count as Count;
+        }
+        let mut all = vec![0.0; total as usize];
+        root.gather_varcount_into_root(
+            &own[..],
+            &mut PartitionMut::new(&mut all[..], &counts[..], &starts[..]),
+        );
+        let mut entries = all.iter();
+        for rank in 0..world.size() as usize {
+            let numbers = self.of(rank);
+            for at in self.positions(rank, &columns) {
+                let Some(column) = matrix.column_mut(numbers[at] as usize) else { continue };
+                for (&row, value) in numbers[at..].iter().zip(&mut entries) {
+                    column[(row - numbers[at]) as usize] += value;
+                }
+            }
+        }
+    }
 }
 
 impl Substructures {
@@ -70,47 +171,27 @@ impl Substructures {
             }
         }
         (interface..).zip(&contact).for_each(|(number, &at)| numbers[at] = number);
-        let mut substructures = Self {
+        let mut last: Vec<(u32, usize)> = Vec::new();
+        for (&node, numbers) in nodes.iter().zip(numbers.chunks_exact(D)) {
+            let Some(local) = local_node(mesh.owned, mesh.first_node, &mesh.ghosts, node) else { continue };
+            let numbered = numbers.iter().enumerate().filter(|(_, number)| **number != NONE);
+            last.extend(numbered.map(|(i, &number)| (number, local * D + i)));
+        }
+        last.sort_unstable();
+        let (own, last): (Vec<u32>, Vec<usize>) = last.into_iter().unzip();
+        Ok(Self {
             dimension: D,
             owned: mesh.owned,
-            local: mesh.nodes.len(),
             first_node: mesh.first_node,
             ghosts: mesh.ghosts.clone(),
             total: interface as usize + contact.len(),
             interface: interface as usize,
             nodes,
             numbers,
-            last: Vec::new(),
-        };
-        let mut last: Vec<(u32, usize)> = Vec::new();
-        for (&node, numbers) in substructures.nodes.iter().zip(substructures.numbers.chunks_exact(D)) {
-            let Some(local) = substructures.local_node(node) else { continue };
-            let numbered = numbers.iter().enumerate().filter(|(_, number)| **number != NONE);
-            last.extend(numbered.map(|(i, &number)| (number, local * D + i)));
-        }
-        last.sort_unstable();
-        substructures.last = last.into_iter().map(|(_, unknown)| unknown).collect();
-        Ok(substructures)
-    }
-
-    /// The local number of a node of this rank, owned or ghost.
-    fn local_node(&self, global: u32) -> Option<usize> {
-        let own = (global as usize).wrapping_sub(self.first_node);
-        if own < self.owned {
-            return Some(own);
-        }
-        self.ghosts.binary_search(&global).ok().map(|ghost| self.owned + ghost)
-    }
-
-    /// Global number of a local node.
-    fn global_node(&self, local: usize) -> u32 {
-        if local < self.owned { (self.first_node + local) as u32 } else { self.ghosts[local - self.owned] }
-    }
-
-    /// The number of an unknown of this rank.
-    fn number(&self, unknown: usize) -> u32 {
-        let node = self.nodes.binary_search(&self.global_node(unknown / self.dimension));
-        node.map_or(NONE, |node| self.numbers[node * self.dimension + unknown % self.dimension])
+            last,
+            numbering: Rc::new(Numbering::new(session.world(), &own)?),
+            order: None,
+        })
     }
 
     /// The rows of the matrix between the nodes of interface and contact, of all ranks. Collective.
@@ -138,7 +219,7 @@ impl Substructures {
         let (d, size) = (self.dimension, self.dimension * self.dimension);
         let mut of_ghosts: Vec<Vec<(u32, usize)>> = vec![Vec::new(); self.ghosts.len()];
         let mut local = BlockRows {
-            offsets: Vec::with_capacity(self.local + 1),
+            offsets: Vec::with_capacity(self.owned + self.ghosts.len() + 1),
             columns: Vec::with_capacity(rows.columns.len()),
             values: Vec::with_capacity(rows.values.len()),
         };
@@ -146,8 +227,9 @@ impl Substructures {
         let mut sorted = Vec::new();
         for (row, range) in rows.offsets.windows(2).enumerate() {
             sorted.clear();
-            sorted
-                .extend((range[0]..range[1]).filter_map(|at| Some((self.local_node(rows.columns[at])?, at))));
+            sorted.extend((range[0]..range[1]).filter_map(|at| {
+                Some((local_node(self.owned, self.first_node, &self.ghosts, rows.columns[at])?, at))
+            }));
             sorted.sort_unstable();
             for &(column, at) in &sorted {
                 local.columns.push(column as u32);
@@ -175,6 +257,15 @@ impl Substructures {
     }
 }
 
+/// The local number of a node of this rank: the nodes it owns start with `first`, and the ghosts follow.
+fn local_node(owned: usize, first: usize, ghosts: &[u32], global: u32) -> Option<usize> {
+    let own = (global as usize).wrapping_sub(first);
+    if own < owned {
+        return Some(own);
+    }
+    ghosts.binary_search(&global).ok().map(|ghost| owned + ghost)
+}
+
 /// Global numbers of the nodes that cells of several ranks touch, ascending. Collective.
 pub(super) fn interface_nodes<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Vec<u32>, Agreed> {
     let mut nodes = gather(session.world(), &mesh.ghosts)?;
@@ -196,13 +287,12 @@ pub(super) enum Factors {
 #[derive(Debug)]
 pub(super) struct Shared {
     interior: Cholesky,
-    /// The numbers of the unknowns that are left of all ranks, in the order in which ranks gather them.
-    numbers: Vec<u32>,
-    gathering: Gathering,
-    /// The range of this rank in these numbers.
-    own: Range<usize>,
+    numbering: Rc<Numbering>,
+    /// The values of the unknowns that are left of all ranks.
     gathered: Vec<f64>,
     interface: DenseFactor,
+    /// The factor of the contact unknowns, until it is taken.
+    last_factor: Vec<f64>,
     /// Values of the unknowns of interface and contact; those of the contact start at `contact`.
     values: Vec<f64>,
     contact: usize,
@@ -211,16 +301,28 @@ pub(super) struct Shared {
 }
 
 impl Factors {
-    /// Factors the matrix with these rows on this rank, in the order of elimination in use, and the contact unknowns last; `None` on
+    /// Factors the matrix with these rows on this rank, in the order of elimination in use, with the contact unknowns last; `None` on
     /// all ranks where these can't be last. Collective, with the same outcome and precision on all ranks.
     pub(super) fn new(
         world: &SimpleCommunicator,
-        substructures: &Substructures,
+        substructures: &mut Substructures,
         rows: &BlockRows,
-        known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Option<Self>, Agreed> {
-        let d = substructures.dimension;
+        let factors = Self::of(world, substructures, rows, precision)?;
+        if let Some(factors) = &factors {
+            substructures.order.get_or_insert_with(|| factors.order().to_vec());
+        }
+        Ok(factors)
+    }
+
+    fn of(
+        world: &SimpleCommunicator,
+        substructures: &Substructures,
+        rows: &BlockRows,
+        precision: Precision,
+    ) -> Result<Option<Self>, Agreed> {
+        let (d, known) = (substructures.dimension, substructures.order.as_deref());
         if world.size() == 1 {
             let factor = Cholesky::new(d, rows, &substructures.last, known, precision);
             return Ok(agree(world, factor)?.map(Self::Whole));
@@ -251,7 +353,7 @@ impl Factors {
     }
 
     /// The order of elimination on this rank.
-    pub(super) fn order(&self) -> &[u32] {
+    fn order(&self) -> &[u32] {
         match self {
             Self::Whole(factor) => factor.order(),
             Self::Shared(shared) => shared.interior.order(),
@@ -275,11 +377,16 @@ impl Factors {
     }
 
     /// The diagonal block of the contact unknowns: column after column, each from the diagonal down.
-    pub(super) fn last_factor(&self) -> Vec<f64> {
+    pub(super) fn take_last_factor(&mut self) -> Vec<f64> {
         match self {
             Self::Whole(factor) => factor.last_block(),
-            Self::Shared(shared) => shared.interface.last_columns(shared.values.len() - shared.contact),
+            Self::Shared(shared) => std::mem::take(&mut shared.last_factor),
         }
+    }
+
+    /// Whether substitutions solve with the diagonal block of the contact unknowns as well.
+    pub(super) fn solves_contact(&self) -> bool {
+        matches!(self, Self::Whole(_))
     }
 
     /// Forward substitution: solves `L y = b`, given the values of this rank. Collective.
@@ -290,7 +397,8 @@ impl Factors {
         }
     }
 
-    /// The part of `y` of the contact unknowns of all ranks.
+    /// The values of the contact unknowns of all ranks: their part of `y`, or, where [`Factors::solves_contact`] is false, what the forward
+    /// substitution leaves of their right-hand side, and the solution with which the backward substitution starts.
     pub(super) fn last_mut(&mut self) -> &mut [f64] {
         match self {
             Self::Whole(factor) => factor.last_mut(),
@@ -323,12 +431,13 @@ impl Shared {
         mut interior: Cholesky,
         skeleton: &BlockRows,
     ) -> Result<Self, Agreed> {
-        let total = substructures.total;
-        let own: Vec<u32> =
-            interior.last_unknowns().iter().map(|&unknown| substructures.number(unknown as usize)).collect();
-        let gathering = Gathering::new(world, own.len())?;
-        let numbers = gather(world, &own)?;
-        let mut matrix = DensePanels::zeros(total, world.rank() as usize, world.size() as usize);
+        let (team, numbering) = (Ranks(world), &substructures.numbering);
+        let moved =
+            || Error::Internal("unknowns of an interface are not in the order of their numbers".into());
+        let is_ordered =
+            interior.last_unknowns().iter().map(|&u| u as usize).eq(substructures.last.iter().copied());
+        agree(world, is_ordered.then_some(()).ok_or_else(moved))?;
+        let mut matrix = DensePanels::zeros(substructures.total, substructures.interface, &team);
         let d = substructures.dimension;
         for (row, range) in skeleton.offsets.windows(2).enumerate() {
             for at in range[0]..range[1] {
@@ -338,42 +447,24 @@ impl Shared {
                     if i != NONE
                         && j != NONE
                         && i >= j
-                        && let Some(entry) = matrix.entry_mut(i as usize, j as usize)
+                        && let Some(column) = matrix.column_mut(j as usize)
                     {
-                        *entry = skeleton.values[at * d * d + k];
+                        column[(i - j) as usize] = skeleton.values[at * d * d + k];
                     }
                 }
             }
         }
-        for rank in 0..world.size() {
-            let numbers = &numbers[gathering.range(rank as usize)];
-            let mut schur = if rank == world.rank() {
-                interior.take_last_block()
-            } else {
-                vec![0.0; numbers.len() * (numbers.len() + 1) / 2]
-            };
-            world.process_at_rank(rank).broadcast_into(&mut schur[..]);
-            let mut entries = schur.iter();
-            for (at, &column) in numbers.iter().enumerate() {
-                for (&row, value) in numbers[at..].iter().zip(&mut entries) {
-                    let (column, row) = (column.min(row) as usize, column.max(row) as usize);
-                    if let Some(entry) = matrix.entry_mut(row, column) {
-                        *entry += value;
-                    }
-                }
-            }
+        for panel in 0..matrix.count() {
+            numbering.add_schur_complements(world, &interior, &mut matrix, panel);
         }
-        let factored = matrix.factor(|panel, values| {
-            world.process_at_rank(panel as i32 % world.size()).broadcast_into(values);
-        });
-        let interface = agree(world, factored)?;
+        interior.drop_last_block();
+        let (interface, last_factor) = agree(world, matrix.factor(&team, interior.precision()))?;
         Ok(Self {
-            gathered: vec![0.0; gathering.total()],
-            own: gathering.range(world.rank() as usize),
-            gathering,
-            numbers,
+            gathered: vec![0.0; numbering.gathering.total()],
+            numbering: numbering.clone(),
             interface,
-            values: vec![0.0; total],
+            last_factor,
+            values: vec![0.0; substructures.total],
             contact: substructures.interface,
             local: vec![0.0; interior.order().len()],
             interior,
@@ -390,17 +481,18 @@ impl Shared {
         own.copy_from_slice(right_hand_side);
         ghosts.fill(0.0);
         self.interior.forward(&self.local)?;
-        self.gathering.gather(&SimpleCommunicator::world(), self.interior.last_mut(), &mut self.gathered);
+        let world = SimpleCommunicator::world();
+        self.numbering.gathering.gather(&world, self.interior.last_mut(), &mut self.gathered);
         self.values.fill(0.0);
-        for (&number, value) in self.numbers.iter().zip(&self.gathered) {
+        for (&number, value) in self.numbering.all.iter().zip(&self.gathered) {
             self.values[number as usize] += value;
         }
-        self.interface.forward(&mut self.values)
+        self.interface.forward(&Ranks(&world), &mut self.values)
     }
 
     fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
-        self.interface.backward(&mut self.values)?;
-        let numbers = &self.numbers[self.own.clone()];
+        self.interface.backward(&Ranks(&SimpleCommunicator::world()), &mut self.values)?;
+        let numbers = self.numbering.of(self.numbering.rank);
         for (last, &number) in self.interior.last_mut().iter_mut().zip(numbers) {
             *last = self.values[number as usize];
         }
@@ -415,30 +507,22 @@ impl Shared {
 #[derive(Debug)]
 pub(super) struct SharedFactor {
     substructures: Substructures,
-    /// The order of elimination, once it is known.
-    order: Option<Vec<u32>>,
     factors: Option<Factors>,
 }
 
 impl SharedFactor {
     /// For matrices on the nodes of a mesh; `None` where the dense matrix of the interface would be too large. Collective.
     pub(super) fn new<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Result<Option<Self>> {
-        if interface_nodes(session, mesh)?.len() * D > MAX_INTERFACE_UNKNOWNS {
-            return Ok(None);
-        }
         let substructures = Substructures::new(session, mesh, &Frames::new::<D>(session, mesh, &[])?)?;
-        Ok(Some(Self { substructures, order: None, factors: None }))
+        Ok((substructures.total <= MAX_INTERFACE_UNKNOWNS).then_some(Self { substructures, factors: None }))
     }
 }
 
 impl OwnPreconditioner for SharedFactor {
     fn set_up(&mut self, rows: &BlockRows) -> Result<()> {
         self.factors = None;
-        let (world, order) = (SimpleCommunicator::world(), self.order.as_deref());
-        self.factors = Factors::new(&world, &self.substructures, rows, order, Precision::Double)?;
-        if let Some(factors) = &self.factors {
-            self.order.get_or_insert_with(|| factors.order().to_vec());
-        }
+        let world = SimpleCommunicator::world();
+        self.factors = Factors::new(&world, &mut self.substructures, rows, Precision::Double)?;
         Ok(())
     }
 
