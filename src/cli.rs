@@ -8,6 +8,7 @@ use crate::{
     },
     job::{self, Job, Loaded},
     laws::nearest::nearest,
+    mesh::gmsh,
     parallel::{
         agreement::Agreed,
         session::{Mpi, Session},
@@ -22,7 +23,7 @@ use std::{
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 const EXAMPLES: &str = "\
@@ -31,6 +32,7 @@ Examples:
   solver check job.toml                    check it; print its effects and its cost
   solver job.toml --set time.step=0.01     run it with another step
   solver job.toml --restart                continue a stopped run
+  solver run first.toml second.toml        run stages one after another ([initial] from)
   solver partition m.msh -n 64 -o m.h5     split a mesh for runs on up to 64 processes
   solver describe contact                  print the meaning of the keys of [[contact]]
 
@@ -79,7 +81,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Print the contents of a checkpoint, a field file or a partitioned mesh.
+    /// Print the contents of a mesh, a partitioned mesh, a checkpoint or a field file.
     Inspect {
         /// The file.
         file: PathBuf,
@@ -119,14 +121,21 @@ enum Command {
 
 #[derive(Debug, Args)]
 struct RunArguments {
-    /// The job file.
-    job: PathBuf,
-    /// Override a key: time.step=0.01, contact.0.quadrature=gauss.
+    /// The job file; several are stages, which run one after another.
+    #[arg(value_name = "JOB", required = true)]
+    jobs: Vec<PathBuf>,
+    /// Override a key of every job: time.step=0.01, contact.0.quadrature=gauss.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Continue from the newest intact checkpoint of the output folder, or from this file.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
+    /// Print errors only; run.log has the rest.
+    #[arg(short, long, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print and log every step, also of long runs.
+    #[arg(short, long)]
+    verbose: bool,
     /// Start even if the output folder contains results of another job or an unfinished run, and overwrite them.
     #[arg(long, conflicts_with = "restart")]
     force: bool,
@@ -161,6 +170,7 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
         Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),
+        Some(Command::Inspect { file }) if is_mesh(&file) => say(&gmsh::inspect(&file)?),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
         Some(Command::Partition { mesh, parts, output }) => partition(&mesh, parts, &output),
         Some(Command::Study { study, overrides, ablate, part }) => {
@@ -198,9 +208,17 @@ fn remedy(arguments: &[OsString]) -> Option<String> {
     let first = words.first()?;
     if first.starts_with('-') {
         let command = words.iter().find(|word| COMMANDS.contains(word))?;
-        return Some(format!("the command comes first, followed by its options: solver {command} ..."));
+        return Some(command_first(command));
     }
     if COMMANDS.contains(first) { None } else { misspelt_command(Path::new(first)) }
+}
+
+fn command_first(command: &str) -> String {
+    format!("the command comes first, followed by its options: solver {command} ...")
+}
+
+fn is_mesh(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "msh")
 }
 
 fn is_job(path: &Path) -> bool {
@@ -217,6 +235,9 @@ fn job_behind_restart(job: &str) -> String {
 /// The message for a word that is not a file but resembles a command.
 fn misspelt_command(path: &Path) -> Option<String> {
     let word = path.to_str()?;
+    if COMMANDS.contains(&word) && !path.exists() {
+        return Some(command_first(word));
+    }
     let near = nearest(word, COMMANDS)?;
     (!path.exists() && path.extension().is_none())
         .then(|| format!("`{word}` is neither a command nor a job file; did you mean `solver {near}`?"))
@@ -324,12 +345,55 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         }
         Some(Some(file)) => Start::From(file.clone()),
     };
-    if let Some(words) = misspelt_command(&arguments.job) {
+    if let Some(words) = arguments.jobs.iter().find_map(|job| misspelt_command(job)) {
         return Err(Error::Refused(words));
     }
-    on_all_ranks(&arguments.job, &arguments.overrides, |session, loaded, clock| {
-        Ok(run::run(session, loaded, &from, clock)?)
+    if arguments.jobs.len() > 1 && arguments.restart.is_some() {
+        let words =
+            "--restart continues one job: continue the stage that was stopped, then run the next ones";
+        return Err(Error::Refused(words.into()));
+    }
+    in_session(|session, clock| {
+        let colour = std::io::stderr().is_terminal();
+        let load = |job: &PathBuf| Job::load_coloured(job, &arguments.overrides, colour);
+        // All jobs are checked before the first one runs.
+        let stages = arguments.jobs.iter().map(load).collect::<Result<Vec<Loaded>>>().and_then(stages);
+        let mut clock = Clock { on_terminal: !arguments.quiet, logs_every_step: arguments.verbose, ..clock };
+        for stage in session.agree(stages)? {
+            let exit = run::run(session, stage, &from, clock)?;
+            if exit != Exit::Done {
+                return Ok(exit);
+            }
+            clock = Clock { began: Instant::now(), launched: Duration::ZERO, ..clock };
+        }
+        Ok(Exit::Done)
     })
+}
+
+/// Refuses stages that would overwrite each other's results, or whose options of PETSc would apply to later ones.
+fn stages(stages: Vec<Loaded>) -> Result<Vec<Loaded>> {
+    for (at, stage) in stages.iter().enumerate() {
+        for later in &stages[at + 1..] {
+            let folder = stage.job.output_folder();
+            if folder == later.job.output_folder() {
+                let help = "give each stage its own [output] folder";
+                return Err(later.fault(
+                    "output.folder",
+                    format!("two stages write to {}", folder.display()),
+                    help,
+                ));
+            }
+            if stage.job.solver.petsc.keys().any(|option| !later.job.solver.petsc.contains_key(option)) {
+                let help = "give all stages the same options, or run them separately";
+                return Err(later.fault(
+                    "solver.petsc",
+                    "options of PETSc of an earlier stage apply here too",
+                    help,
+                ));
+            }
+        }
+    }
+    Ok(stages)
 }
 
 fn check(job: &Path, overrides: &[String], json: bool) -> Result<Exit> {
@@ -371,7 +435,7 @@ fn in_session(work: impl FnOnce(&Session, Clock) -> Result<Exit>) -> Result<Exit
     let began = Instant::now();
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
-    let clock = Clock { began, launched: began.elapsed(), on_terminal: true };
+    let clock = Clock { began, launched: began.elapsed(), on_terminal: true, logs_every_step: false };
     let exit = session.agree(work(&session, clock)).unwrap_or_else(|error| printed(&session, &error));
     if exit != Exit::Done && was_abandoned() {
         session.world().barrier();

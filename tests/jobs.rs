@@ -1,8 +1,8 @@
 //! Every job under jobs/ reproduces the numbers of its `[check]` table, on one and on two ranks.
 //!
 //! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
-//! end: `history.COLUMN` and `probe.NAME.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or `.min.` over the
-//! boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
+//! end: `history.COLUMN`, `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or
+//! `.min.` over the boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -85,6 +85,9 @@ fn measured(folder: &Path, quantity: &str) -> Option<f64> {
         ["probe", name, side, field] => {
             let all = column(folder, "probes.csv", Some(("probe", name)), field)?.into_iter();
             extreme(side, all)
+        }
+        ["resultant", source, field] => {
+            column(folder, "resultants.csv", Some(("source", source)), field)?.pop()
         }
         ["history", field] => column(folder, "history.csv", None, field)?.pop(),
         ["profile", boundary, side, field] => {

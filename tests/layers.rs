@@ -514,7 +514,7 @@ fn parameters(stream: TokenStream, found: &mut Vec<(String, usize)>) {
             depth == 0 && is(token, ',')
         });
         let is_parameter = |part: &&[TokenTree]| {
-            !part.is_empty() && !part.iter().take(4).any(|token| is_word(token, "self"))
+            !part.is_empty() && !part.iter().take(5).any(|token| is_word(token, "self"))
         };
         found.push((name.to_string(), parts.filter(is_parameter).count()));
     }

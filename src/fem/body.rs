@@ -12,7 +12,7 @@ use crate::{
         effect::{
             Contact, Curvature, Effect, Energy, Evaluation, FlowProperties, Form, History, HistoryStore,
             Load, Outcome, PeakSquares, Peaks, Phases, STORED_IN_CONTACT, Step, StressError, SurfaceEffect,
-            Term,
+            SurfaceForce, Term,
         },
         space::{Batch, Geometry, Needs, Nodal, assemble},
         state::State,
@@ -21,11 +21,12 @@ use crate::{
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
-        tensor::{Mandel, add_scaled, dot, larger},
+        tensor::{Mandel, larger},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
+use std::cell::RefCell;
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -49,6 +50,8 @@ pub struct Body<const D: usize, const S: usize> {
     step: Step,
     /// The displacement with ghosts of which the cells have their trial histories at the end of the step; empty: of none.
     evaluated: Vec<f64>,
+    /// Forces of the interior at supports; empty unless they are requested.
+    at_supports: RefCell<SupportForces>,
     /// The fastest relaxation of power laws in 1/s since the last [`Body::take_flow_step_bound`].
     fastest_flow: f64,
 }
@@ -74,6 +77,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             evaluation,
             step: Step::default(),
             evaluated: Vec::new(),
+            at_supports: RefCell::default(),
             fastest_flow: 0.0,
         }
     }
@@ -136,13 +140,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 for effect in called.select_mut(effects) {
                     let before = if let Evaluation::Start(_) = at { Some(batch.stress) } else { None };
                     effect.evaluate(at, step, batch, &mut outcome);
-                    let Some(before) = before else { continue };
-                    for lane in 0..batch.count {
-                        let cell = batch.cells.simplex(lane);
-                        let gradients: f64 = cell.gradients.as_flattened().iter().map(|g| g * g).sum();
-                        let added = add_scaled(&batch.stress.lane(lane), -1.0, &before.lane(lane));
-                        squares += cell.volume * cell.volume * gradients * dot(&added, &added);
-                    }
+                    squares += before.map_or(0.0, |before| batch.square_of_added_forces(&before));
                 }
             }
             batch.scatter(mesh, forces);
@@ -154,6 +152,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
     pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
         let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
+        let SupportForces { packs, forces } = &mut *self.at_supports.borrow_mut();
+        forces.fill(0.0);
         with_nodal(state, |nodal| {
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
             energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
@@ -174,6 +174,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
                     .for_each(|effect| effect.add_stress(self.evaluation, step, batch));
                 if strained {
                     squares.update(batch.count, &batch.strain, &batch.stress);
+                }
+                if packs.get(batch.number).is_some_and(|requested| *requested) {
+                    batch.scatter(&self.mesh, forces);
                 }
             });
             Ok((energy, squares.peaks()))
@@ -306,6 +309,63 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(out)
     }
 
+    /// Appends the forces of the surface effects in the step just committed.
+    pub fn write_surface_forces(&self, state: &State, forces: &mut Vec<SurfaceForce<D>>) -> Result<()> {
+        let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        with_nodal(state, |nodal| {
+            self.surface_effects.iter().for_each(|e| e.write_forces(self.evaluation, step, nodal, forces));
+        })
+    }
+
+    /// Requests the forces of the interior at nodes of the packs of cells for which this holds, from the next energy balance on.
+    pub fn request_support_forces(&self, packs: Vec<bool>) {
+        let forces = vec![0.0; self.mesh.nodes.len() * D];
+        *self.at_supports.borrow_mut() = SupportForces { packs, forces };
+    }
+
+    /// Passes on the forces at the local nodes of stress and inertia in the requested packs of cells after a committed step whose energy
+    /// was computed: minus what all other forces must balance there. In the step the velocity has changed since `velocity_before` by
+    /// `length` in s times its rate.
+    pub fn with_support_forces<T>(
+        &self,
+        state: &State,
+        (velocity_before, length): (&[f64], f64),
+        read: impl FnOnce(&[f64]) -> T,
+    ) -> Result<T> {
+        let SupportForces { packs, forces } = &mut *self.at_supports.borrow_mut();
+        let inertia = Called::filter(&self.effects, |effect| effect.term().form() == Some(Form::Mass));
+        if !inertia.is_empty() {
+            let needs = Needs { velocity_change: true, ..Needs::default() };
+            let requested = (0..packs.len()).filter(|number| packs[*number]);
+            with_nodal(state, |nodal| {
+                let nodal = Nodal { previous_velocity: velocity_before, ..nodal };
+                let cells = (&self.mesh, &self.geometry);
+                Batch::for_each(requested, cells, nodal, needs, |batch: &mut Batch<D, S>| {
+                    batch.velocity = batch.velocity_change;
+                    inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
+                    for force in &mut batch.force[..=D] {
+                        force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= -1.0 / length);
+                    }
+                    batch.scatter(&self.mesh, forces);
+                });
+            })?;
+        }
+        Ok(read(forces))
+    }
+
+    /// Strain of the displacement, one a cell.
+    pub fn strain(&self, state: &State) -> Result<Vec<Mandel<S>>> {
+        let mut out = vec![[0.0; S]; self.mesh.cell_count()];
+        let needs = Needs { strain: true, ..Needs::default() };
+        with_nodal(state, |nodal| {
+            Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
+                let strains = out[batch.first..][..batch.count].iter_mut().enumerate();
+                strains.for_each(|(lane, out)| *out = batch.strain.lane(lane));
+            });
+        })?;
+        Ok(out)
+    }
+
     /// Writes the nodal forces of the loads at `time`. Collective, also where a rank fails.
     pub fn write_loads(&self, time: f64, forces: &mut DistributedVector) -> Result<()> {
         let result = {
@@ -390,6 +450,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
     fn needs(&self, phase: impl Fn(Phases) -> Option<Needs>) -> Option<Needs> {
         self.effects.iter().filter_map(|e| phase(e.phases(self.evaluation))).reduce(Needs::or)
     }
+}
+
+/// Forces of the interior on the nodes of some packs of cells.
+#[derive(Debug, Default)]
+struct SupportForces {
+    /// Whether each pack is one of them; empty: none.
+    packs: Vec<bool>,
+    /// At the local nodes, in N.
+    forces: Vec<f64>,
 }
 
 /// A set of effects, by their positions: one bit each.

@@ -4,3 +4,4 @@ pub mod space;
 pub mod state;
 pub mod effect;
 pub mod body;
+pub mod resultants;

@@ -1,7 +1,7 @@
 //! Loads a job from a file or a text, and refuses it if it has faults.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -135,6 +135,9 @@ impl Job {
         if let Mesh::File(path) = &mut self.mesh {
             *path = normal(&folder.join(&*path));
         }
+        if let Some(path) = self.initial.as_mut().and_then(|initial| initial.from.as_mut()) {
+            *path = normal(&folder.join(&*path));
+        }
     }
 }
 
@@ -160,14 +163,40 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
     Err(Error::Refused(format!("{name}: a {} file has at most {LARGEST} bytes", kind.name)))
 }
 
+/// What a file is that begins with these bytes, if it is one that is often given in place of a job.
+fn other_file(bytes: &[u8]) -> Option<&'static str> {
+    let kinds: [(&[u8], &str); 4] = [
+        (b"$MeshFormat", "a Gmsh mesh, not a job: name it in a job, [mesh] file = \"FILE.msh\""),
+        (
+            b"\x89HDF\r\n",
+            "an HDF5 file, not a job: solver inspect FILE shows what it contains; a run continues from a checkpoint with \
+             solver JOB.toml --restart FILE.h5",
+        ),
+        (&[0xff, 0xfe], "a text in UTF-16: save it in UTF-8"),
+        (&[0xfe, 0xff], "a text in UTF-16: save it in UTF-8"),
+    ];
+    kinds.into_iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, what)| what)
+}
+
 /// The text of a file of this kind, and the folder it is in.
 pub(crate) fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
     let absolute = std::path::absolute(path).map_err(|error| Error::unreadable(path, error))?;
     let folder = absolute.parent().unwrap_or(Path::new("/")).to_owned();
     let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes))
-        .map_err(|error| Error::unreadable(path, error))?;
+    let unreadable = |error: std::io::Error| match error.kind() {
+        ErrorKind::NotFound => {
+            Error::unreadable(path, format!("there is no {} file of this name", kind.name))
+        }
+        ErrorKind::IsADirectory => {
+            Error::unreadable(path, format!("it is a folder, not a {} file", kind.name))
+        }
+        _ => Error::unreadable(path, error),
+    };
+    let read = |file: File| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes);
+    File::open(path).and_then(read).map_err(unreadable)?;
+    if let Some(what) = other_file(&bytes) {
+        return Err(Error::Refused(format!("{} is {what}", path.display())));
+    }
     refuse_long(kind, bytes.len(), &path.display().to_string())?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
@@ -175,4 +204,26 @@ pub(crate) fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
         Error::Refused(format!("{}:{line}: not a text file (UTF-8 expected)", path.display()))
     })?;
     Ok((text, folder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_no_jobs_are_named_as_what_they_are() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let said = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).expect("written");
+            Job::load(&path, &[]).expect_err("no job").to_string()
+        };
+        assert!(said("a.msh", b"$MeshFormat\n4.1 0 8\n").contains("a Gmsh mesh, not a job"));
+        assert!(said("a.h5", b"\x89HDF\r\n\x1a\n").contains("an HDF5 file, not a job"));
+        assert!(said("a.toml", b"\xff\xfe[\0").contains("UTF-16: save it in UTF-8"));
+        let missing = Job::load(&folder.path().join("b.toml"), &[]).expect_err("missing").to_string();
+        assert!(missing.contains("cannot read") && missing.contains("there is no job file"), "{missing}");
+        let directory = Job::load(folder.path(), &[]).expect_err("a folder").to_string();
+        assert!(directory.contains("it is a folder, not a job file"), "{directory}");
+    }
 }

@@ -136,9 +136,42 @@ pub fn von_mises_square<const S: usize>(t: &Mandel<S>) -> f64 {
     0.5 * (a * a + b * b + c * c) + shear
 }
 
+/// The eigenvalues in descending order; missing components are zero. Closed form after O. K. Smith, Communications of the ACM 4 (1961)
+/// 168.
+pub fn principal_values<const S: usize>(t: &Mandel<S>) -> [f64; 3] {
+    let mut a = [[0.0; 3]; 3];
+    for c in 0..S {
+        let (i, j, factor) = component::<S>(c);
+        (a[i][j], a[j][i]) = (t[c] / factor, t[c] / factor);
+    }
+    let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
+    (0..3).for_each(|i| a[i][i] -= mean);
+    let square: f64 = a.as_flattened().iter().map(|x| x * x).sum();
+    let radius = (square / 6.0).sqrt();
+    if radius == 0.0 {
+        return [mean; 3];
+    }
+    let rows = a.map(|row| row.map(|x| x / radius));
+    let angle = (0.5 * dot(&rows[0], &cross(&rows[1], &rows[2]))).clamp(-1.0, 1.0).acos() / 3.0;
+    let [first, last] =
+        [0.0, 2.0].map(|turn| mean + 2.0 * radius * (angle + turn * std::f64::consts::PI / 3.0).cos());
+    [first, 3.0 * mean - first - last, last]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn principal_values_are_the_eigenvalues() {
+        let close = |found: [f64; 3], expected: [f64; 3]| {
+            (0..3).for_each(|i| assert!((found[i] - expected[i]).abs() < 1e-14, "{found:?} {expected:?}"));
+        };
+        close(principal_values(&[2.0, 2.0, 3.0 * SQRT_2]), [5.0, 0.0, -1.0]);
+        close(principal_values(&[2.0, -1.0, 4.0, 0.0]), [4.0, 2.0, -1.0]);
+        close(principal_values(&[1.0, 1.0, 1.0, SQRT_2, SQRT_2, SQRT_2]), [3.0, 0.0, 0.0]);
+        close(principal_values(&[-3.0, -3.0, -3.0, 0.0, 0.0, 0.0]), [-3.0; 3]);
+    }
 
     #[test]
     fn a_maximum_keeps_what_is_not_a_number() {

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, state::State},
+    fem::{body::Body, effect::Form, state::State},
     job::{Job, Loaded, Probe},
     mesh::{Mesh, check::Quality},
     parallel::{agreement::Agreed, session::Session},
@@ -43,9 +43,12 @@ pub struct Report {
     certificates: Certificates,
     partition: PartitionQuality,
     cell_quality: Quality,
+    extent: Vec<[f64; 2]>,
     estimate: Estimate,
     warnings: Vec<String>,
     output_folder: String,
+    #[serde(skip)]
+    has_impacts: bool,
     #[serde(skip)]
     header: Vec<String>,
 }
@@ -108,11 +111,39 @@ fn report<const D: usize, const S: usize>(
         certificates: ready.certificates.clone(),
         partition: PartitionQuality { edge_cut: mesh.edge_cut, imbalance: mesh.imbalance },
         cell_quality: quality,
+        extent: extent(session, mesh),
         estimate: Estimate::new(session, body, &inventory, preconditioner, problem),
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
+        has_impacts: body.has_form(Form::Mass)
+            && body.contacts.iter().any(|c| c.law.depends_on_displacement()),
         header: header::lines(session, loaded, ready)?,
     })
+}
+
+/// The lowest and the highest coordinate of the body along each axis in m. Collective.
+fn extent<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Vec<[f64; 2]> {
+    let along = |i: usize| {
+        let places = mesh.nodes.iter().map(|node| node[i]);
+        let [low, high] = places.fold([f64::INFINITY; 2], |[low, high], x| [low.min(x), high.min(-x)]);
+        let [low, high] = session.largest([-low, -high]);
+        [-low, high]
+    };
+    (0..D).map(along).collect()
+}
+
+/// Which time scheme suits a job, and why.
+fn advice(scheme: &str, bound: Option<f64>, has_impacts: bool) -> String {
+    let own = match bound {
+        Some(bound) => format!("{scheme} is stable with steps below {bound:.4e} s"),
+        None => format!("{scheme} is stable with steps of any length"),
+    };
+    let better = match (scheme, has_impacts) {
+        ("bdf2", true) => "; implicit_euler does not overshoot in impacts, which this job may have",
+        (_, true) | ("bdf2", false) => "",
+        (_, false) => "; bdf2 is of second order where motions are smooth",
+    };
+    format!("stability  {own}{better}")
 }
 
 impl Report {
@@ -130,9 +161,13 @@ impl Report {
 
     /// Lines that the log of a run does not have.
     fn lines(&self) -> Vec<String> {
+        let of_axis = |(axis, [low, high]): (&str, &[f64; 2])| format!("{axis} from {low} to {high} m");
+        let extent: Vec<String> = ["x", "y", "z"].into_iter().zip(&self.extent).map(of_axis).collect();
         let mut lines = vec![
             format!("unknowns   {} velocity components; supports hold the others", self.unknowns),
             format!("cells      shape quality at least {:.3} of 1", self.cell_quality.smallest),
+            format!("extent     {}", extent.join(", ")),
+            advice(self.scheme, self.certificates.explicit_step_bound, self.has_impacts),
         ];
         if self.newton {
             lines.push(format!("contact    {} points", self.contact_points));

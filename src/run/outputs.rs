@@ -1,5 +1,6 @@
 //! All files of a run, opened for a new start or to continue.
 
+use super::Simulation;
 use crate::{
     error::Result,
     fem::{body::Body, state::State},
@@ -12,6 +13,7 @@ use crate::{
         output_field::Converged,
         probes::Probes,
         profiles::Profiles,
+        resultants::ResultantTable,
         whole_file::write_whole,
     },
     job::{Every, Job},
@@ -29,6 +31,7 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     folder: PathBuf,
     identity: Identity,
     history: Option<History>,
+    resultants: ResultantTable<D>,
     probes: Probes<D>,
     profiles: Profiles<D>,
     fields: FieldOutput<D>,
@@ -72,19 +75,21 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let folder = job.output_folder().to_owned();
         let before = if is_restart && session.is_first() { length_of_all(&folder) } else { 0 };
         let mut profiles = profiles(session, body, job)?;
+        let mut resultants = ResultantTable::new(session, body, state, job)?;
         let (step, time) = (is_restart.then_some(state.step), is_restart.then_some(state.time));
         let fields = FieldOutput::open(session, job, body, time, log)?;
         // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
-        let (every, profiles_every) = (job.output.fields, job.output.profiles);
+        let (every, profiles_every) = (job.output.fields.clone(), job.output.profiles.clone());
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
         let rewrites = if profiles_every.is_some() {
-            due(profiles_every, state)
+            due(&profiles_every, state)
         } else {
-            due(every, state) && !is_there
+            due(&every, state) && !is_there
         };
         let profiled = time.map(|time| if rewrites { time.next_down() } else { time });
         let tables = || {
             write_whole(&folder.join("job.toml"), &job.to_toml()?)?;
+            resultants.open(&folder, step)?;
             probes.open(&folder, step)?;
             profiles.open(&folder, profiled)?;
             History::open(&folder, step)
@@ -97,6 +102,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             folder,
             identity,
             history,
+            resultants,
             probes,
             profiles,
             fields,
@@ -114,21 +120,22 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     pub(super) fn after_step(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
-        state: &State,
+        simulation: &Simulation<D, S>,
         outcome: &StepOutcome,
-        totals: &Totals,
     ) -> Result<()> {
         let start = Instant::now();
+        let Simulation { body, state, scheme, totals, .. } = simulation;
         let mut written = Ok(());
         if let Some(history) = &mut self.history {
             written = history.row(state.step, state.time, state.step_length, outcome, totals);
         }
         session.agree(written)?;
+        let change = scheme.velocity_change(state);
+        self.resultants.write(session, body, state, change, scheme.load())?;
         if !self.probes.is_empty() {
             session.agree(self.probes.write(session, &body.mesh, state))?;
         }
-        self.write_state(session, body, state, [due(self.every, state), due(self.profiles_every, state)])?;
+        self.write_state(session, body, state, [due(&self.every, state), due(&self.profiles_every, state)])?;
         self.fields.write_out_if_due()?;
         self.spent += start.elapsed();
         Ok(())
@@ -136,8 +143,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
 
     /// Writes the fields and profiles of the initial state, if they are due and not in their files yet. Collective.
     pub(super) fn at_start(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
-        let fields = self.lacks_fields(state) && due(self.every, state);
-        let profiles = self.lacks_profiles(state) && due(self.profiles_every, state);
+        let fields = self.lacks_fields(state) && due(&self.every, state);
+        let profiles = self.lacks_profiles(state) && due(&self.profiles_every, state);
         self.write_state(session, body, state, [fields, profiles])
     }
 
@@ -192,6 +199,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Flushes all tables.
     fn flush(&mut self) -> Result<()> {
         self.history.as_mut().map_or(Ok(()), History::flush)?;
+        self.resultants.flush()?;
         self.probes.flush()?;
         self.profiles.flush()
     }
@@ -232,7 +240,8 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
 }
 
 /// Files that grow during a run.
-const GROWING: [&str; 5] = ["history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf"];
+const GROWING: [&str; 6] =
+    ["history.csv", "resultants.csv", "probes.csv", "profiles.csv", "fields.vtkhdf", "fields.xdmf"];
 
 fn length_of_all(folder: &Path) -> u64 {
     GROWING.iter().map(|name| length(&folder.join(name))).sum()
@@ -243,16 +252,30 @@ fn length(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |file| file.len())
 }
 
-/// Whether output of this state is due; that of the initial state always is, if the job says when.
-fn due(every: Option<Every>, state: &State) -> bool {
-    every.is_some_and(|every| is_due(every, state.step, [state.time - state.step_length, state.time]))
+/// Whether output of this state is due; that of the initial state always is, unless the job lists the times.
+fn due(every: &Option<Every>, state: &State) -> bool {
+    let times = [state.time - state.step_length, state.time];
+    every.as_ref().is_some_and(|every| is_due(every, state.step, times))
+}
+
+/// Whether the step just taken reached one of these times.
+pub(super) fn reaches(listed: &[f64], state: &State) -> bool {
+    state.step > 0 && is_among(listed, [state.time - state.step_length, state.time])
+}
+
+/// Whether one of these times lies in the step that went from the time `before` to `after` in s. Steps end at these times.
+fn is_among(listed: &[f64], [before, after]: [f64; 2]) -> bool {
+    let close = 1e-12 * after.abs();
+    listed.iter().any(|time| *time > before + close && *time <= after + close)
 }
 
 /// Whether output is due after this step, which went from the time `before` to `after` in s.
-fn is_due(every: Every, step: u64, [before, after]: [f64; 2]) -> bool {
+fn is_due(every: &Every, step: u64, [before, after]: [f64; 2]) -> bool {
     match every {
+        Every::At(listed) if step == 0 => listed.first() == Some(&0.0),
+        Every::At(listed) => is_among(listed, [before, after]),
         _ if step == 0 => true,
-        Every::Every(steps) => step.is_multiple_of(steps),
+        Every::Every(steps) => step.is_multiple_of(*steps),
         Every::Interval(interval) => {
             let count = |time: f64| (time / interval * (1.0 + 1e-12)).floor();
             count(after) > count(before)
@@ -280,10 +303,17 @@ mod tests {
 
     #[test]
     fn multiples_of_an_interval_that_rounding_misses_are_due() {
-        let tenths = |times| is_due(Every::Interval(0.1), 5, times);
+        let tenths = |times| is_due(&Every::Interval(0.1), 5, times);
         assert!(0.3 / 0.1 < 3.0 && tenths([0.2, 0.3]), "0.3 is a multiple of 0.1");
         assert!(!tenths([0.3, 0.35]) && tenths([0.35, 0.45]) && tenths([0.2, 0.75]));
-        assert!(is_due(Every::Interval(0.1), 0, [0.0; 2]) && is_due(Every::Every(3), 0, [0.0; 2]));
-        assert!(is_due(Every::Every(3), 6, [0.0; 2]) && !is_due(Every::Every(3), 7, [0.0; 2]));
+        assert!(is_due(&Every::Interval(0.1), 0, [0.0; 2]) && is_due(&Every::Every(3), 0, [0.0; 2]));
+        assert!(is_due(&Every::Every(3), 6, [0.0; 2]) && !is_due(&Every::Every(3), 7, [0.0; 2]));
+    }
+    #[test]
+    fn listed_times_are_due_once_in_the_step_that_ends_there() {
+        let at = Every::At(vec![0.3, 0.5]);
+        let steps = [[0.2, 0.1 + 0.2], [0.1 + 0.2, 0.45], [0.45, 0.5], [0.5, 0.6]];
+        assert_eq!(steps.map(|times| is_due(&at, 3, times)), [true, false, true, false]);
+        assert!(!is_due(&at, 0, [0.0; 2]) && is_due(&Every::At(vec![0.0]), 0, [0.0; 2]));
     }
 }

@@ -9,6 +9,7 @@ use crate::{
         checkpoint_folder::{checkpoint_path, list},
         history::Totals,
     },
+    job::Loaded,
     parallel::{agreement::Agreed, session::Session},
 };
 use mpi::traits::{Communicator, Root};
@@ -65,6 +66,48 @@ pub(super) fn restore<const D: usize, const S: usize>(
         "no intact checkpoint to continue from; run without --restart\n{}",
         faults.join("\n")
     ))))
+}
+
+/// Reads the state that a job starts from, if it names one, into body and state; returns a line for the log. Components that supports
+/// hold keep the displacement and have no velocity. Collective.
+pub(super) fn transfer<const D: usize, const S: usize>(
+    session: &Session,
+    loaded: &Loaded,
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<Option<String>> {
+    let Some(from) = loaded.job.initial.as_ref().and_then(|initial| initial.from.as_deref()) else {
+        return Ok(None);
+    };
+    let fault = |words: String, help: &str| loaded.fault("initial.from", words, help);
+    let is_folder = session.total(usize::from(session.is_first() && from.is_dir())) > 0;
+    let file = if is_folder {
+        let help = "add a [checkpoint] table to the job that wrote it: it then saves its last state";
+        let none = || fault(format!("{} holds no checkpoint", from.display()), help);
+        let newest = newest(session, from)?.into_iter().next();
+        session.agree(newest.ok_or_else(none))?
+    } else {
+        let is_there = session.total(usize::from(session.is_first() && from.is_file())) > 0;
+        let none =
+            || fault(format!("{} does not exist", from.display()), "name a checkpoint or an output folder");
+        session.agree(if is_there { Ok(()) } else { Err(none()) })?;
+        from.to_owned()
+    };
+    let found = checkpoint::transfer(session, &file, body, state)?;
+    for field in [&mut state.velocity, &mut state.previous_velocity] {
+        let held = |values: &mut [f64]| {
+            values.iter_mut().zip(&body.fixed).filter(|(_, held)| **held).for_each(|(v, _)| *v = 0.0);
+        };
+        held(&mut field.owned_mut()?);
+        field.update_ghosts()?;
+    }
+    let mut words = format!("starting from {} (step {}, t = {} s)", file.display(), found.step, found.time);
+    for (what, names) in [("dropped", &found.dropped), ("at rest", &found.at_rest)] {
+        if !names.is_empty() {
+            words += &format!("; {what}: {}", names.join(", "));
+        }
+    }
+    Ok(Some(words))
 }
 
 /// The checkpoints of a folder as rank 0 lists them, the newest first; other ranks may see an outdated listing of a shared folder.

@@ -1,6 +1,6 @@
 //! Sets a job up for a run or for `solver check`, without touching the output folder.
 
-use super::{build, obstacles, steps, validate::refuse_free_bodies};
+use super::{build, obstacles, restored::transfer, steps, validate::refuse_free_bodies};
 use crate::{
     error::{Exit, Result},
     fem::{body::Body, state::State},
@@ -25,6 +25,8 @@ pub(super) struct Setup<const D: usize, const S: usize> {
     pub verdict: Verdict,
     /// Warnings about the initial state.
     pub warnings: Vec<String>,
+    /// The line of the log about the state of another run from which this one starts, if there is one.
+    pub began_from: Option<String>,
 }
 
 /// Sets a job up on its mesh, which was checked against the job. Collective.
@@ -38,7 +40,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
         session.agree(set_option(name, value))?;
     }
     let probes = session.agree(Probes::locate(session, &mesh, &job.output.probe))?;
-    let (mut body, state) = build::body::<D, S>(session, job, mesh)?;
+    let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
+    let began_from = transfer(session, loaded, &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
     let warnings = obstacles::warnings(session, job, &body, &state)?;
     let shared = steps::steps_a_matrix(job);
@@ -70,7 +73,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     };
     let verdict = certificates.verdict(longest, unique_step, &job.solver.accept);
     session.agree(refuse(loaded, &verdict))?;
-    Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings })
+    Ok(Setup { body, state, scheme, probes, certificates, verdict, warnings, began_from })
 }
 
 fn refuse(loaded: &Loaded, verdict: &Verdict) -> Result<()> {

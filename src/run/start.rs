@@ -37,4 +37,6 @@ pub struct Clock {
     pub launched: Duration,
     /// Whether the run's log is shown on the terminal too.
     pub on_terminal: bool,
+    /// Whether every step of a long run is logged.
+    pub logs_every_step: bool,
 }

@@ -17,11 +17,21 @@ pub(super) fn longest_step(job: &Job) -> f64 {
 
 /// Where steps of a job have to end; adaptive ones at output times, too.
 pub(super) fn landings(job: &Job) -> Landings {
-    let interval = match (&job.time.adaptive, job.output.fields) {
-        (Some(_), Some(Every::Interval(interval))) => Some(interval),
+    let interval = match (&job.time.adaptive, &job.output.fields) {
+        (Some(_), Some(Every::Interval(interval))) => Some(*interval),
         _ => None,
     };
-    Landings { times: job.time.land_on.clone(), interval, end: job.time.end }
+    let outputs = [&job.output.fields, &job.output.profiles];
+    let of_outputs = outputs.into_iter().filter_map(|every| match every {
+        Some(Every::At(times)) => Some(times.as_slice()),
+        _ => None,
+    });
+    let of_checkpoints = job.checkpoint.iter().map(|checkpoint| checkpoint.at.as_slice());
+    let mut output_times: Vec<f64> = of_outputs.chain(of_checkpoints).flatten().copied().collect();
+    output_times.retain(|time| *time > 0.0 && !job.time.land_on.contains(time));
+    output_times.sort_by(f64::total_cmp);
+    output_times.dedup();
+    Landings { times: job.time.land_on.clone(), output_times, interval, end: job.time.end }
 }
 
 /// How many steps one matrix serves, about: adaptive steps are taken to change their length every other step.

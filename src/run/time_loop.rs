@@ -5,11 +5,11 @@ use super::{
     deadline::Deadline,
     folder::{claim_folder, prepare_folder},
     header,
-    outputs::{Contents, Outputs},
+    outputs::{Contents, Outputs, reaches},
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
-    step_line::StepLine,
+    step_line::{Columns, StepLine},
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -22,12 +22,12 @@ use crate::{
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
-    solver::{certificate::Certificates, stepping::StepOutcome},
+    solver::{
+        certificate::Certificates,
+        stepping::{Preconditioner, StepOutcome},
+    },
 };
-use std::{
-    fmt::Write,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 /// About how many steps are logged; of longer runs only every n-th step is.
 const LOGGED_STEPS: u64 = 1000;
@@ -60,6 +60,8 @@ pub(super) fn run<const D: usize, const S: usize>(
     if let Some(restored) = &restored {
         restored.faults.iter().for_each(|fault| log.warning(fault));
         log.line(&restored.words);
+    } else if let Some(words) = &ready.began_from {
+        log.line(words);
     }
     session.agree(header::lines(session, loaded, &ready))?.iter().for_each(|line| log.line(line));
     header::warnings(loaded, &ready).into_iter().for_each(|warning| log.warning(warning));
@@ -71,6 +73,12 @@ pub(super) fn run<const D: usize, const S: usize>(
     let mut outputs = session.agree(Outputs::open(session, contents, body, state, &mut log))?;
     session.agree(outputs.at_start(session, body, state))?;
     let setup = clock.began.elapsed() - clock.launched;
+    let columns = Columns {
+        contact: !simulation.body.contacts.is_empty(),
+        friction: simulation.body.contacts.iter().any(|contact| contact.friction().is_some()),
+        newton: simulation.scheme.is_nonlinear(),
+        iterative: simulation.scheme.preconditioner().0 != Preconditioner::Cholesky,
+    };
     let stepping = (Instant::now(), state.step);
     let deadline = Deadline::new(session, job, clock);
     deadline.log_limit(&mut log);
@@ -82,6 +90,7 @@ pub(super) fn run<const D: usize, const S: usize>(
         landed: 0,
         outputs,
         log,
+        columns,
         line: String::with_capacity(LINE),
         clock,
         deadline,
@@ -107,6 +116,8 @@ struct Run<'a, const D: usize, const S: usize> {
     landed: u64,
     outputs: Outputs<D, S>,
     log: Log,
+    /// What lines of the log tell of a step.
+    columns: Columns,
     /// The line of the log after a step, kept to reuse its memory.
     line: String,
     clock: Clock,
@@ -121,13 +132,15 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
     fn advance(&mut self) -> Result<Ended> {
         let Simulation { state, landings, .. } = &self.simulation;
         let last = state.step + landings.steps_after(state.time, self.job.time.step);
-        self.log.start_progress(last, state.step);
+        if !self.clock.logs_every_step {
+            self.log.start_progress(last, state.step);
+        }
         let mut saved_at = Instant::now();
         while let Some(outcome) =
             self.simulation.advance(self.session).or_else(|error| self.explain(error))?
         {
-            let Simulation { body, state, totals, landings, adaptive, .. } = &self.simulation;
-            self.outputs.after_step(self.session, body, state, &outcome, totals)?;
+            let Simulation { state, landings, adaptive, .. } = &self.simulation;
+            self.outputs.after_step(self.session, &self.simulation, &outcome)?;
             let has_steps_left = state.time < self.job.time.end;
             let steps_left = landings.steps_after(state.time, state.step_length);
             let last = if adaptive.is_some() { state.step + steps_left } else { last };
@@ -195,7 +208,8 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.landed += 1;
             self.log.quiet_line(format!("step {step} ends at t = {time:.9} s: {what}"));
         }
-        if !(step.is_multiple_of(last.div_ceil(LOGGED_STEPS).max(1)) || step == last) {
+        let every = if self.clock.logs_every_step { 1 } else { last.div_ceil(LOGGED_STEPS).max(1) };
+        if !(step.is_multiple_of(every) || step == last) {
             return;
         }
         let line = StepLine {
@@ -203,12 +217,11 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             last,
             time,
             outcome,
+            has: self.columns,
             imbalance,
             left: self.seconds_per_step() * (last - step) as f64,
         };
-        self.line.clear();
-        let written = write!(self.line, "{line}");
-        debug_assert!(written.is_ok(), "text can be written");
+        line.write(&mut self.line);
         self.log.quiet_line(&self.line);
     }
 
@@ -223,7 +236,9 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let late = self.deadline.passed(self.session);
         let (mut by_steps, mut by_time) = (false, false);
         if let Some(checkpoint) = &self.job.checkpoint {
-            by_steps = checkpoint.every.is_some_and(|every| self.simulation.state.step.is_multiple_of(every));
+            let state = &self.simulation.state;
+            by_steps = checkpoint.every.is_some_and(|every| state.step.is_multiple_of(every))
+                || reaches(&checkpoint.at, state);
             if let Some(seconds) = checkpoint.interval {
                 let due = saved_at.elapsed().as_secs_f64() >= seconds;
                 by_time = self.session.largest([f64::from(u8::from(due))])[0] > 0.0;

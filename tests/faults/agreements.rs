@@ -147,7 +147,8 @@ fn take(session: &Session, folder: &Path, kind: &str, results: &str) -> Result<E
     let start = if kind == "restart" { Start::Newest } else { Start::Anew };
     let output = format!("output.folder='{}'", folder.join(results).display());
     let loaded = Job::load(&folder.join(format!("{kind}.toml")), &[output]).expect("a job");
-    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let clock =
+        Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false, logs_every_step: false };
     run::run(session, loaded, &start, clock)
 }
 

@@ -123,7 +123,8 @@ pub fn scenario(name: &str, folder: &Path) {
 
 fn take(session: &Session, job: &Path, folder: &str, start: &Start) {
     let loaded = Job::load(job, &[format!("output.folder='{folder}'")]).expect("a job");
-    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let clock =
+        Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false, logs_every_step: false };
     let exit = run::run(session, loaded, start, clock).unwrap_or_else(|error| panic!("{folder}: {error}"));
     assert_eq!(exit, Exit::Done, "{folder}");
 }

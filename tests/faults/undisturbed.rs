@@ -33,7 +33,7 @@ pub fn finish(case: &Case, straight: &Results, what: &str) -> bool {
 
 #[track_caller]
 fn assert_same(straight: &Results, results: &Results, what: &str) -> bool {
-    for name in ["history.csv", "probes.csv", "profiles.csv"] {
+    for name in ["history.csv", "resultants.csv", "probes.csv", "profiles.csv"] {
         assert_eq!(straight.text(name), results.text(name), "{what}: {name}");
     }
     let [one, other] = [straight, results].map(|r| {

@@ -53,7 +53,7 @@ fn explicit_steps_grow_exactly_when_the_certificate_says_so() {
             assert!(left < 0.5, "{what}: {left}");
             continue;
         }
-        case.run_with(1, &["--force"]).expect(2).says("grow").says("explicit_stability");
+        case.run_with(1, &["--force"]).expect(2).says("amplify").says("explicit_stability");
         let case = case.set("solver.accept", "['explicit_stability']");
         let outcome = case.run_with(1, &["--force"]);
         let grown = growth(&case);

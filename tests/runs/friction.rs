@@ -119,13 +119,16 @@ fn a_job_with_friction_says_so_and_one_without_has_nothing_of_it() {
             "contact_pressure",
             "friction_traction_x",
             "friction_traction_y",
-            "friction_traction_z"
+            "friction_traction_z",
+            "tangential_displacement_x",
+            "tangential_displacement_y",
+            "tangential_displacement_z"
         ]
     );
-    assert_eq!(b.table("profiles.csv").columns.len(), 8);
+    assert_eq!(b.table("profiles.csv").columns.len(), 11);
     let size = |r: &Results, c: &str| r.table("profiles.csv").last(c);
     assert!((size(&a, "friction_traction_x").hypot(size(&a, "friction_traction_y")) - 20.0).abs() < 1e-6);
-    assert!(a.text("run.log").contains("slipping 20  ") && !b.text("run.log").contains("slipping"));
+    assert!(a.text("run.log").contains(", 20 slip  ") && !b.text("run.log").contains(" slip"));
     assert!(b.table("history.csv").last("contact_dissipation").abs() < 1e-9);
 }
 

@@ -30,8 +30,19 @@ impl NumberFile {
 
     /// A field of a field file at a step of the file.
     pub fn field(&self, name: &str, step: usize) -> Vec<f64> {
-        let at_nodes =
-            ["displacement", "velocity", "contact_traction", "bonding", "memory_pressure"].contains(&name);
+        let at_nodes = [
+            "displacement",
+            "velocity",
+            "contact_traction",
+            "bonding",
+            "memory_pressure",
+            "contact_pressure",
+            "gap",
+            "contact_status",
+            "branch",
+            "sliding_velocity",
+        ]
+        .contains(&name);
         let ids = if at_nodes { "VTKHDF/PointData/node" } else { "VTKHDF/CellData/cell" };
         self.by_id(&format!("Fields/{name}/{step}"), ids)
     }

@@ -28,3 +28,4 @@ mod restart;
 mod results;
 mod schemes;
 mod signals;
+mod stages;

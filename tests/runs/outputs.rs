@@ -32,6 +32,7 @@ fn a_run_leaves_the_files_of_the_contract() {
             "job.toml",
             "probes.csv",
             "profiles.csv",
+            "resultants.csv",
             "run.log",
             "summary.json"
         ]
@@ -43,7 +44,17 @@ fn a_run_leaves_the_files_of_the_contract() {
     );
     assert_eq!(
         header(&results, "profiles.csv"),
-        "time,profile,x,y,normal_displacement,normal_velocity,contact_pressure"
+        "time,profile,x,y,normal_displacement,normal_velocity,contact_pressure,tangential_displacement_x,tangential_displacement_y"
+    );
+    assert_eq!(
+        header(&results, "resultants.csv"),
+        "step,time,source,force_x,force_y,moment_z,touching_area,open_area,mean_pressure,largest_pressure"
+    );
+    let resultants = results.table("resultants.csv");
+    assert_eq!(resultants.rows.len(), 4 * 16);
+    assert_eq!(
+        &resultants.words("source")[..4],
+        ["support left", "contact bottom", "traction top", "momentum"]
     );
     let history = results.table("history.csv");
     let steps: Vec<f64> = (1..=16).map(f64::from).collect();
@@ -66,7 +77,8 @@ fn tables_of_a_cube_have_three_components() {
     );
     assert_eq!(
         header(&results, "profiles.csv"),
-        "time,profile,x,y,z,normal_displacement,normal_velocity,contact_pressure"
+        "time,profile,x,y,z,normal_displacement,normal_velocity,contact_pressure,tangential_displacement_x,\
+         tangential_displacement_y,tangential_displacement_z"
     );
     let profiles = results.table("profiles.csv");
     for name in ["bottom", "right"] {
@@ -311,7 +323,7 @@ fn the_log_is_plain_text_and_says_what_the_terminal_said() {
         "2 ranks",
         "32 triangles",
         "effects    inertia, elasticity",
-        "step     16/16",
+        "step 16/16  t = 1 s",
         "completed",
     ] {
         assert!(log.contains(words), "{words}");
@@ -345,4 +357,60 @@ fn the_papers_job_shows_what_the_paper_claims() {
     assert!(pressure[..first_falling].is_sorted_by(|a, b| a < b));
     assert!(pressure[first_falling..first_rising].is_sorted_by(|a, b| a > b));
     assert!(pressure[first_rising..].is_sorted_by(|a, b| a < b));
+}
+
+#[test]
+fn further_fields_agree_with_the_other_results() {
+    let all = "['region', 'strain', 'principal_stress', 'pressure', 'contact_pressure', 'gap', 'contact_status', 'branch', \
+               'sliding_velocity']";
+    let case = Case::square(6).set("output.also", all).set("checkpoint.every", "8");
+    let results = case.run(2);
+    let file = NumberFile::open(&results.path("fields.vtkhdf"));
+    let last = file.times().len() - 1;
+    let field = |name: &str| file.field(name, last);
+    let principal = ["principal_stress_1", "principal_stress_2", "principal_stress_3"].map(field);
+    for (cell, (mises, pressure)) in field("von_mises").into_iter().zip(field("pressure")).enumerate() {
+        let [a, b, c] = [0, 1, 2].map(|i| principal[i][cell]);
+        assert!(
+            a >= b && b >= c && [a, b, c].contains(&0.0) || (a * b * c).abs() < 1e-9,
+            "plane stress: {a} {b} {c}"
+        );
+        let from_principal = (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt();
+        assert!((from_principal - mises).abs() < 1e-9 * (1.0 + mises), "{from_principal} {mises}");
+        assert!((a + b + c + 3.0 * pressure).abs() < 1e-9, "{a} {b} {c} {pressure}");
+    }
+    assert!(field("region").iter().all(|region| *region == 0.0));
+    let strain =
+        field("strain").chunks(6).map(|e| e[0] * e[0] + 2.0 * e[1] * e[1] + e[3] * e[3]).fold(0.0, larger);
+    assert!(strain > 0.0 && strain.sqrt() <= results.number("max_strain") * (1.0 + 1e-12));
+    let largest = results.table("resultants.csv").only("source", "contact bottom").last("largest_pressure");
+    let pressures = field("contact_pressure").into_iter().fold(0.0, larger);
+    assert!((pressures - largest).abs() < 1e-12, "{pressures} {largest}");
+    let status = field("contact_status");
+    assert_eq!(status.iter().filter(|status| **status > 0.0).count(), 7, "nodes of the bottom");
+    assert!(status.iter().all(|status| [0.0, 1.0, 2.0].contains(status)) && status.contains(&2.0));
+    assert!(field("sliding_velocity").iter().all(|v| *v == 0.0), "no friction");
+    // The same job has the same further fields when it goes on.
+    case.run_with(2, &["--restart", "--set", "time.end=2", "--set", "output.also=[]"])
+        .expect(2)
+        .says("continue with the output.also of the run that wrote it");
+}
+
+#[test]
+fn the_gap_is_what_is_left_of_the_distance() {
+    let case = Case::square(6)
+        .without("contact.0.normal")
+        .set("contact.0.normal.unilateral.gap", "0.25")
+        .set("output.also", "['gap', 'contact_status']")
+        .set("time.end", "0.25");
+    let results = case.run(2);
+    let file = NumberFile::open(&results.path("fields.vtkhdf"));
+    let gap = file.field("gap", file.times().len() - 1);
+    let mut left: Vec<f64> = gap.into_iter().filter(|gap| *gap != 0.0).collect();
+    let moved = results.table("profiles.csv").only("time", "0.25").numbers("normal_displacement");
+    let mut expected: Vec<f64> = moved.iter().map(|moved| 0.25 - moved).collect();
+    left.sort_by(f64::total_cmp);
+    expected.sort_by(f64::total_cmp);
+    assert_eq!(left.len(), 7);
+    assert!(left.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-14), "{left:?} {expected:?}");
 }

@@ -119,6 +119,8 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
         "bottom_contact_pressure_arrows",
         "probes_displacement_y",
         "probes_velocity_x",
+        "force_0",
+        "area_1",
         "energies",
         "dissipation",
         "energy_imbalance",
@@ -208,7 +210,15 @@ fn missing_and_damaged_files_are_named_and_the_rest_is_shown() {
     let case = Case::square(4);
     case.run(1);
     let out = case.folder().join("out");
-    for name in ["job.toml", "summary.json", "history.csv", "probes.csv", "profiles.csv", "fields.vtkhdf"] {
+    for name in [
+        "job.toml",
+        "summary.json",
+        "history.csv",
+        "resultants.csv",
+        "probes.csv",
+        "profiles.csv",
+        "fields.vtkhdf",
+    ] {
         let text = std::fs::read(out.join(name)).expect("file");
         std::fs::remove_file(out.join(name)).expect("removed");
         check_missing(&out, name, "it does not exist");

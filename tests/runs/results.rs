@@ -159,6 +159,16 @@ pub fn assert_same_answer(one: &Results, other: &Results, share: f64, what: &str
     for column in ENERGIES {
         check_over(least, column, &a.numbers(column), &b.numbers(column));
     }
+    let (a, b) = (one.table("resultants.csv"), other.table("resultants.csv"));
+    assert_eq!(a.columns, b.columns);
+    for word in ["step", "time", "source"] {
+        assert_eq!(a.words(word), b.words(word), "{what}: {word} in resultants.csv");
+    }
+    for of in ["force", "moment"] {
+        let names: Vec<&String> = a.columns.iter().filter(|name| name.starts_with(of)).collect();
+        let all = |table: &Table| names.iter().flat_map(|name| table.numbers(name)).collect::<Vec<_>>();
+        check(of, &all(&a), &all(&b));
+    }
     for name in ["final_von_mises", "max_von_mises", "max_strain"] {
         check(name, &[one.number(name)], &[other.number(name)]);
     }

@@ -20,7 +20,7 @@ fn endless() -> Case {
 /// Sends a signal after some steps.
 fn stop(case: &Case, ranks: usize, signal: &str, target: Target) -> Outcome {
     let mut running = case.start(ranks);
-    running.wait_for("step     27/");
+    running.wait_for("step   27/");
     running.signal(signal, target);
     running.wait()
 }

@@ -82,7 +82,8 @@ fn whole_run(session: &Session, steps: u32) -> u64 {
     let end = format!("time.end={}", f64::from(steps) / 64.0);
     let rare = ["mesh.rectangle.cells=[8,8]", "output.fields={every=1000}", "checkpoint.every=1000"];
     let loaded = loaded(PAPER, &[&[end.as_str(), out.as_str()][..], &rare[..]].concat());
-    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let clock =
+        Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false, logs_every_step: false };
     let info = measure(|| {
         run(session, loaded, &Start::Anew, clock).expect("a run");
     });

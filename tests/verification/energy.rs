@@ -3,7 +3,13 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, noise, simulation};
 use clarke::fem::effect::{CONTACT, DAMAGE, DEBONDING, ELASTIC, VISCOPLASTIC, VISCOUS, WORK};
-use clarke::{io::output::history::Totals, mesh::GlobalMesh, parallel::session::Session};
+use clarke::{
+    fem::resultants::{Resultants, Source},
+    io::output::history::Totals,
+    linear_algebra::tensor::{larger, norm},
+    mesh::GlobalMesh,
+    parallel::session::Session,
+};
 
 const JOBS: u64 = 60;
 /// Random jobs under each implicit scheme.
@@ -244,6 +250,21 @@ fn job<const D: usize>(number: u64, hypothesis: &str, scheme: &str) -> String {
     job + &format!("[initial]\nvelocity = {velocity:?}\ndisplacement = {displacement:?}\n")
 }
 
+/// What forces and moments lack to the rate of momentum, relative to the sum of their magnitudes.
+fn open_resultant<const D: usize>(resultants: &Resultants<D>) -> [f64; 2] {
+    let (mut sums, mut sizes) = ([[0.0; 3]; 2], [0.0; 2]);
+    for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
+        let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };
+        let force = std::array::from_fn(|i| found.force.get(i).copied().unwrap_or(0.0));
+        for (at, vector) in [force, found.moment].iter().enumerate() {
+            (0..3).for_each(|i| sums[at][i] += sign * vector[i]);
+            sizes[at] += norm(vector);
+        }
+    }
+    // In free flight only the rounding errors of the forces inside a body are left, which are 0.1 N to 10 N here.
+    std::array::from_fn(|at| norm(&sums[at]) / larger(sizes[at], 0.1))
+}
+
 fn balanced<const D: usize, const S: usize>(
     session: &Session,
     number: u64,
@@ -252,6 +273,8 @@ fn balanced<const D: usize, const S: usize>(
 ) -> (Totals, String) {
     let text = job::<D>(number, hypothesis, scheme);
     let mut run = simulation::<D, S>(session, &text, mesh);
+    let supports = crate::scenes::supports(&text);
+    let mut resultants = Resultants::new(session, &run.body, &run.state, &supports).expect("resultants");
     let mut steps = 0;
     while let Some(outcome) = run.advance(session).unwrap_or_else(|e| panic!("{e}\n{text}")) {
         steps += 1;
@@ -262,6 +285,12 @@ fn balanced<const D: usize, const S: usize>(
             outcome.energy
         );
         assert!(inclusion < 1e-6, "step {steps}: inclusion residual {inclusion:e}\n{text}");
+        let change = run.scheme.velocity_change(&run.state);
+        resultants
+            .update(session, &run.body, &run.state, change, run.scheme.load())
+            .expect("resultants of a step");
+        let [open, turn] = open_resultant(&resultants);
+        assert!(open < 1e-10 && turn < 1e-10, "step {steps}: forces {open:e}, moments {turn:e}\n{text}");
         assert!(outcome.energy[VISCOUS] >= 0.0 && outcome.energy[VISCOPLASTIC] >= 0.0);
         assert!(outcome.energy[DAMAGE] >= 0.0 && outcome.energy[DEBONDING] >= 0.0);
     }

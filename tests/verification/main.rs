@@ -40,6 +40,7 @@ mod schemes;
 mod softening;
 mod subspace;
 mod rejected_steps;
+mod resultants;
 mod tolerance;
 mod unloading;
 mod uniqueness;
@@ -78,6 +79,7 @@ fn scenario() {
         "profiles" => profiles::all(&session, &folder),
         "patch" => patch::uniform_fields(&session),
         "energy" => energy::random_jobs(&session),
+        "resultants" => resultants::all(&session),
         "closed_forms" => closed_forms::all(&session),
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),

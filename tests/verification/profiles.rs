@@ -37,12 +37,18 @@ fn measure<const D: usize>(corners: &[[f64; D]; D]) -> f64 {
     if D == 2 { norm(&edge(1)) } else { 0.5 * norm(&cross(&edge(1), &edge(D - 1))) }
 }
 
-/// The rows of a profile: positions, and the three numbers after them.
-fn rows<const D: usize>(folder: &Path) -> Vec<([f64; D], [f64; 3])> {
+/// The rows of a profile: positions, the three numbers after them, and the normal component of the last numbers, the tangential
+/// displacement.
+fn rows<const D: usize>(folder: &Path) -> Vec<([f64; D], [f64; 3], f64)> {
+    let mut down = [0.0; D];
+    down[D - 1] = -1.0;
+    let normal = turned(down);
     let text = std::fs::read_to_string(folder.join("profiles.csv")).expect("the file");
     let row = |line: &str| {
         let numbers: Vec<f64> = line.split(',').skip(2).map(|x| x.parse().expect("a number")).collect();
-        (std::array::from_fn(|i| numbers[i]), std::array::from_fn(|i| numbers[D + i]))
+        let tangential: [f64; D] = std::array::from_fn(|i| numbers[numbers.len() - D + i]);
+        let along: f64 = (0..D).map(|i| tangential[i] * normal[i]).sum();
+        (std::array::from_fn(|i| numbers[i]), std::array::from_fn(|i| numbers[D + i]), along)
     };
     text.lines().skip(1).map(row).collect()
 }
@@ -60,7 +66,8 @@ fn hold<const D: usize>(
     nodes.sort_unstable();
     nodes.dedup();
     assert_eq!(rows.len(), nodes.len(), "{what}");
-    for (place, found) in rows {
+    for (place, found, tangential) in rows {
+        assert!(tangential.abs() < 1e-12, "{what} at {place:?}: not tangential by {tangential:e}");
         let node = nodes.iter().find(|n| whole.nodes[**n as usize] == place).expect("a node of the boundary");
         let expected = expected(*node as usize);
         let off = (0..3).map(|i| (found[i] - expected[i]).abs()).fold(0.0, larger);

@@ -87,6 +87,11 @@ pub fn simulation<const D: usize, const S: usize>(
     Simulation::new(session, &mut loaded, mesh).unwrap_or_else(|e| panic!("{e}\n{job}"))
 }
 
+/// The supports of a job.
+pub fn supports(job: &str) -> Vec<Support> {
+    Job::from_text(job, "job.toml", Path::new("."), &[]).expect("a job").job.support
+}
+
 /// The `[mesh]` table of a mesh that is handed over in memory: any of the right dimension.
 pub fn any_mesh<const D: usize>() -> &'static str {
     if D == 2 {

@@ -1,6 +1,6 @@
 use super::{
     Curvature, Energy, EnergyKind, Evaluation, HistoryStore, NUMERICAL, Outcome, Role, Step, StressError,
-    SurfaceEffect, Tangents, evolution::Evolution, node_history::NodeHistory,
+    SurfaceEffect, SurfaceForce, Tangents, evolution::Evolution, node_history::NodeHistory,
 };
 use crate::{
     fem::space::{Nodal, SurfacePoint},
@@ -34,6 +34,8 @@ pub const DEBONDING: EnergyKind = EnergyKind::new(10, Role::Dissipated, "adhesio
 #[derive(Debug)]
 pub struct Adhesion<const D: usize> {
     laws: Vec<contact::Adhesion>,
+    /// Positions of the contacts of the laws among those of the job.
+    contacts: Vec<usize>,
     /// Points with the position of their law, those of a node together.
     points: Vec<(usize, SurfacePoint<D>)>,
     /// Points of each node that is bonded.
@@ -46,6 +48,8 @@ pub struct Adhesion<const D: usize> {
 /// A law and the points where it holds.
 #[derive(Debug)]
 pub struct Bonded<const D: usize> {
+    /// Position of its contact among those of the job.
+    pub contact: usize,
     /// The law.
     pub law: contact::Adhesion,
     /// Points at nodes owned here.
@@ -55,10 +59,11 @@ pub struct Bonded<const D: usize> {
 impl<const D: usize> Adhesion<D> {
     /// Whole bonds at the points; the rank owns so many nodes.
     pub fn new(bonded: Vec<Bonded<D>>, owned: usize) -> Self {
-        let (mut laws, mut points) = (Vec::new(), Vec::new());
-        for Bonded { law, points: own } in bonded {
+        let (mut laws, mut contacts, mut points) = (Vec::new(), Vec::new(), Vec::new());
+        for Bonded { contact, law, points: own } in bonded {
             points.extend(own.into_iter().map(|point| (laws.len(), point)));
             laws.push(law);
+            contacts.push(contact);
         }
         points.sort_by_key(|(_, point)| point.node);
         let groups = || points.chunk_by(|(_, a), (_, b)| a.node == b.node);
@@ -66,6 +71,7 @@ impl<const D: usize> Adhesion<D> {
         let counts = groups().map(<[_]>::len).collect();
         Self {
             laws,
+            contacts,
             counts,
             points,
             bonding: NodeHistory::new(["bonding", "previous_bonding"], nodes, owned, 1.0),
@@ -232,6 +238,20 @@ impl<const D: usize> SurfaceEffect<D> for Adhesion<D> {
                 let traction = self.laws[*law].traction(&point.value(nodal.displacement), &point.normal);
                 energy[NUMERICAL] +=
                     step.length * point.weight * after * dot(&traction, &point.value(nodal.velocity));
+            }
+        }
+    }
+
+    fn write_forces(&self, at: Evaluation, step: Step, nodal: Nodal<'_>, forces: &mut Vec<SurfaceForce<D>>) {
+        // Laws at the converged state have the displacement before the step.
+        let length = if at == Evaluation::Converged { step.length } else { 0.0 };
+        for (group, bonding) in self.groups().zip(&self.bonding.converged) {
+            for (law, point) in group {
+                let displacement =
+                    add_scaled(&point.value(nodal.displacement), -length, &point.value(nodal.velocity));
+                let traction = self.laws[*law].traction(&displacement, &point.normal);
+                let force = traction.map(|t| point.weight * bonding * bonding * t);
+                forces.push(SurfaceForce { contact: self.contacts[*law], node: point.node, force });
             }
         }
     }

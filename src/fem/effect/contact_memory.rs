@@ -1,6 +1,6 @@
 use super::{
     Blend, CONTACT, Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError, SurfaceEffect,
-    Tangents, node_history::NodeHistory,
+    SurfaceForce, Tangents, node_history::NodeHistory,
 };
 use crate::{
     error::{Error, Result},
@@ -18,6 +18,8 @@ use crate::{
 pub struct ContactMemory<const D: usize> {
     /// One a node, in the order of nodes.
     points: Vec<(Memory, SurfacePoint<D>)>,
+    /// Position of the contact of each point among those of the job.
+    contacts: Vec<usize>,
     pressure: NodeHistory,
     /// Normal displacements before an implicit step in m.
     before: Vec<f64>,
@@ -26,12 +28,15 @@ pub struct ContactMemory<const D: usize> {
 }
 
 impl<const D: usize> ContactMemory<D> {
-    /// Foundations without history, each with its points at owned nodes. Refuses edges, because a node has one memory.
-    pub fn new(foundations: Vec<(Memory, Vec<SurfacePoint<D>>)>, mesh: &Mesh<D>) -> Result<Self> {
+    /// Foundations without history, each with its points at owned nodes and the position of its contact among those of the job.
+    /// Refuses edges, because a node has one memory.
+    pub fn new(foundations: Vec<(usize, Memory, Vec<SurfacePoint<D>>)>, mesh: &Mesh<D>) -> Result<Self> {
         let of_each = foundations.into_iter();
-        let mut points: Vec<(Memory, SurfacePoint<D>)> =
-            of_each.flat_map(|(law, points)| points.into_iter().map(move |point| (law, point))).collect();
-        points.sort_by_key(|(_, point)| point.node);
+        let mut all: Vec<(usize, (Memory, SurfacePoint<D>))> = of_each
+            .flat_map(|(contact, law, points)| points.into_iter().map(move |point| (contact, (law, point))))
+            .collect();
+        all.sort_by_key(|(_, (_, point))| point.node);
+        let (contacts, points): (Vec<usize>, Vec<(Memory, SurfacePoint<D>)>) = all.into_iter().unzip();
         if let Some(pair) = points.windows(2).find(|pair| pair[0].1.node == pair[1].1.node) {
             return Err(Error::Refused(format!(
                 "contact memory at {:?} m: two boundaries meet at an edge there, but a node stores the history of one displacement only; \
@@ -42,6 +47,7 @@ impl<const D: usize> ContactMemory<D> {
         let nodes = points.iter().map(|(_, point)| point.node).collect();
         Ok(Self {
             points,
+            contacts,
             pressure: NodeHistory::new(
                 ["memory_pressure", "previous_memory_pressure"],
                 nodes,
@@ -122,6 +128,14 @@ impl<const D: usize> SurfaceEffect<D> for ContactMemory<D> {
     /// No energies: what the pressure takes up is counted with that of the normal law.
     fn add_step_energy(&mut self, _: Evaluation, step: Step, nodal: Nodal<'_>, _: &mut Energy) {
         self.advance(step, nodal.displacement);
+    }
+
+    fn write_forces(&self, _: Evaluation, _: Step, _: Nodal<'_>, forces: &mut Vec<SurfaceForce<D>>) {
+        let points = self.points.iter().zip(&self.contacts).zip(&self.pressure.converged);
+        forces.extend(points.map(|(((_, point), &contact), pressure)| {
+            let force = point.normal.map(|n| -point.weight * pressure * n);
+            SurfaceForce { contact, node: point.node, force }
+        }));
     }
 
     /// The foundation counts as the spring that it is for a displacement held for a long time.

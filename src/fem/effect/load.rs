@@ -21,6 +21,28 @@ pub struct Traction {
     pub value: Vec<Scalar>,
 }
 
+impl Traction {
+    /// Visits the forces in N on the nodes of this rank's facets at `time`, by quadrature of degree 2.
+    pub fn forces<const D: usize>(
+        &self,
+        mesh: &Mesh<D>,
+        time: f64,
+        mut visit: impl FnMut(u32, Vector<D>),
+    ) -> Result<()> {
+        for &facet in &self.facets {
+            let (nodes, corners) = (mesh.facets[facet as usize], mesh.facet_corners(facet));
+            let measure = norm(&facet_normal(&corners));
+            for (place, weight) in facet_rule::<D>() {
+                let value = evaluate(&self.value, time, &point(&corners, place), "traction")?;
+                for (node, share) in nodes.into_iter().zip(place) {
+                    visit(node, value.map(|value| measure * weight * share * value));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// All loads of a job.
 #[derive(Debug, Default)]
 pub struct Load {
@@ -52,14 +74,7 @@ impl Load {
         forces: &mut [f64],
     ) -> Result<()> {
         for traction in &self.tractions {
-            for &facet in &traction.facets {
-                let (nodes, corners) = (mesh.facets[facet as usize], mesh.facet_corners(facet));
-                let measure = norm(&facet_normal(&corners));
-                for (place, weight) in facet_rule::<D>() {
-                    let value = evaluate(&traction.value, time, &point(&corners, place), "traction")?;
-                    scatter(forces, &nodes, place, measure * weight, &value);
-                }
-            }
+            traction.forces(mesh, time, |node, force| add_at(forces, node, &force))?;
         }
         for body_force in &self.body_forces {
             for (number, cell) in geometry.iter().enumerate() {
@@ -87,9 +102,13 @@ fn point<const D: usize>(corners: &[Vector<D>], place: &[f64]) -> Vector<D> {
 
 fn scatter<const D: usize>(forces: &mut [f64], nodes: &[u32], place: &[f64], weight: f64, value: &Vector<D>) {
     for (&node, share) in nodes.iter().zip(place) {
-        for i in 0..D {
-            forces[node as usize * D + i] += weight * share * value[i];
-        }
+        add_at(forces, node, &value.map(|value| weight * share * value));
+    }
+}
+
+fn add_at<const D: usize>(forces: &mut [f64], node: u32, force: &Vector<D>) {
+    for i in 0..D {
+        forces[node as usize * D + i] += force[i];
     }
 }
 

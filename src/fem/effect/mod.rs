@@ -42,8 +42,8 @@ use crate::{
 pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    CONTACT, COUNTS, Contact, ContactConditions, ContactNode, PointCount, Quadrature, ReferenceValues,
-    STORED_IN_CONTACT, choose_unknowns, contact_nodes,
+    CONTACT, COUNTS, Contact, ContactAreas, ContactConditions, ContactNode, PointCount, PointState,
+    Quadrature, ReferenceValues, STORED_IN_CONTACT, choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
@@ -57,7 +57,7 @@ pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use step_error::{Curvature, StressError};
 pub use support::fixed_components;
-pub use surface::SurfaceEffect;
+pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
 pub use viscoplastic_flow::{VISCOPLASTIC, ViscoplasticFlow};
@@ -114,13 +114,13 @@ pub fn surface_effects<const D: usize>(
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for contact in contacts {
+    for (at, contact) in contacts.iter().enumerate() {
         let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
         if let Some(law) = contact.memory {
-            foundations.push((law, points()?));
+            foundations.push((at, law, points()?));
         }
         if let Some(law) = contact.adhesion {
-            bonded.push(Bonded { law, points: points()? });
+            bonded.push(Bonded { contact: at, law, points: points()? });
         }
     }
     if !bonded.is_empty() {

@@ -1,11 +1,7 @@
 //! The error that a step makes in stresses and histories.
 
-use super::isotropic;
-use crate::{
-    fem::space::Batch,
-    laws::{material::Isotropic, step::Step},
-    linear_algebra::simd::Pack,
-};
+use super::{Step, isotropic};
+use crate::{fem::space::Batch, laws::material::Isotropic, linear_algebra::simd::Pack};
 
 /// The deviation of the next value from the straight line through the last two: `k_n / (k_n + k_{n-1}) (x_n - x_{n-1} - w (x_{n-1} -
 /// x_{n-2}))` with `w = k_n / k_{n-1}`, the local error of implicit Euler. Before the first step values are taken as

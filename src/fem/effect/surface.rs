@@ -1,5 +1,16 @@
 use super::{Curvature, Energy, Evaluation, HistoryStore, Outcome, Step, StressError};
-use crate::fem::space::Nodal;
+use crate::{fem::space::Nodal, linear_algebra::tensor::Vector};
+
+/// The force of a surface effect at a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceForce<const D: usize> {
+    /// Position of the contact among those of the job.
+    pub contact: usize,
+    /// Local number of the node.
+    pub node: u32,
+    /// Force on the body in N.
+    pub force: Vector<D>,
+}
 
 /// An effect at nodes of boundaries whose force follows the displacement.
 pub trait SurfaceEffect<const D: usize> {
@@ -32,6 +43,9 @@ pub trait SurfaceEffect<const D: usize> {
     /// histories before and after it: what it dissipates, and the terms of the scheme. `nodal` has displacement and velocity at the end
     /// of the step and the displacement before it.
     fn add_step_energy(&mut self, at: Evaluation, step: Step, nodal: Nodal<'_>, energy: &mut Energy);
+
+    /// Appends the forces of the last committed step, given displacement and velocity of the converged state.
+    fn write_forces(&self, at: Evaluation, step: Step, nodal: Nodal<'_>, forces: &mut Vec<SurfaceForce<D>>);
 
     /// Adds the squares of the force at the end of a step that was solved and not yet committed, given the displacement there, and of
     /// the error that its trial history makes in the force, given the histories before.

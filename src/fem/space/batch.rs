@@ -5,7 +5,7 @@
 use super::{Geometry, SimplexPack, kernels, kernels::Corners};
 use crate::{
     linear_algebra::{
-        simd::{LANES, Pack},
+        simd::{LANES, Pack, sum},
         tensor::add_scaled,
     },
     mesh::Mesh,
@@ -131,6 +131,17 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         geometry: &'g Geometry<D>,
         nodal: Nodal<'_>,
         needs: Needs,
+        visit: impl FnMut(&mut Self),
+    ) {
+        Self::for_each(0..geometry.packs.len(), (mesh, geometry), nodal, needs, visit);
+    }
+
+    /// Visits the packs of cells with these numbers in the same way.
+    pub fn for_each(
+        numbers: impl Iterator<Item = usize>,
+        (mesh, geometry): (&Mesh<D>, &'g Geometry<D>),
+        nodal: Nodal<'_>,
+        needs: Needs,
         mut visit: impl FnMut(&mut Self),
     ) {
         let Some(first) = geometry.packs.first() else { return };
@@ -152,7 +163,8 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
             force: [Pack::ZERO; 4],
             corners: [[Pack::ZERO; 4]; 2],
         };
-        for (number, (run, cells)) in geometry.runs.iter().zip(&geometry.packs).enumerate() {
+        for number in numbers {
+            let (run, cells) = (&geometry.runs[number], &geometry.packs[number]);
             (batch.number, batch.material) = (number, run.material);
             (batch.first, batch.count) = (run.first, run.count);
             batch.cells = cells;
@@ -165,6 +177,12 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
     #[inline(always)]
     fn nodes<'m>(&self, mesh: &'m Mesh<D>) -> &'m [u32] {
         &mesh.cells[self.first * (D + 1)..(self.first + self.count) * (D + 1)]
+    }
+
+    /// The sum over the cells of the squares of the forces of their stress outputs beyond `before`, as far as the gradients of the nodes
+    /// but the first have them.
+    pub fn square_of_added_forces(&self, before: &Pack<S>) -> f64 {
+        square_of_forces(self.cells, before, &self.stress)
     }
 
     /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts).
@@ -218,6 +236,28 @@ fn gather<const D: usize, const S: usize>(
     }
     batch.stress = Pack::ZERO;
     batch.force[..=D].fill(Pack::ZERO);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn square_of_forces<const D: usize, const S: usize>(
+    cells: &SimplexPack<D>,
+    before: &Pack<S>,
+    after: &Pack<S>,
+) -> f64 {
+    let mut squares = [0.0; LANES];
+    for lane in 0..LANES {
+        let mut gradients = 0.0;
+        for gradient in &cells.gradients {
+            (0..D).for_each(|i| gradients += gradient.0[i][lane] * gradient.0[i][lane]);
+        }
+        let mut stresses = 0.0;
+        for c in 0..S {
+            let added = after.0[c][lane] - before.0[c][lane];
+            stresses += added * added;
+        }
+        squares[lane] = cells.volume[lane] * cells.volume[lane] * gradients * stresses;
+    }
+    sum(&squares)
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]

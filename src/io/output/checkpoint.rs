@@ -96,8 +96,7 @@ pub fn save<const D: usize, const S: usize>(
     let mut tables: Vec<Table> =
         nodal.into_iter().map(|(name, values)| Table { name, set: "nodes", width: D, values }).collect();
     let traction = state.contact_traction.as_ref().map(DistributedVector::owned).transpose()?;
-    let traction =
-        traction.as_deref().map(|t| Table { name: "contact_traction", set: "nodes", width: D, values: t });
+    let traction = traction.as_deref().map(|t| Table { name: TRACTION, set: "nodes", width: D, values: t });
     tables.extend(traction);
     let previous = state.previous_displacement.as_ref().map(DistributedVector::owned).transpose()?;
     let previous = previous.as_deref();
@@ -138,9 +137,9 @@ pub fn restore<const D: usize, const S: usize>(
         fill(field, values)?;
     }
     if let Some(traction) = &mut state.contact_traction {
-        let values =
-            checkpoint.read("nodes", body.mesh.total_nodes as u64, &[("contact_traction", D)], &nodes)?;
+        let values = checkpoint.read("nodes", body.mesh.total_nodes as u64, &[(TRACTION, D)], &nodes)?;
         fill(traction, &values[0])?;
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values[0]));
     }
     if let Some(previous) = &mut state.previous_displacement {
         let wanted = [("previous_displacement", D)];
@@ -162,6 +161,77 @@ pub fn restore<const D: usize, const S: usize>(
     Ok(header)
 }
 
+/// The state of another run, as far as this job has a place for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transferred {
+    /// Number of steps of that run.
+    pub step: u64,
+    /// Its time in s.
+    pub time: f64,
+    /// Tables of the checkpoint that this job does not have.
+    pub dropped: Vec<String>,
+    /// Histories of this job that the checkpoint does not have.
+    pub at_rest: Vec<String>,
+}
+
+/// Reads the last state of another run on the same mesh into `body` and `state` as a state at time 0. Refused if the checkpoint is
+/// damaged or belongs to another mesh. Collective, with the same outcome on all ranks.
+pub fn transfer<const D: usize, const S: usize>(
+    session: &Session,
+    path: &Path,
+    body: &mut Body<D, S>,
+    state: &mut State,
+) -> Result<Transferred> {
+    let checkpoint = Checkpoint::open(path, session.world())?;
+    let header = session.agree(check_mesh(path, checkpoint.header(), body))?;
+    let [nodes, cells] = [owned_node_ids(body), cell_ids(body)];
+    let [total_cells, total_nodes] = [body.mesh.total_cells, body.mesh.total_nodes].map(|total| total as u64);
+    let [of_nodes, of_cells] = [checkpoint.tables("nodes")?, checkpoint.tables("cells")?];
+    let fields = ["displacement", "velocity"].map(|name| (name, D));
+    let values = checkpoint.read("nodes", total_nodes, &fields, &nodes)?;
+    fill(&mut state.displacement, &values[0])?;
+    fill(&mut state.velocity, &values[1])?;
+    fill(&mut state.previous_velocity, &values[1])?;
+    if let Some(previous) = &mut state.previous_displacement {
+        fill(previous, &values[0])?;
+    }
+    let mut known: Vec<&str> = vec!["displacement", "velocity"];
+    if let Some(traction) = &mut state.contact_traction
+        && of_nodes.iter().any(|name| name == TRACTION)
+    {
+        known.push(TRACTION);
+        let values = checkpoint.read("nodes", total_nodes, &[(TRACTION, D)], &nodes)?;
+        fill(traction, &values[0])?;
+        body.contacts.iter_mut().for_each(|contact| contact.restore_pressures(&values[0]));
+    }
+    let kept = |history: History<'_>| (history.name, history.width);
+    let own_cells: Vec<(&str, usize)> = body.all_cell_histories().map(kept).collect();
+    let own_nodes: Vec<(&str, usize)> = body.all_node_histories().map(kept).collect();
+    let mut at_rest = Vec::new();
+    for (set, total, own, there, ids) in [
+        ("cells", total_cells, own_cells, &of_cells, &cells),
+        ("nodes", total_nodes, own_nodes, &of_nodes, &nodes),
+    ] {
+        for (name, width) in own {
+            // A run at its start has not changed: its earlier values are the current ones.
+            let current = name.strip_prefix("previous_").unwrap_or(name);
+            if there.iter().any(|table| table == current) {
+                known.extend([current, name]);
+                let values = checkpoint.read(set, total, &[(current, width)], ids)?;
+                body.restore_history(name, &values[0]);
+            } else if name == current {
+                at_rest.push(name.to_owned());
+            }
+        }
+    }
+    let is_dropped = |name: &&String| !known.contains(&name.as_str()) && !name.starts_with("previous_");
+    let dropped = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
+    Ok(Transferred { step: header.step, time: header.time, dropped, at_rest })
+}
+
+/// The table of contact tractions at nodes.
+const TRACTION: &str = "contact_traction";
+
 /// A damaged file is a failure, not a refusal, so that an older checkpoint can be tried.
 fn damaged(error: Agreed) -> Error {
     if error.exit() == Exit::Refused { Error::Failed(error.to_string()) } else { error.into() }
@@ -172,27 +242,51 @@ fn fill(field: &mut DistributedVector, values: &[f64]) -> Result<()> {
     field.update_ghosts()
 }
 
+fn refused(path: &Path, words: &str) -> Error {
+    Error::Refused(format!("{}: {words}", path.display()))
+}
+
+/// The header of a checkpoint of a format that can be read.
+fn read_header(path: &Path, bytes: &[u8]) -> Result<Header> {
+    let header: Header = serde_json::from_slice(bytes).map_err(|error| {
+        refused(
+            path,
+            &format!("the header of the checkpoint cannot be parsed ({error}); start the run again"),
+        )
+    })?;
+    if header.format != FORMAT {
+        let words = format!(
+            "the checkpoint has format {} of Clarke {}, this version reads format {FORMAT}; continue with that version",
+            header.format, header.version
+        );
+        return Err(refused(path, &words));
+    }
+    Ok(header)
+}
+
+/// The header of a checkpoint of another run on the mesh of this body.
+fn check_mesh<const D: usize, const S: usize>(
+    path: &Path,
+    bytes: &[u8],
+    body: &Body<D, S>,
+) -> Result<Header> {
+    let header = read_header(path, bytes)?;
+    if header.mesh != digest(body) || header.dimension != D {
+        let words =
+            "the checkpoint belongs to another mesh; a run can start only from a state on its own mesh";
+        return Err(refused(path, words));
+    }
+    Ok(header)
+}
+
 fn check<const D: usize, const S: usize>(
     path: &Path,
     bytes: &[u8],
     identity: &Identity,
     body: &Body<D, S>,
 ) -> Result<Header> {
-    let refuse = |words: String| Err(Error::Refused(format!("{}: {words}", path.display())));
-    let header: Header = match serde_json::from_slice(bytes) {
-        Ok(header) => header,
-        Err(e) => {
-            return refuse(format!(
-                "the header of the checkpoint cannot be parsed ({e}); start the run again"
-            ));
-        }
-    };
-    if header.format != FORMAT {
-        return refuse(format!(
-            "the checkpoint has format {} of Clarke {}, this version reads format {FORMAT}; continue with that version",
-            header.format, header.version
-        ));
-    }
+    let refuse = |words: String| Err(refused(path, &words));
+    let header = read_header(path, bytes)?;
     let differing = differing_keys(&header.physics, &identity.physics);
     if !differing.is_empty() {
         let lines: Vec<String> = differing

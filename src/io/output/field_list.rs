@@ -4,6 +4,7 @@
 use super::{
     error_indicator,
     field::{Place, Shape},
+    further_fields as further,
     output_field::{Computed, Converged, OutputField},
 };
 use crate::{error::Result, linear_algebra::tensor::von_mises};
@@ -61,6 +62,28 @@ fields! {
             Some(traction) => Computed::of(traction.owned()?),
             None => return Ok(None),
         };
+    /// See [`FurtherField`](crate::job::FurtherField), as all fields below.
+    REGION = further::REGION, |at| further::region(at);
+    /// Strain.
+    STRAIN = further::STRAIN, |at| further::strain(at)?;
+    /// Largest principal stress.
+    PRINCIPAL_STRESS_1 = further::PRINCIPAL_STRESSES[0], |at| further::principal_stress(at, 0);
+    /// Middle principal stress.
+    PRINCIPAL_STRESS_2 = further::PRINCIPAL_STRESSES[1], |at| further::principal_stress(at, 1);
+    /// Smallest principal stress.
+    PRINCIPAL_STRESS_3 = further::PRINCIPAL_STRESSES[2], |at| further::principal_stress(at, 2);
+    /// Pressure.
+    PRESSURE = further::PRESSURE, |at| further::pressure(at);
+    /// Contact pressure.
+    CONTACT_PRESSURE = further::CONTACT_PRESSURE, |at| further::of_contacts(at, |point| [point.pressure])?;
+    /// Gap.
+    GAP = further::GAP, |at| further::of_contacts(at, |point| [point.gap])?;
+    /// State of contact points.
+    CONTACT_STATUS = further::CONTACT_STATUS, |at| further::of_contacts(at, |point| [further::status(point)])?;
+    /// Branch of the normal law.
+    BRANCH = further::BRANCH, |at| further::of_contacts(at, |point| [point.branch as f64])?;
+    /// Sliding velocity.
+    SLIDING_VELOCITY = further::SLIDING_VELOCITY, |at| further::of_contacts(at, |point| point.sliding)?;
 }
 
 #[cfg(test)]

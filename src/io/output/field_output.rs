@@ -1,7 +1,7 @@
 //! The field file of a run.
 
 use super::{
-    field_list::{COUNT, FIELDS, computations},
+    field_list::{COUNT, ERROR_INDICATOR, FIELDS, computations},
     fields::{Field, FieldFile, FieldMesh, Place, Shape},
     log::Log,
     output_field::{Computed, Converged, OutputField},
@@ -158,9 +158,14 @@ fn refuse_other_fields(path: &Path, is_wanted: [bool; COUNT]) -> Result<()> {
         let holds = file.link_exists(&format!("Fields/{name}"));
         if holds != is_wanted {
             let word = if holds { "contains" } else { "does not contain" };
+            let key = if *name == ERROR_INDICATOR.name {
+                format!("output.{name} = {holds}")
+            } else {
+                "the output.also of the run that wrote it".to_owned()
+            };
             return Err(Error::Refused(format!(
-                "{} {word} {name}, and all its times have the same fields: continue with output.{name} = {holds}, or in another \
-                 output.folder from a named checkpoint (--restart FILE.h5)",
+                "{} {word} {name}, and all its times have the same fields: continue with {key}, or in another output.folder from a \
+                 named checkpoint (--restart FILE.h5)",
                 path.display()
             )));
         }

@@ -1,7 +1,7 @@
 //! The log: what the terminal shows, and the same without control characters in `run.log`.
 
 use crate::error::{Error, Result};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::{
     fs::{File, OpenOptions, TryLockError},
     io::{IsTerminal, Write},
@@ -95,9 +95,15 @@ impl Log {
 
     /// Shows a progress bar if the output is a terminal.
     pub(crate) fn start_progress(&mut self, steps: u64, taken: u64) {
-        let wanted = self.is_active && self.on_terminal;
-        if wanted && std::io::stderr().is_terminal() && std::io::stdout().is_terminal() {
+        if !(self.is_active && self.on_terminal) {
+            return;
+        }
+        let is_direct = std::io::stderr().is_terminal() && std::io::stdout().is_terminal();
+        if is_direct || launcher_has_terminal() {
             let bar = ProgressBar::new(steps);
+            if !is_direct {
+                bar.set_draw_target(ProgressDrawTarget::term_like_with_hz(Box::new(LauncherTerminal), 5));
+            }
             let style = ProgressStyle::with_template(
                 "{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}",
             );
@@ -126,6 +132,66 @@ impl Log {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Whether the parent of this process, under mpirun the launcher, writes to a terminal to which it passes what this process writes.
+fn launcher_has_terminal() -> bool {
+    if std::env::var_os("OMPI_COMM_WORLD_RANK").is_none() && std::env::var_os("PMI_RANK").is_none() {
+        return false;
+    }
+    let parent = std::os::unix::process::parent_id();
+    [1, 2].iter().all(|stream| {
+        let file = std::fs::read_link(format!("/proc/{parent}/fd/{stream}"));
+        file.is_ok_and(|file| file.starts_with("/dev/pts") || file.starts_with("/dev/tty"))
+    })
+}
+
+/// The terminal of the launcher, as far as a progress bar of one line needs it; written through the standard output.
+#[derive(Debug)]
+struct LauncherTerminal;
+
+impl LauncherTerminal {
+    fn put(words: std::fmt::Arguments<'_>) -> std::io::Result<()> {
+        std::io::stdout().write_fmt(words)
+    }
+}
+
+impl TermLike for LauncherTerminal {
+    fn width(&self) -> u16 {
+        100
+    }
+
+    fn move_cursor_up(&self, lines: usize) -> std::io::Result<()> {
+        if lines == 0 { Ok(()) } else { Self::put(format_args!("\x1b[{lines}A")) }
+    }
+
+    fn move_cursor_down(&self, lines: usize) -> std::io::Result<()> {
+        if lines == 0 { Ok(()) } else { Self::put(format_args!("\x1b[{lines}B")) }
+    }
+
+    fn move_cursor_right(&self, columns: usize) -> std::io::Result<()> {
+        if columns == 0 { Ok(()) } else { Self::put(format_args!("\x1b[{columns}C")) }
+    }
+
+    fn move_cursor_left(&self, columns: usize) -> std::io::Result<()> {
+        if columns == 0 { Ok(()) } else { Self::put(format_args!("\x1b[{columns}D")) }
+    }
+
+    fn write_line(&self, words: &str) -> std::io::Result<()> {
+        Self::put(format_args!("{words}\n"))
+    }
+
+    fn write_str(&self, words: &str) -> std::io::Result<()> {
+        Self::put(format_args!("{words}"))
+    }
+
+    fn clear_line(&self) -> std::io::Result<()> {
+        Self::put(format_args!("\r\x1b[2K"))
+    }
+
+    fn flush(&self) -> std::io::Result<()> {
+        std::io::stdout().flush()
     }
 }
 

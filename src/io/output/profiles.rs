@@ -9,7 +9,7 @@ use crate::{
         state::State,
     },
     laws::contact::NodeContext,
-    linear_algebra::tensor::{Mandel, Vector, apply, dot, norm},
+    linear_algebra::tensor::{Mandel, Vector, add_scaled, apply, dot, norm},
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
 };
@@ -70,8 +70,11 @@ impl<const D: usize> Profiles<D> {
             .iter()
             .map(|axis| format!(",friction_traction_{axis}"))
             .collect::<String>();
-        let header =
-            format!("time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}");
+        let tangential = ["x", "y", "z"][..D].iter().map(|axis| format!(",tangential_displacement_{axis}"));
+        let tangential = tangential.collect::<String>();
+        let header = format!(
+            "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}{tangential}"
+        );
         self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
     }
@@ -84,7 +87,7 @@ impl<const D: usize> Profiles<D> {
         state: &State,
         stress: &[Mandel<S>],
     ) -> Result<(), Agreed> {
-        let width = if self.with_friction { 2 * D + 3 } else { D + 3 };
+        let width = if self.with_friction { 3 * D + 3 } else { 2 * D + 3 };
         for profile in &self.profiles {
             let rows = session.agree(profile.rows(body, state, stress, self.with_friction))?;
             // All rows to rank 0.
@@ -111,8 +114,8 @@ impl<const D: usize> Profiles<D> {
 }
 
 impl<const D: usize> Profile<D> {
-    /// Position, normal displacement, normal velocity, contact pressure and, if requested, friction traction `-sigma_tau` of each
-    /// point on this rank.
+    /// Position, normal displacement, normal velocity, contact pressure, friction traction `-sigma_tau` if requested, and tangential
+    /// displacement of each point on this rank.
     fn rows<const S: usize>(
         &self,
         body: &Body<D, S>,
@@ -124,7 +127,7 @@ impl<const D: usize> Profile<D> {
             if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
         let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
-        let mut out = Vec::with_capacity(self.points.len() * (D + 3));
+        let mut out = Vec::with_capacity(self.points.len() * (3 * D + 3));
         for (at, point) in self.points.iter().enumerate() {
             let node = point.node as usize;
             let along = |field: &[f64]| (0..D).map(|i| field[node * D + i] * point.normal[i]).sum::<f64>();
@@ -139,11 +142,13 @@ impl<const D: usize> Profile<D> {
                 None => by_stress[at],
             };
             out.extend(body.mesh.nodes[node]);
-            out.extend([along(&displacement), normal_velocity, pressure]);
+            let normal_displacement = along(&displacement);
+            out.extend([normal_displacement, normal_velocity, pressure]);
             if with_friction {
                 let known = self.contact.zip(traction.as_ref());
                 out.extend(known.map_or([0.0; D], |(c, t)| body.contacts[c].friction_traction(node, t)));
             }
+            out.extend(add_scaled(&point.value(&displacement), -normal_displacement, &point.normal));
         }
         Ok(out)
     }

@@ -1,5 +1,7 @@
 //! `[[support]]`, `[[traction]]`, `[[body_force]]` and `[initial]`.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -83,6 +85,13 @@ pub struct BodyForce {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
+    /// The last state of another run, from which this one starts at time 0: a checkpoint, or an output folder for its newest
+    /// checkpoint. The mesh must be the same; loads, supports, contacts, laws and scheme may differ. Histories that this job does not
+    /// have are dropped, those that only this job has start at rest; the log names both. Components held by supports keep the saved
+    /// displacement. Not together with the other keys of this table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("format" = "path"), example = "out/first_stage", example = "out/first_stage/checkpoint-64.h5")]
+    pub from: Option<PathBuf>,
     /// The displacement at time 0, one component per axis: numbers, or expressions in the undeformed coordinates x, y, z. Absent:
     /// zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -15,12 +15,20 @@ pub struct Output {
     pub folder: Option<PathBuf>,
     /// When the fields (displacement, velocity, stress and others) are written to fields.vtkhdf. Absent: only at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(example = serde_json::json!({ "every": 8 }), example = serde_json::json!({ "interval": 0.1 }))]
+    #[schemars(
+        example = serde_json::json!({ "every": 8 }),
+        example = serde_json::json!({ "interval": 0.1 }),
+        example = serde_json::json!({ "at": [0.0, 0.25] })
+    )]
     pub fields: Option<Every>,
     /// Whether the field error_indicator is written with the other fields: for each cell an estimate of the discretisation error of
     /// its stress in the elastic energy norm, in J^(1/2), in two dimensions (J/m)^(1/2) (Zienkiewicz and Zhu, 1987). summary.json
     /// then contains the norm over the body and its ratio to the norm of the stress. Every material must have elasticity.
     pub error_indicator: bool,
+    /// Further fields that are written with the others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(example = ["strain", "contact_status"])]
+    pub also: Vec<FurtherField>,
     /// Level of the lossless compression of fields.vtkhdf by HDF5's shuffle and deflate filters. 0: no compression. Higher levels
     /// take longer to write.
     #[schemars(range(max = 9), example = 1)]
@@ -32,20 +40,49 @@ pub struct Output {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<Profile>,
     /// When profiles are written, for example in every step without fields. The last state is always written. Adaptive steps do not
-    /// end on these times. Default: whenever fields are written.
+    /// end on multiples of an interval, but all steps on the times of `at`. Default: whenever fields are written.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = serde_json::json!({ "every": 1 }), example = serde_json::json!({ "interval": 0.01 }))]
     pub profiles: Option<Every>,
 }
 
-/// The interval between two outputs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A field that is written only if a job asks for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FurtherField {
+    /// The number of the region of each cell, from 0 in the order of the mesh.
+    Region,
+    /// The strain of the displacement in each cell; in plane stress its in-plane components.
+    Strain,
+    /// The principal stresses of each cell in Pa: principal_stress_1, the largest, to principal_stress_3.
+    PrincipalStress,
+    /// Minus the mean of the three normal stresses of each cell in Pa.
+    Pressure,
+    /// The contact pressure at the nodes of nodal contacts in Pa; 0 at other nodes.
+    ContactPressure,
+    /// The distance to the obstacle along the normal at the nodes of nodal contacts in m, negative where it is penetrated; 0 at other
+    /// nodes and where the law has no gap.
+    Gap,
+    /// The state of the nodes of nodal contacts. 0: no contact boundary; 1: open; 2: with contact pressure; 3: with contact pressure
+    /// and friction, sticking; 4: the same, slipping.
+    ContactStatus,
+    /// The number of the branch of the normal contact law, from 0 in the order of the normal velocity; 0 at other nodes.
+    Branch,
+    /// The velocity relative to the obstacle along the boundary at the nodes of contacts with friction in m/s; zero at other nodes.
+    SlidingVelocity,
+}
+
+/// The times of outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Every {
     /// Number of steps between two outputs.
     Every(#[schemars(range(min = 1), extend("unit" = "steps"), example = 8)] u64),
     /// Simulated time between two outputs.
     Interval(#[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 0.1)] f64),
+    /// Simulated times of the outputs, in ascending order and not after the end of the run. A step that would pass such a time is
+    /// shortened to end there.
+    At(#[schemars(extend("unit" = "s"), example = [0.0, 0.25])] Vec<f64>),
 }
 
 /// A point of the body whose displacement and velocity are written to probes.csv in every step.
@@ -81,6 +118,11 @@ pub struct Checkpoint {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 1800.0)]
     pub interval: Option<f64>,
+    /// Simulated times at which the state is saved, in ascending order, above 0 and not after the end of the run. A step that would
+    /// pass such a time is shortened to end there. May be combined with `every` or `interval`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("unit" = "s"), example = [0.25, 0.5])]
+    pub at: Vec<f64>,
     /// Number of checkpoints that are kept; older ones are deleted.
     #[serde(default = "keep")]
     #[schemars(range(min = 1))]

@@ -28,6 +28,10 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     }
     check_claims(findings);
     for key in ["initial.displacement", "initial.velocity"] {
+        if root.find("initial.from").is_some() && root.find(key).is_some() {
+            let help = "delete this key, or `from`";
+            findings.fault_at_key(key, "`from` gives the whole initial state", help);
+        }
         for path in items(root, key) {
             if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
                 findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");

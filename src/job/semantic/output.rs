@@ -1,6 +1,6 @@
 //! Checks of probes, profiles and expected results.
 
-use super::boundary::check_name;
+use super::boundary::{check_name, check_repeats};
 use super::findings::{Findings, MeshNames, items};
 use crate::job::report::Fault;
 use crate::job::source::Value;
@@ -13,6 +13,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         let help = "name a boundary with [[output.profile]] on = \"...\", or leave the key out";
         findings.fault_at_key("output.profiles", "there are no profiles to write", help);
     }
+    check_repeats(findings, "output.also", "field");
     check_expected(findings);
     check_indicator(findings);
 }

@@ -59,15 +59,24 @@ fn check_steps(findings: &mut Findings<'_>) {
     }
 }
 
-/// The times in `land_on` must ascend and lie within the run.
+/// Lists of times must ascend and lie within the run; those of fields and profiles may begin with 0.
 fn check_landings(findings: &mut Findings<'_>) {
+    check_times(findings, "time.land_on", false);
+    check_times(findings, "checkpoint.at", false);
+    check_times(findings, "output.fields.at", true);
+    check_times(findings, "output.profiles.at", true);
+}
+
+fn check_times(findings: &mut Findings<'_>, list: &str, may_be_zero: bool) {
     let end = findings.root.read::<f64>("time.end").filter(|end| end.is_finite());
     let mut before = 0.0;
-    for at in 0..findings.root.count("time.land_on") {
-        let place = format!("time.land_on.{at}");
+    for at in 0..findings.root.count(list) {
+        let place = format!("{list}.{at}");
         let Some(time) = findings.root.read::<f64>(&place) else { continue };
-        if time <= before {
-            let message = "these times must be above 0 and in ascending order";
+        let is_start = at == 0 && may_be_zero && time == 0.0;
+        if !(time > before || is_start) {
+            let least = if may_be_zero { "at least" } else { "above" };
+            let message = format!("these times must be {least} 0 and in ascending order");
             findings.fault(&place, message, format!("give a time after {before}, or delete it"));
         } else if let Some(end) = end.filter(|end| time > *end) {
             findings.fault(&place, "this time is after the end of the run", format!("at most {end}"));
@@ -86,7 +95,7 @@ fn check_checkpoint(findings: &mut Findings<'_>) {
             "delete one of them",
         );
     }
-    if !["every", "interval", "wall_limit", "margin"].into_iter().any(present) {
+    if !["every", "interval", "at", "wall_limit", "margin"].into_iter().any(present) {
         let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
         findings.fault("checkpoint", "[checkpoint] does not state when to save", help);
     }

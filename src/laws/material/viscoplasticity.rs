@@ -132,6 +132,11 @@ impl Flow for FlowLaw {
         chosen!(self, law => law.flow_to_end(trial, length, accumulated, tangent))
     }
 
+    #[inline(always)]
+    fn yielding<const S: usize>(&self, stresses: &Pack<S>, accumulated: &[f64; LANES]) -> [bool; LANES] {
+        chosen!(self, law => law.yielding(stresses, accumulated))
+    }
+
     fn has_symmetric_tangent<const S: usize>(&self) -> bool {
         chosen!(self, law => law.has_symmetric_tangent::<S>())
     }

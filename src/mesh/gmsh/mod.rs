@@ -7,10 +7,12 @@
 mod assemble;
 mod cursor;
 mod document;
+mod inspect;
 
 use super::GlobalMesh;
 use crate::error::{Error, Result};
 use document::Document;
+pub use inspect::inspect;
 use std::path::Path;
 
 /// A mesh of the dimension of its file.

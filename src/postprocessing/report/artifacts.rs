@@ -36,6 +36,8 @@ pub(super) struct Found {
     pub summary: Option<Value>,
     /// `history.csv`.
     pub history: Option<Table>,
+    /// `resultants.csv`.
+    pub resultants: Option<Table>,
     /// `probes.csv`.
     pub probes: Option<Table>,
     /// `profiles.csv`.
@@ -68,6 +70,9 @@ impl Found {
         });
         found.history =
             found.take("history.csv", "energies, steps and iterations", |path| Table::read(path, ""));
+        found.resultants = found.take("resultants.csv", "forces of supports, contacts and loads", |path| {
+            Table::read(path, "source")
+        });
         let wants = |there: fn(&Job) -> bool, job: &Option<Job>| job.as_ref().is_none_or(there);
         if folder.join("probes.csv").exists() || wants(|job| !job.output.probe.is_empty(), &found.job) {
             found.probes = found.take("probes.csv", "probes over time", |path| Table::read(path, "probe"));

@@ -49,6 +49,27 @@ pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
     Ok(out)
 }
 
+/// The components of the force of each source, and the area of each contact by state.
+pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Vec<Picture>> {
+    let of = |unit: [&'static str; 2]| unit[dimension - 2];
+    let axes = ["x", "y", "z"];
+    let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
+    let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
+    let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
+    let mut out = Vec::new();
+    for (number, source) in table.names().iter().enumerate() {
+        let rows = table.of(source);
+        let what = if source == "momentum" { "rate of momentum" } else { source };
+        let quantity = if source == "momentum" { "rate of momentum" } else { "force" };
+        out.extend(sums(&rows, &format!("force_{number}"), (what, quantity), of(["N/m", "N"]), &forces)?);
+        if source.starts_with("contact") {
+            let name = format!("area_{number}");
+            out.extend(sums(&rows, &name, (source, "area"), of(["m", "m²"]), &areas)?);
+        }
+    }
+    Ok(out)
+}
+
 /// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
 pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     let columns = |roles: &[Role]| -> Vec<&str> {
@@ -60,7 +81,7 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
         ("energies", "energy", columns(&[Role::Stored])),
         ("dissipation", "work and dissipation since t = 0", spent),
     ] {
-        out.extend(sums(table, name, quantity, unit, &columns)?);
+        out.extend(sums(table, name, (quantity, quantity), unit, &columns)?);
     }
     out.extend(over_time(
         table,
@@ -76,7 +97,14 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     Ok(out)
 }
 
-fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str]) -> Result<Option<Picture>> {
+/// A chart of several columns of one quantity over time; none if all of them are zero.
+fn sums(
+    table: &Table,
+    name: &str,
+    (what, quantity): (&str, &str),
+    unit: &str,
+    columns: &[&str],
+) -> Result<Option<Picture>> {
     let mut series = Vec::new();
     let (mut ends, mut zero) = (Vec::new(), Vec::new());
     for column in columns {
@@ -96,8 +124,8 @@ fn sums(table: &Table, name: &str, quantity: &str, unit: &str, columns: &[&str])
     let zero =
         if zero.is_empty() { String::new() } else { format!(" Zero throughout: {}.", zero.join(", ")) };
     let svg = Chart::new(TIME, Axis { quantity, unit }, series).svg()?;
-    let alt = format!("Chart of {quantity} over time; at the end {ends}");
-    Ok(Some(Picture::new(name, alt, format!("{}. At the end: {ends}.{zero}", capital(quantity)), svg)))
+    let alt = format!("Chart of {what} over time; at the end {ends}");
+    Ok(Some(Picture::new(name, alt, format!("{}. At the end: {ends}.{zero}", capital(what)), svg)))
 }
 
 /// Properties of the steps: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.

@@ -182,12 +182,17 @@ fn time_sections(page: &mut Page, found: &Found) -> Result<()> {
     if let Some(probes) = found.probes.as_ref().filter(|probes| !probes.is_empty()) {
         page.section("Probes", "", history::probes(probes)?);
     }
+    let dimension = found.dimension().unwrap_or(3);
+    if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
+        let words = "Forces on the body. In every step they add up to the rate of momentum.";
+        page.section("Resultants", &paragraph(words), history::resultants(resultants, dimension)?);
+    }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
         page.section("Energy", &paragraph("history.csv contains no steps yet."), vec![]);
         return Ok(());
     }
-    let unit = Energy::unit(found.dimension().unwrap_or(3));
+    let unit = Energy::unit(dimension);
     page.section("Energy", "", history::energies(history, unit)?);
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
     page.section("Steps", "", history::steps(history, tolerance)?);

@@ -13,8 +13,8 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads a table whose column `named`, if it has one, contains text and all others numbers. An incomplete last row, left by a
-    /// run that was interrupted, is ignored.
+    /// Reads a table whose column `named`, if it has one, contains text and all others numbers; empty entries of a table with such a
+    /// column are NaN. An incomplete last row, left by a run that was interrupted, is ignored.
     pub(super) fn read(path: &Path, named: &str) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::unreadable(path, error))?;
         Self::parse(&text, named).map_err(|words| Error::unreadable(path, words))
@@ -46,6 +46,8 @@ impl Table {
             if name == named {
                 word = (*cell).to_owned();
                 row.push(0.0);
+            } else if cell.is_empty() && !named.is_empty() {
+                row.push(f64::NAN);
             } else {
                 row.push(
                     cell.trim().parse::<f64>().map_err(|_| format!("{cell:?} is not a number ({name})"))?,
@@ -132,6 +134,14 @@ mod tests {
         assert_eq!(table.names(), ["left", "right"]);
         assert_eq!(table.of("left").last("time").column("x"), Some(vec![3.0, 4.0]));
         assert_eq!(table.column("y"), None);
+    }
+
+    #[test]
+    fn empty_entries_are_not_numbers_and_none_at_all_without_names() {
+        let table = Table::parse("step,source,area\n1,top,\n1,left,2\n", "source").expect("table");
+        assert!(table.of("top").column("area").expect("a column")[0].is_nan());
+        assert_eq!(table.of("left").column("area"), Some(vec![2.0]));
+        assert!(Table::parse("step,area\n1,\n2,1\n", "").is_err());
     }
 
     #[test]

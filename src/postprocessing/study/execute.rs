@@ -59,7 +59,8 @@ pub(super) fn execute(session: &Session, planned: &Planned, repetitions: usize) 
 
 /// One run. Its PETSc options are cleared afterwards, so that they do not affect the next run. Collective.
 fn run_once(session: &Session, planned: &Planned) -> Result<Exit, Agreed> {
-    let clock = Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false };
+    let clock =
+        Clock { began: Instant::now(), launched: Duration::ZERO, on_terminal: false, logs_every_step: false };
     let ended = run::run(session, planned.loaded.clone(), &Start::Over, clock);
     for name in planned.loaded.job.solver.petsc.keys() {
         session.agree(clear_option(name))?;

@@ -163,7 +163,7 @@ impl Plan {
                 }
             }
             let every = Some(Every::Every(every.max(1)));
-            self.split.iter_mut().for_each(|run| run.loaded.job.output.fields = every);
+            self.split.iter_mut().for_each(|run| run.loaded.job.output.fields = every.clone());
             reference.loaded.job.output.fields = every;
         }
         if faults.is_empty() { Ok(()) } else { Err(Error::Refused(faults.join("\n"))) }

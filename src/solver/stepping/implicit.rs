@@ -16,6 +16,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{Blend, Energy, Evaluation, Form, Step},
+        resultants::VelocityChange,
         space::Nodal,
         state::State,
     },
@@ -146,6 +147,11 @@ impl Implicit {
     /// Commits the solved step to the state. Collective.
     pub(super) fn commit(&self, state: &mut State, solved: &DistributedVector, step: Step) -> Result<()> {
         state.commit(solved, Some(&self.end), step)
+    }
+
+    /// The change of the velocity from the start of the step just committed.
+    pub(super) fn velocity_change(&self) -> VelocityChange<'_> {
+        VelocityChange { before: &self.velocity, length: self.blend.length }
     }
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells; 0 for steps of implicit Euler.

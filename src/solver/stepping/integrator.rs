@@ -9,6 +9,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{Blend, Energy, Evaluation, NUMERICAL, Peaks, Step},
+        resultants::VelocityChange,
         state::State,
     },
     job::Scheme,
@@ -112,6 +113,16 @@ impl Integrator {
         match self {
             Self::LaggedEuler(_) => state.commit(solved, None, step),
             Self::Implicit(scheme) => scheme.commit(state, solved, step),
+        }
+    }
+
+    /// The change of the velocity in the step just committed.
+    pub(super) fn velocity_change<'a>(&'a self, state: &'a State) -> VelocityChange<'a> {
+        match self {
+            Self::LaggedEuler(_) => {
+                VelocityChange { before: &state.previous_velocity, length: state.step_length }
+            }
+            Self::Implicit(scheme) => scheme.velocity_change(),
         }
     }
 

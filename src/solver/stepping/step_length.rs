@@ -19,6 +19,8 @@ pub struct Landing {
 pub struct Landings {
     /// Times specified in the job, in s, sorted.
     pub times: Vec<f64>,
+    /// Times of outputs, in s, sorted, none of them among the other times; the log does not report them.
+    pub output_times: Vec<f64>,
     /// Every multiple of this time in s.
     pub interval: Option<f64>,
     /// The end of the run in s.
@@ -31,6 +33,7 @@ impl Landings {
         let after = time * (1.0 + 1e-12);
         let multiple = |interval: f64| interval * ((after / interval).floor() + 1.0);
         let last = self.interval.map_or(self.end, multiple).min(self.end);
+        let last = self.output_times.iter().find(|at| **at > after).map_or(last, |at| at.min(last));
         match self.times.iter().find(|landing| **landing > after && **landing <= last) {
             Some(landing) => Landing { time: *landing, name: Some("[time] land_on") },
             None => Landing { time: last, name: None },
@@ -39,9 +42,11 @@ impl Landings {
 
     /// Fixed steps of this length from `time` to the end.
     pub fn steps_after(&self, time: f64, length: f64) -> u64 {
-        let landings = self.times.iter().copied().filter(|landing| *landing > time && *landing < self.end);
         let (mut from, mut steps) = (time, 0);
-        for to in landings.chain([self.end]) {
+        let next = |times: &[f64], from: f64| times.iter().copied().find(|to| *to > from);
+        while from < self.end {
+            let nearest = [next(&self.times, from), next(&self.output_times, from)].into_iter().flatten();
+            let to = nearest.fold(self.end, f64::min);
             steps += ((to - from) / length - TIME_TOLERANCE).ceil().max(0.0) as u64;
             from = to;
         }
@@ -66,7 +71,20 @@ pub fn next_step(state: &State, length: f64, end: f64) -> Step {
 /// millions of lengths would accumulate.
 fn snapped_to_multiple(time: f64, length: f64) -> f64 {
     let multiple = (time / length).round() * length;
-    if (time - multiple).abs() <= TIME_TOLERANCE * length { multiple } else { time }
+    if (time - multiple).abs() <= TIME_TOLERANCE * length { without_rounding(multiple) } else { time }
+}
+
+/// The decimal number with 14 digits that equals a time up to the rounding of a product, if there is one: 0.95, not
+/// 0.9500000000000001, is 19 steps of 0.05.
+fn without_rounding(time: f64) -> f64 {
+    // Powers of ten up to this one are exact.
+    let digits = 13 - time.abs().log10().floor().clamp(-100.0, 100.0) as i32;
+    if !(0..=22).contains(&digits) {
+        return time;
+    }
+    let scale = 10f64.powi(digits);
+    let decimal = (time * scale).round() / scale;
+    if (decimal - time).abs() <= 2.0 * f64::EPSILON * time.abs() { decimal } else { time }
 }
 
 #[cfg(test)]
@@ -84,7 +102,8 @@ mod tests {
 
     #[test]
     fn prescribed_times_are_reached_in_order_and_shorten_fixed_steps() {
-        let landings = Landings { times: vec![0.25, 0.7], interval: None, end: 1.0 };
+        let landings =
+            Landings { times: vec![0.25, 0.7], output_times: Vec::new(), interval: None, end: 1.0 };
         let times = |landings: &Landings| {
             let mut times = vec![0.0];
             while times[times.len() - 1] < landings.end {
@@ -100,16 +119,35 @@ mod tests {
         assert_eq!(landings.steps_after(0.7, 0.1), 3);
         let with_output = Landings { interval: Some(0.5), ..landings };
         assert_eq!(times(&with_output), [0.0, 0.25, 0.5, 0.7, 1.0]);
-        let named = |times: Vec<f64>, interval| Landings { times, interval, end: 1.0 }.next(0.4).name;
+        let with_listed = Landings { output_times: vec![0.1, 0.6], ..with_output.clone() };
+        assert_eq!(times(&with_listed), [0.0, 0.1, 0.25, 0.5, 0.6, 0.7, 1.0]);
+        assert_eq!((with_listed.next(0.5).name, with_listed.next(0.6).name), (None, Some("[time] land_on")));
+        // One, then 0.2, 0.25; 0.35, 0.45, 0.55, 0.6; 0.7; 0.8 to 1.
+        assert_eq!(with_listed.steps_after(0.0, 0.1), 1 + 2 + 4 + 1 + 3);
+        let named = |times: Vec<f64>, interval| {
+            Landings { times, output_times: Vec::new(), interval, end: 1.0 }.next(0.4).name
+        };
         assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
         assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
-        let none = Landings { times: Vec::new(), interval: None, end: 1.0 };
+        let none = Landings { times: Vec::new(), output_times: Vec::new(), interval: None, end: 1.0 };
         assert_eq!((none.next(0.3).time, none.steps_after(0.0, 0.3)), (1.0, 4));
     }
 
     #[test]
-    fn times_between_multiples_are_unchanged() {
+    fn times_between_multiples_stay_where_they_are() {
         assert_eq!(snapped_to_multiple(0.65, 0.1), 0.65);
-        assert_eq!(snapped_to_multiple(0.1 + 0.2, 0.1), 3.0 * 0.1);
+        assert_eq!(snapped_to_multiple(0.1 + 0.2, 0.1), 0.3);
+    }
+
+    #[test]
+    fn times_have_the_digits_of_the_step() {
+        let mut time = 0.0;
+        for step in 1..=1000 {
+            time = snapped_to_multiple(time + 0.05, 0.05);
+            assert_eq!(time, f64::from(step) / 20.0);
+        }
+        let third = 1.0 / 3.0;
+        assert_eq!(snapped_to_multiple(third + third, third), 2.0 / 3.0);
+        assert_eq!([0.0, 1e-30, 3e-7].map(without_rounding), [0.0, 1e-30, 3e-7]);
     }
 }

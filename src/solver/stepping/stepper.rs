@@ -18,6 +18,7 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{Step, WORK},
+        resultants::VelocityChange,
         state::State,
     },
     job::{Accept, Scheme},
@@ -108,6 +109,16 @@ impl Stepper {
     /// Whether a vector of nodal loads exists.
     pub fn has_load(&self) -> bool {
         self.load.is_some()
+    }
+
+    /// The nodal loads of the last step, if there are loads.
+    pub fn load(&self) -> Option<&DistributedVector> {
+        self.load.as_ref()
+    }
+
+    /// The change of the velocity in the step just committed to the state.
+    pub fn velocity_change<'a>(&'a self, state: &'a State) -> VelocityChange<'a> {
+        self.integrator.velocity_change(state)
     }
 
     /// The preconditioner in use, and the reason for it.

@@ -61,7 +61,7 @@ impl<const D: usize> Contact<D> {
             };
             count.branches[branch.min(BRANCHES - 1)] += 1;
         }
-        for motion in self.friction.iter().flat_map(|f: &Friction<D>| f.motions(velocity)) {
+        for (motion, _) in self.friction.iter().flat_map(|f: &Friction<D>| f.motions(Newton, velocity)) {
             match motion {
                 Motion::Sticks => count.sticking += 1,
                 Motion::Slides => count.slipping += 1,

@@ -163,7 +163,7 @@ impl<const D: usize> Friction<D> {
     }
 
     /// The points with their sliding velocities.
-    fn sliding(
+    pub(super) fn sliding(
         &self,
         vectors: Vectors,
         velocity: &[f64],
@@ -302,15 +302,15 @@ impl<const D: usize> Friction<D> {
         self.law.steepest_decrease() * most
     }
 
-    /// The state of each point, at velocities in a vector of Newton's method.
-    pub(super) fn motions(&self, velocity: &[f64]) -> impl Iterator<Item = Motion> {
-        self.sliding(Newton, velocity).map(|(point, sliding)| {
+    /// The state of each point with its weight, at these velocities.
+    pub(super) fn motions(&self, vectors: Vectors, velocity: &[f64]) -> impl Iterator<Item = (Motion, f64)> {
+        self.sliding(vectors, velocity).map(|(point, sliding)| {
             if self.law.follows_pressure() && point.pressure <= 0.0 {
-                return Motion::Separated;
+                return (Motion::Separated, point.weight);
             }
             let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
             let found = self.law.resolve(norm(&parameter), self.scale, point.pressure);
-            if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }
+            (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
         })
     }
 

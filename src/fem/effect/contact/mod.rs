@@ -30,6 +30,7 @@ mod newton;
 mod point;
 mod prepare;
 mod reference;
+mod resultant;
 mod sliding;
 mod squares;
 mod starts;
@@ -51,6 +52,7 @@ pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, STORED_IN_CONTACT};
 pub use reference::ReferenceValues;
+pub use resultant::{ContactAreas, PointState};
 pub use unknowns::choose_unknowns;
 
 /// The law along the normal of a contact boundary, and its points.

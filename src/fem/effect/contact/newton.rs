@@ -79,7 +79,7 @@ impl<const D: usize> Contact<D> {
             branch.min(255) as u8
         }));
         if let Some(friction) = &self.friction {
-            out.extend(friction.motions(velocity).map(|motion| motion as u8));
+            out.extend(friction.motions(Newton, velocity).map(|(motion, _)| motion as u8));
         }
     }
 

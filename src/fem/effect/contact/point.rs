@@ -227,6 +227,13 @@ impl<const D: usize> Point<D> {
         }
     }
 
+    /// Visits the forces in N on the body of a pressure in Pa, with those that supports take up.
+    pub(super) fn forces(&self, pressure: f64, mut visit: impl FnMut(u32, Vector<D>)) {
+        for (node, share) in self.nodes() {
+            visit(node as u32, self.normal.map(|n| -self.weight * share * pressure * n));
+        }
+    }
+
     /// The unbalanced normal force per area at this point, from a residual, a vector of Newton's method.
     pub(super) fn open_pressure(&self, residual: &[f64]) -> f64 {
         let mut largest = 0.0f64;

@@ -10,12 +10,13 @@ use crate::{
         effect::{Blend, Energy, NUMERICAL, Outcome, Step},
         space::Batch,
     },
-    laws::material::{Extrapolated, Flow, FlowLaw, Tangent},
+    laws::material::{Extrapolated, Flow, FlowLaw, Isotropic, Tangent},
     linear_algebra::{
-        simd::Pack,
+        simd::{LANES, Pack, sum},
         tensor::{Mandel, add_scaled, dot},
     },
 };
+use multiversion::multiversion;
 
 impl<const S: usize> ViscoplasticFlow<S> {
     /// Lets each cell of the batch flow and takes what flow releases from its stresses.
@@ -27,14 +28,18 @@ impl<const S: usize> ViscoplasticFlow<S> {
         outcome: &mut Outcome,
     ) {
         let Some(law) = self.laws.get(batch.material) else { return };
-        let Some(&converged) = self.stress.converged(batch.number) else { return };
-        let Blend { length, earlier, .. } = blend;
+        let Some((&converged, trial)) = self.stress.both_mut(batch.number) else { return };
+        *trial = converged;
         let mut accumulated = self.accumulated.as_mut().filter(|_| law.hardens());
-        for lane in 0..batch.count {
-            let history = converged.lane(lane);
-            let elastic = add_scaled(&law.elasticity().apply(&batch.strain.lane(lane)), 1.0, &history);
-            let before = accumulated.as_ref().and_then(|a| a.converged(batch.number));
-            let before = before.map_or(0.0, |before| before.0[0][lane]);
+        let mut before = [0.0; LANES];
+        if let Some((converged, trial)) = accumulated.as_mut().and_then(|all| all.both_mut(batch.number)) {
+            *trial = *converged;
+            [before] = converged.0;
+        }
+        let (elastic, yielding) = elastic_stresses(law, &batch.strain, &converged, &before);
+        let Blend { length, earlier, .. } = blend;
+        for lane in (0..batch.count).filter(|&lane| yielding[lane]) {
+            let (elastic, before) = (elastic.lane(lane), before[lane]);
             let change = if earlier == 0.0 { [0.0; S] } else { self.stress.last_change(batch.number, lane) };
             let mut tangent = [[0.0; S]; S];
             let wanted = outcome.tangents.is_some().then_some(&mut tangent);
@@ -46,21 +51,18 @@ impl<const S: usize> ViscoplasticFlow<S> {
                 let last = Extrapolated { flow, growth: -earlier * growth };
                 law.continue_flow(&elastic, &last, length, before, wanted)
             };
-            let (mut after, mut total) = (history, before);
-            if let Some((found, symmetric)) = &found {
-                let release = law.elasticity().apply(&found.flow);
-                after = add_scaled(&history, -1.0, &release);
-                total = found.accumulated;
-                add_to(&mut batch.stress, lane, 1.0, &release);
-                add_to(&mut batch.elastic_stress, lane, -1.0, &release);
-                outcome.has_flowed = true;
-                if let Some(tangents) = &mut outcome.tangents {
-                    tangents.push(batch.first + lane, &tangent_change(law, &tangent, length), *symmetric);
-                }
-            }
+            let Some((found, symmetric)) = found else { continue };
+            let release = law.elasticity().apply(&found.flow);
+            let after = add_scaled(&converged.lane(lane), -1.0, &release);
             self.stress.set_trial(batch.number, lane, after);
             if let Some(accumulated) = &mut accumulated {
-                accumulated.set_trial(batch.number, lane, [total]);
+                accumulated.set_trial(batch.number, lane, [found.accumulated]);
+            }
+            add_to(&mut batch.stress, lane, 1.0, &release);
+            add_to(&mut batch.elastic_stress, lane, -1.0, &release);
+            outcome.has_flowed = true;
+            if let Some(tangents) = &mut outcome.tangents {
+                tangents.push(batch.first + lane, &tangent_change(law, &tangent, length), symmetric);
             }
         }
     }
@@ -74,29 +76,68 @@ impl<const S: usize> ViscoplasticFlow<S> {
         energy: &mut Energy,
     ) {
         let Some(elasticity) = self.laws.get(batch.material).map(FlowLaw::elasticity) else { return };
-        let Some([converged, trial]) = self.stress.both(batch.number) else { return };
-        let (share, two_steps) = (batch.integrity.shares(), blend.earlier != 0.0);
-        for lane in 0..batch.count {
-            let [history, after] = [converged.lane(lane), trial.lane(lane)];
-            let [strain, before] = [batch.strain.lane(lane), batch.strain_before.lane(lane)];
-            let change = add_scaled(&strain, -1.0, &before);
-            let stress = add_scaled(&elasticity.apply(&strain), 1.0, &after);
-            let before = add_scaled(&elasticity.apply(&before), 1.0, &history);
-            let jump = add_scaled(&stress, -1.0, &before);
-            let mismatch = add_scaled(&change, -step.length, &batch.strain_rate.lane(lane));
-            let (mut taken, mut dissipated) = (0.0, 0.0);
-            if after != history {
-                let flow = elasticity.solve(&add_scaled(&history, -1.0, &after));
-                taken = dot(&stress, &flow);
-                // Trapezoidal, of second order as the formula is. Never negative: the difference is a term of the scheme.
-                dissipated = if two_steps { 0.5 * (taken + dot(&before, &flow)) } else { taken }.max(0.0);
-            }
-            let share = share[lane] * batch.cells.volume[lane];
-            energy[VISCOPLASTIC] += share * dissipated;
-            let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - taken);
-            energy[NUMERICAL] += share * own;
-        }
+        let Some(histories) = self.stress.both(batch.number) else { return };
+        let taken = Taken { elasticity, length: step.length, is_trapezoidal: blend.earlier != 0.0 };
+        let strains = [&batch.strain_before, &batch.strain, &batch.strain_rate];
+        let share = batch.integrity.shares();
+        let weights = std::array::from_fn(|lane| share[lane] * batch.cells.volume[lane]);
+        let [viscoplastic, numerical] = energies(&taken, strains, histories, &weights);
+        energy[VISCOPLASTIC] += viscoplastic;
+        energy[NUMERICAL] += numerical;
     }
+}
+
+/// What flow takes up in a step.
+struct Taken<'a> {
+    elasticity: &'a Isotropic,
+    /// The length of the step in s.
+    length: f64,
+    /// Whether the dissipation is that of the trapezoidal rule, of second order as the formula is.
+    is_trapezoidal: bool,
+}
+
+/// The energy that cells of these weights dissipate, and the terms of the scheme, given the strains before and after the step and its
+/// rate, and converged and trial histories.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn energies<const S: usize>(
+    taken: &Taken<'_>,
+    [strain_before, strain, rate]: [&Pack<S>; 3],
+    [converged, trial]: [&Pack<S>; 2],
+    weights: &[f64; LANES],
+) -> [f64; 2] {
+    let Taken { elasticity, length, is_trapezoidal } = *taken;
+    let [mut viscoplastic, mut numerical] = [[0.0; LANES]; 2];
+    for lane in 0..LANES {
+        let [history, after] = [converged.lane(lane), trial.lane(lane)];
+        let [strain, before] = [strain.lane(lane), strain_before.lane(lane)];
+        let change = add_scaled(&strain, -1.0, &before);
+        let stress = add_scaled(&elasticity.apply(&strain), 1.0, &after);
+        let before = add_scaled(&elasticity.apply(&before), 1.0, &history);
+        let jump = add_scaled(&stress, -1.0, &before);
+        let mismatch = add_scaled(&change, -length, &rate.lane(lane));
+        let flow = elasticity.solve(&add_scaled(&history, -1.0, &after));
+        let work = dot(&stress, &flow);
+        // Never negative: the difference is a term of the scheme.
+        let dissipated = if is_trapezoidal { 0.5 * (work + dot(&before, &flow)) } else { work }.max(0.0);
+        viscoplastic[lane] = weights[lane] * dissipated;
+        let own = dot(&stress, &mismatch) - 0.5 * elasticity.inverse_square(&jump) + (dissipated - work);
+        numerical[lane] = weights[lane] * own;
+    }
+    [sum(&viscoplastic), sum(&numerical)]
+}
+
+/// The stresses of a batch if nothing flowed, and where they may flow.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn elastic_stresses<const S: usize>(
+    law: &FlowLaw,
+    strain: &Pack<S>,
+    history: &Pack<S>,
+    accumulated: &[f64; LANES],
+) -> (Pack<S>, [bool; LANES]) {
+    let elasticity = *law.elasticity();
+    let stresses =
+        Pack::from_lanes(|lane| add_scaled(&elasticity.apply(&strain.lane(lane)), 1.0, &history.lane(lane)));
+    (stresses, law.yielding(&stresses, accumulated))
 }
 
 /// Adds to the stress of a cell by its lane.

@@ -64,6 +64,13 @@ pub trait Flow {
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<(Mandel<S>, f64)>;
 
+    /// Which stresses of a pack may flow in a step that would end with them if nothing flowed: where this is false,
+    /// [`flow_to_end`](Self::flow_to_end) finds no flow.
+    #[inline(always)]
+    fn yielding<const S: usize>(&self, _stresses: &Pack<S>, _accumulated: &[f64; LANES]) -> [bool; LANES] {
+        [true; LANES]
+    }
+
     /// Whether the tangent times `E` is symmetric, as it is where flow is associated.
     fn has_symmetric_tangent<const S: usize>(&self) -> bool {
         true

@@ -104,6 +104,16 @@ impl Flow for Elastic<Perzyna> {
         })
     }
 
+    #[inline(always)]
+    fn yielding<const S: usize>(&self, stresses: &Pack<S>, accumulated: &[f64; LANES]) -> [bool; LANES] {
+        let mut yielding = [false; LANES];
+        for lane in 0..LANES {
+            let overstress = von_mises(&stresses.lane(lane)) - self.strength(accumulated[lane]);
+            yielding[lane] = overstress > 0.0 || overstress.is_nan();
+        }
+        yielding
+    }
+
     fn has_symmetric_tangent<const S: usize>(&self) -> bool {
         S != 3
     }

@@ -37,6 +37,22 @@ fn stresses_flow_together_as_they_do_one_by_one() {
 }
 
 #[test]
+fn stresses_yield_together_where_they_flow_one_by_one() {
+    let stresses = Pack::from_lanes(|lane| [2.0 * lane as f64 - 1.0, 3.0, -0.7 * lane as f64]);
+    for hardening_modulus in [None, Some(20.0)] {
+        let mut law = law(Metric::Elasticity, Hypothesis::PlaneStress);
+        law.parameters.hardening_modulus = hardening_modulus;
+        let accumulated = array::from_fn(|lane| 0.02 * lane as f64);
+        let yielding = law.yielding(&stresses, &accumulated);
+        let flows: [bool; LANES] = array::from_fn(|lane| {
+            law.flow_to_end(&stresses.lane(lane), 0.1, accumulated[lane], None).is_some()
+        });
+        assert_eq!(yielding, flows);
+        assert!(yielding.contains(&true) && yielding.contains(&false));
+    }
+}
+
+#[test]
 fn pure_shear_is_scaled_to_the_surface_in_every_metric() {
     for metric in METRICS {
         let projected = law(metric, Hypothesis::PlaneStress).project(&[0.0, 0.0, 100.0]);

@@ -1,0 +1,124 @@
+//! Forces of a contact on the body, and the parts of its area by state.
+
+use super::{
+    Contact,
+    friction::Motion,
+    point::{Unknown, Vectors::Body},
+};
+use crate::{
+    error::Result,
+    linear_algebra::tensor::{Vector, larger},
+};
+
+/// Areas in m^(D-1) of a contact by the state of its points, and its pressures; points whose normal a support holds count for
+/// friction only.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactAreas {
+    /// With contact pressure.
+    pub touching: f64,
+    /// Without contact pressure.
+    pub open: f64,
+    /// With friction, sticking.
+    pub sticking: f64,
+    /// With friction and sliding.
+    pub slipping: f64,
+    /// Integral of the contact pressure over the area in N.
+    pub pressure: f64,
+    /// Largest contact pressure in Pa; minus infinity where nothing touches.
+    pub largest_pressure: f64,
+}
+
+/// The state of a nodal point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointState<const D: usize> {
+    /// Contact pressure in Pa.
+    pub pressure: f64,
+    /// Distance to the obstacle in m; 0 if the law has no gap.
+    pub gap: f64,
+    /// Branch of the normal law.
+    pub branch: usize,
+    /// With friction, whether it sticks.
+    pub sticks: Option<bool>,
+    /// Velocity relative to the obstacle along the boundary in m/s, with friction.
+    pub sliding: Vector<D>,
+}
+
+impl<const D: usize> Default for PointState<D> {
+    fn default() -> Self {
+        Self { pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding: [0.0; D] }
+    }
+}
+
+impl<const D: usize> Contact<D> {
+    /// Areas and pressures on this rank in the step just solved, at its velocities with ghosts.
+    pub fn areas(&self, velocity: &[f64]) -> ContactAreas {
+        let mut areas = ContactAreas { largest_pressure: f64::NEG_INFINITY, ..ContactAreas::default() };
+        for point in self.points.iter().filter(|point| point.unknown != Unknown::Held) {
+            let pressure = point.pressure_at(&self.law, Body, velocity);
+            if pressure == 0.0 {
+                areas.open += point.weight;
+            } else {
+                areas.touching += point.weight;
+                areas.pressure += point.weight * pressure;
+                areas.largest_pressure = larger(areas.largest_pressure, pressure);
+            }
+        }
+        for (motion, weight) in self.friction.iter().flat_map(|friction| friction.motions(Body, velocity)) {
+            match motion {
+                Motion::Sticks => areas.sticking += weight,
+                Motion::Slides => areas.slipping += weight,
+                Motion::Separated => {}
+            }
+        }
+        areas
+    }
+
+    /// Visits the states of nodal points on this rank in the step just solved, at its time, displacements and velocities with ghosts.
+    pub fn states(
+        &self,
+        time: f64,
+        [displacement, velocity]: [&[f64]; 2],
+        mut visit: impl FnMut(usize, PointState<D>),
+    ) -> Result<()> {
+        if self.needs_ghosts {
+            return Ok(());
+        }
+        let friction = self.friction.as_ref();
+        let mut moving =
+            friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).peekable();
+        let mut motions = friction.into_iter().flat_map(|friction| friction.motions(Body, velocity));
+        for (at, point) in self.points.iter().enumerate() {
+            let mut state = PointState::default();
+            while let Some((_, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
+                state.sliding = sliding;
+                state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);
+            }
+            if point.unknown != Unknown::Held {
+                state.pressure = point.pressure_at(&self.law, Body, velocity);
+                let along = point.normal_component(Body, velocity);
+                let parameter = self.scale * along + state.pressure;
+                state.branch = match point.unknown {
+                    Unknown::Parameter => self.law.resolve(parameter, self.scale, point.context).branch,
+                    _ => self.law.branch(along, point.context),
+                };
+            }
+            if self.law.depends_on_displacement() {
+                let gap = self.gap.at(time, &point.place, &point.normal)?;
+                state.gap = gap - point.normal_component(Body, displacement);
+            }
+            visit(point.node(), state);
+        }
+        Ok(())
+    }
+
+    /// Visits the forces in N on the body at the nodes of points on this rank in the step just solved, at its velocities with ghosts.
+    /// They include those that supports take up where these fix a part of the normal.
+    pub fn forces(&self, velocity: &[f64], mut visit: impl FnMut(u32, Vector<D>)) {
+        for point in &self.points {
+            point.forces(point.pressure_at(&self.law, Body, velocity), &mut visit);
+        }
+        for point in self.friction.iter().flat_map(|friction| &friction.points) {
+            visit(point.node() as u32, point.traction.map(|q| -point.weight * q));
+        }
+    }
+}

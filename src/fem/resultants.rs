@@ -1,0 +1,317 @@
+//! Forces and moments on a body: reactions of supports, contact, loads, and the rate of momentum, which is their sum.
+
+use super::{
+    body::Body,
+    effect::{ContactAreas, Form, SurfaceForce, fixed_components},
+    state::State,
+};
+use crate::{
+    error::Result,
+    job::Support,
+    linear_algebra::{petsc::DistributedVector, tensor::Vector},
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
+};
+use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
+
+/// The force and the moment of one source on the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resultant<const D: usize> {
+    /// Force in N (N/m in the plane).
+    pub force: Vector<D>,
+    /// Moment about the origin at the initial positions of the nodes in N m; in the plane only the last component, in N.
+    pub moment: Vector<3>,
+}
+
+impl<const D: usize> Resultant<D> {
+    /// Number of entries in an array of sums.
+    const WIDTH: usize = D + 3;
+
+    fn read(sums: &[f64]) -> Self {
+        Self { force: std::array::from_fn(|i| sums[i]), moment: std::array::from_fn(|i| sums[D + i]) }
+    }
+}
+
+/// What acts on a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// A support, by its position in the job.
+    Support(usize),
+    /// A contact with its adhesion and memory, by its position in the job.
+    Contact(usize),
+    /// A traction, by its position in the job.
+    Traction(usize),
+    /// All body forces.
+    BodyForce,
+    /// Not a force: the rate of momentum and of angular momentum, the sum of all others.
+    Momentum,
+}
+
+/// The change of the velocity in the step just committed, as the scheme has it: `(velocity - before) / length` is its rate.
+#[derive(Debug, Clone, Copy)]
+pub struct VelocityChange<'a> {
+    /// In m/s, with ghosts.
+    pub before: &'a DistributedVector,
+    /// In s.
+    pub length: f64,
+}
+
+/// Computes the resultants of all sources after each step.
+#[derive(Debug)]
+pub struct Resultants<const D: usize> {
+    sources: Vec<Source>,
+    /// Local components that supports hold, in order, each with the first support that holds it.
+    held: Vec<(u32, u32)>,
+    /// For each local node its share of the mass and of the first moments of mass of this rank's cells; empty without inertia.
+    masses: Vec<(f64, Vector<D>)>,
+    /// Resultants of the loads of this rank, once they are known and if they are the same at all times.
+    steady: Option<Vec<f64>>,
+    surface: Vec<SurfaceForce<D>>,
+    /// Values of this rank and of all ranks: resultants of all sources, then areas of all contacts.
+    sums: [Vec<f64>; 2],
+    /// Largest pressure of each contact.
+    largest: Vec<f64>,
+}
+
+impl<const D: usize> Resultants<D> {
+    /// Prepares the sources of a job with these supports, and requests the forces at them of the body. Collective.
+    pub fn new<const S: usize>(
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        supports: &[Support],
+    ) -> Result<Self, Agreed> {
+        let mesh = &body.mesh;
+        let mut first = vec![None; mesh.nodes.len() * D];
+        for (at, support) in supports.iter().enumerate() {
+            let holds =
+                session.agree(fixed_components(mesh, std::slice::from_ref(support), &state.velocity))?;
+            let components = first.iter_mut().zip(holds).filter(|(_, holds)| *holds);
+            components.for_each(|(first, _)| *first = first.or(Some(at as u32)));
+        }
+        let held: Vec<(u32, u32)> =
+            first.iter().enumerate().filter_map(|(at, support)| Some((at as u32, (*support)?))).collect();
+        let has_held = |node: &u32| first[*node as usize * D..][..D].iter().any(Option::is_some);
+        let cell_has_held = |cell: usize| mesh.cell(cell).iter().any(has_held);
+        let runs = body.geometry.runs.iter();
+        body.request_support_forces(
+            runs.map(|run| (run.first..run.first + run.count).any(cell_has_held)).collect(),
+        );
+        let mut sources: Vec<Source> = (0..supports.len()).map(Source::Support).collect();
+        sources.extend((0..body.contacts.len()).map(Source::Contact));
+        sources.extend((0..body.load.tractions.len()).map(Source::Traction));
+        if !body.load.body_forces.is_empty() {
+            sources.push(Source::BodyForce);
+        }
+        let mut masses = Vec::new();
+        if body.has_form(Form::Mass) {
+            sources.push(Source::Momentum);
+            let [mut mass, mut moment] = [vec![0.0; first.len()], vec![0.0; first.len()]];
+            body.add_form(Form::Mass, &vec![1.0; first.len()], &mut mass);
+            body.add_form(Form::Mass, mesh.nodes.as_flattened(), &mut moment);
+            let shares = mass.chunks_exact(D).zip(moment.chunks_exact(D));
+            masses.extend(shares.map(|(mass, moment)| (mass[0], std::array::from_fn(|i| moment[i]))));
+        }
+        let sums = vec![0.0; sources.len() * Resultant::<D>::WIDTH + body.contacts.len() * AREAS];
+        Ok(Self {
+            sources,
+            held,
+            masses,
+            steady: None,
+            surface: Vec::new(),
+            sums: [sums.clone(), sums],
+            largest: vec![0.0; body.contacts.len()],
+        })
+    }
+
+    /// The sources, in the order of the rows.
+    pub fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    /// The resultants of the step last updated, with the areas of contacts.
+    pub fn rows(&self) -> impl Iterator<Item = (Resultant<D>, Option<ContactAreas>)> {
+        let sums = &self.sums[1];
+        let (resultants, areas) = sums.split_at(self.sources.len() * Resultant::<D>::WIDTH);
+        let of_source = self.sources.iter().zip(resultants.chunks_exact(Resultant::<D>::WIDTH));
+        of_source.map(|(source, values)| {
+            let areas = if let &Source::Contact(at) = source {
+                let [touching, open, sticking, slipping, pressure] =
+                    std::array::from_fn(|i| areas[at * AREAS + i]);
+                let largest_pressure = self.largest[at];
+                Some(ContactAreas { touching, open, sticking, slipping, pressure, largest_pressure })
+            } else {
+                None
+            };
+            (Resultant::read(values), areas)
+        })
+    }
+
+    /// Computes the resultants of the step just committed, given the nodal loads in it. Collective.
+    pub fn update<const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        change: VelocityChange<'_>,
+        load: Option<&DistributedVector>,
+    ) -> Result<(), Agreed> {
+        session.agree(self.collect(body, state, change, load))?;
+        let [mine, all] = &mut self.sums;
+        if !mine.is_empty() {
+            session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
+        }
+        self.largest.iter_mut().for_each(|largest| [*largest] = session.largest([*largest]));
+        Ok(())
+    }
+
+    /// Writes the sums of this rank.
+    fn collect<const S: usize>(
+        &mut self,
+        body: &Body<D, S>,
+        state: &State,
+        change: VelocityChange<'_>,
+        load: Option<&DistributedVector>,
+    ) -> Result<()> {
+        let Self { sources, held, masses, steady, surface, sums, largest } = self;
+        let mesh = &body.mesh;
+        let (resultants, areas) = sums[0].split_at_mut(sources.len() * Resultant::<D>::WIDTH);
+        resultants.fill(0.0);
+        let mut sums = Sums { sources, held, fixed: &body.fixed, mesh, values: resultants };
+        let velocity = state.velocity.local()?;
+        let before = change.before.local()?;
+        if let Some(load) = load {
+            let load = load.owned()?;
+            if let Some(steady) = steady {
+                sums.values.copy_from_slice(steady);
+            } else {
+                sums.add_loads(body, state.time, &load)?;
+                if body.load.is_steady() {
+                    *steady = Some(sums.values.to_vec());
+                }
+            }
+            held.iter().take_while(|(component, _)| (*component as usize) < load.len()).for_each(
+                |&(component, support)| sums.react(component as usize, support, load[component as usize]),
+            );
+        }
+        if !held.is_empty() {
+            body.with_support_forces(state, (&before, change.length), |forces| {
+                held.iter().for_each(|&(component, support)| {
+                    sums.react(component as usize, support, forces[component as usize]);
+                });
+            })?;
+        }
+        for (at, contact) in body.contacts.iter().enumerate() {
+            contact.forces(&velocity, |node, force| sums.add_and_react(Source::Contact(at), node, &force));
+            let found = contact.areas(&velocity);
+            areas[at * AREAS..][..AREAS].copy_from_slice(&[
+                found.touching,
+                found.open,
+                found.sticking,
+                found.slipping,
+                found.pressure,
+            ]);
+            largest[at] = found.largest_pressure;
+        }
+        surface.clear();
+        body.write_surface_forces(state, surface)?;
+        for SurfaceForce { contact, node, force } in surface {
+            sums.add_and_react(Source::Contact(*contact), *node, force);
+        }
+        if !masses.is_empty() {
+            let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
+            let changes = velocity.chunks_exact(D).zip(before.chunks_exact(D));
+            for ((mass, centre), (now, before)) in masses.iter().zip(changes) {
+                let rate: Vector<D> = std::array::from_fn(|i| (now[i] - before[i]) / change.length);
+                (0..D).for_each(|i| force[i] += mass * rate[i]);
+                let own = moment_of(centre, &rate);
+                (0..3).for_each(|i| moment[i] += own[i]);
+            }
+            sums.put(Source::Momentum, &force, &moment);
+        }
+        Ok(())
+    }
+}
+
+/// Number of sums of each contact: areas by state and the integral of the pressure.
+const AREAS: usize = 5;
+
+/// The resultants of this rank while they are summed.
+struct Sums<'a, const D: usize> {
+    sources: &'a [Source],
+    held: &'a [(u32, u32)],
+    fixed: &'a [bool],
+    mesh: &'a Mesh<D>,
+    values: &'a mut [f64],
+}
+
+impl<const D: usize> Sums<'_, D> {
+    /// Adds a force and a moment.
+    fn put(&mut self, source: Source, force: &Vector<D>, moment: &Vector<3>) {
+        let Some(at) = self.sources.iter().position(|known| *known == source) else { return };
+        let values = &mut self.values[at * Resultant::<D>::WIDTH..][..Resultant::<D>::WIDTH];
+        values.iter_mut().zip(force.iter().chain(moment)).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Adds a force at a node.
+    fn add(&mut self, source: Source, node: u32, force: &Vector<D>) {
+        let moment = moment_of(&self.mesh.nodes[node as usize], force);
+        self.put(source, force, &moment);
+    }
+
+    /// Adds a force at a node, and the reactions of the supports that hold components there.
+    fn add_and_react(&mut self, source: Source, node: u32, force: &Vector<D>) {
+        self.add(source, node, force);
+        for i in 0..D {
+            let component = node as usize * D + i;
+            if self.fixed[component]
+                && let Ok(at) = self.held.binary_search_by_key(&(component as u32), |held| held.0)
+            {
+                self.react(component, self.held[at].1, force[i]);
+            }
+        }
+    }
+
+    /// Adds the reaction of a support to a force at a component that it holds.
+    fn react(&mut self, component: usize, support: u32, force: f64) {
+        let mut reaction = [0.0; D];
+        reaction[component % D] = -force;
+        self.add(Source::Support(support as usize), (component / D) as u32, &reaction);
+    }
+
+    /// Adds the tractions, and as body forces the rest of the nodal loads at owned nodes.
+    fn add_loads<const S: usize>(&mut self, body: &Body<D, S>, time: f64, load: &[f64]) -> Result<()> {
+        let has_body_forces = !body.load.body_forces.is_empty();
+        for (at, traction) in body.load.tractions.iter().enumerate() {
+            traction.forces(self.mesh, time, |node, force| {
+                self.add(Source::Traction(at), node, &force);
+                if has_body_forces {
+                    self.add(Source::BodyForce, node, &force.map(|f| -f));
+                }
+            })?;
+        }
+        if has_body_forces {
+            for (node, force) in load.chunks_exact(D).enumerate() {
+                self.add(Source::BodyForce, node as u32, &std::array::from_fn(|i| force[i]));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The moment of a force at a point about the origin.
+fn moment_of<const D: usize>(point: &Vector<D>, force: &Vector<D>) -> Vector<3> {
+    let turn = |i: usize, j: usize| point[i] * force[j] - point[j] * force[i];
+    if D == 2 { [0.0, 0.0, turn(0, 1)] } else { [turn(1, 2), turn(2, 0), turn(0, 1)] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_those_about_the_origin() {
+        assert_eq!(moment_of(&[2.0, 3.0], &[5.0, 7.0]), [0.0, 0.0, -1.0]);
+        assert_eq!(moment_of(&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.5]), [-2.0, 5.5, -3.0]);
+    }
+}

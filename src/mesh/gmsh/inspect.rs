@@ -1,0 +1,60 @@
+//! Description of a mesh file.
+
+use super::{AnyMesh, read};
+use crate::{error::Result, linear_algebra::tensor::norm, mesh::GlobalMesh, mesh::shape::facet_normal};
+use std::path::Path;
+
+/// Describes a mesh: cells by region, nodes, extent and boundaries. An invalid mesh is refused with the reason.
+pub fn inspect(path: &Path) -> Result<String> {
+    let words = match read(path)? {
+        AnyMesh::Two(mesh) => words(&mesh),
+        AnyMesh::Three(mesh) => words(&mesh),
+    };
+    Ok(format!("{}: a valid mesh\n\n{words}", path.display()))
+}
+
+fn words<const D: usize>(mesh: &GlobalMesh<D>) -> String {
+    let kind = if D == 2 { "triangles" } else { "tetrahedra" };
+    let mut lines = vec![
+        format!("cells       {} {kind}", mesh.cell_regions.len()),
+        format!("nodes       {}", mesh.nodes.len()),
+    ];
+    for (i, axis) in ["x", "y", "z"].iter().enumerate().take(D) {
+        let places = mesh.nodes.iter().map(|node| node[i]);
+        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        lines.push(format!("extent      {axis} from {low} to {high} m"));
+    }
+    for (number, name) in mesh.regions.iter().enumerate() {
+        let count = mesh.cell_regions.iter().filter(|region| usize::from(**region) == number).count();
+        lines.push(format!("region      {name}: {count} cells"));
+    }
+    let unit = if D == 2 { "m" } else { "m²" };
+    let measure = |facet: u32| {
+        let corners = mesh.facets[facet as usize].map(|node| mesh.nodes[node as usize]);
+        norm(&facet_normal(&corners))
+    };
+    for boundary in &mesh.boundaries {
+        let size: f64 = boundary.facets.iter().map(|facet| measure(*facet)).sum();
+        let (name, count) = (&boundary.name, boundary.facets.len());
+        lines.push(format!("boundary    {name}: {count} facets, {size:.6} {unit}"));
+    }
+    lines.push(format!("surface     {} facets", mesh.facets.len()));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_is_described_by_its_groups_and_its_extent() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/clamped_square.msh");
+        let words = inspect(&path).expect("a mesh");
+        for part in
+            ["a valid mesh", "triangles", "extent      x from 0 to 1 m", "boundary    bottom", "1.000000 m"]
+        {
+            assert!(words.contains(part), "{part}: {words}");
+        }
+        assert!(inspect(Path::new("nowhere.msh")).expect_err("refused").to_string().contains("nowhere.msh"));
+    }
+}

@@ -1,0 +1,128 @@
+//! Stages: a run that starts from the last state of another, and output at given times.
+
+use crate::{
+    case::Case,
+    hdf5_file::NumberFile,
+    launch,
+    results::{Results, relative_difference},
+};
+
+/// The first half of the paper's job, with its last state.
+fn first(scheme: &str) -> Case {
+    Case::square(6)
+        .set("time.end", "0.5")
+        .set("time.scheme", &format!("'{scheme}'"))
+        .set("checkpoint.every", "1000")
+}
+
+/// The second half, from the results of the first.
+fn second(scheme: &str, from: &str) -> Case {
+    Case::square(6)
+        .set("time.end", "0.5")
+        .set("time.scheme", &format!("'{scheme}'"))
+        .without("initial")
+        .set("initial.from", &format!("{from:?}"))
+}
+
+fn out(case: &Case) -> String {
+    case.folder().join("out").to_str().expect("text").to_owned()
+}
+
+/// Displacements and velocities of the probes at the last time.
+fn last(results: &Results) -> Vec<f64> {
+    let probes = results.table("probes.csv");
+    let last = probes.words("time").last().expect("a row").to_string();
+    let rows = probes.only("time", &last);
+    let columns = ["displacement_x", "displacement_y", "velocity_x", "velocity_y"];
+    columns.iter().flat_map(|column| rows.numbers(column)).collect()
+}
+
+#[test]
+fn two_stages_are_the_run_without_a_break_on_any_ranks() {
+    // With lagged_euler the stress at the start of a stage is that of its displacement, not of the one a step before.
+    for (scheme, ranks, share) in [("lagged_euler", [1, 2], 5e-3), ("implicit_euler", [2, 3], 1e-9)] {
+        let straight = Case::square(6).set("time.scheme", &format!("'{scheme}'"));
+        let expected = last(&straight.run(1));
+        let first = first(scheme).run_and_keep(ranks[0]);
+        for from in [out(&first), format!("{}/checkpoint-8.h5", out(&first))] {
+            let second = second(scheme, &from);
+            second
+                .run_with(ranks[1], &[])
+                .expect(0)
+                .says("starting from")
+                .says("checkpoint-8.h5 (step 8, t = 0.5 s)");
+            let found = last(&second.results());
+            let difference = relative_difference(&expected, &found);
+            assert!(difference < share, "{scheme}: {difference:e}");
+            assert_eq!(second.results().table("history.csv").numbers("step")[0], 1.0, "steps begin anew");
+        }
+    }
+}
+
+#[test]
+fn what_a_stage_lacks_is_dropped_and_what_it_adds_starts_at_rest() {
+    let first = first("lagged_euler").run_and_keep(1);
+    let second = second("bdf2", &out(&first))
+        .without("material.viscoplasticity")
+        .set("material.damage", "{ threshold = 1.0, viscosity = 1.0, largest = 0.5 }")
+        .set("traction.0.value", "[0.0, 0.0]");
+    second.run_with(2, &[]).expect(0).says("dropped: viscoplastic_history").says("at rest: damage");
+    // A restart of the second stage continues that stage.
+    let expected = last(&second.results());
+    let stopped = second.set("checkpoint.every", "2");
+    stopped.run_with(1, &["--force", "--set", "time.end=0.25"]).expect(0);
+    stopped.run_with(3, &["--restart"]).expect(0).says("continuing from").says("checkpoint-4.h5");
+    let difference = relative_difference(&expected, &last(&stopped.results()));
+    assert!(difference < 1e-9, "{difference:e}");
+}
+
+#[test]
+fn stages_run_one_after_another() {
+    let first = first("lagged_euler");
+    let from = out(&first);
+    let second = second("lagged_euler", &from);
+    let [one, two] = [&first, &second].map(|case| case.written().display().to_string());
+    launch::run(2, &["run".into(), one.clone(), two.clone()]).expect(0);
+    assert_eq!(second.results().number("time"), 0.5);
+    let both = ["run".to_owned(), one.clone(), one.clone()];
+    launch::run(1, &both).expect(2).says("two stages write to");
+    launch::run(1, &["run".into(), one, two, "--restart".into()]).expect(2).says("continues one job");
+}
+
+#[test]
+fn states_that_do_not_fit_are_refused() {
+    second("lagged_euler", "nowhere").run_with(2, &[]).expect(2).says("does not exist");
+    let empty = tempfile::tempdir().expect("a folder");
+    let empty = empty.path().to_str().expect("text");
+    second("lagged_euler", empty).run_with(1, &[]).expect(2).says("holds no checkpoint");
+    let first = first("lagged_euler").run_and_keep(1);
+    let other = second("lagged_euler", &out(&first)).set("mesh.rectangle.cells", "[5, 6]");
+    other.run_with(2, &[]).expect(2).says("another mesh");
+    let both = second("lagged_euler", &out(&first)).set("initial.velocity", "[0, 0]");
+    both.run_with(1, &[]).expect(2).says("`from` gives the whole initial state");
+}
+
+#[test]
+fn fields_profiles_and_checkpoints_come_at_the_times_listed() {
+    for adaptive in [false, true] {
+        let mut case = Case::square(6)
+            .set("output.fields", "{ at = [0.0, 0.3] }")
+            .set("output.profiles", "{ at = [0.45] }")
+            .set("checkpoint.at", "[0.15, 0.45]")
+            .set("checkpoint.keep", "10");
+        if adaptive {
+            case = case.set("time.adaptive", "{ smallest_step = 1e-4, largest_step = 0.0625 }");
+        }
+        let results = case.run(2);
+        assert_eq!(NumberFile::open(&results.path("fields.vtkhdf")).times(), [0.0, 0.3, 1.0]);
+        let mut times = results.table("profiles.csv").numbers("time");
+        times.dedup();
+        assert_eq!(times, [0.45, 1.0]);
+        assert_eq!(results.checkpoints().len(), 3, "two and the last one");
+        let steps = results.table("history.csv").numbers("time");
+        assert!([0.15, 0.3, 0.45].iter().all(|time| steps.contains(time)), "{steps:?}");
+    }
+    let late = Case::square(4).set("output.fields", "{ at = [0.5, 0.4] }").set("checkpoint.at", "[2.0]");
+    let refused = late.run_with(1, &[]).expect(2);
+    refused.says("in ascending order").says("after the end of the run");
+}
