@@ -35,13 +35,15 @@ impl Blend {
     }
 }
 
-/// The state at which laws are evaluated. The time scheme chooses it; effects are told.
+/// The state at which laws are evaluated, chosen by the time scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Evaluation {
-    /// The converged state before the step, once a step.
+    /// The converged state before the step; evaluated once a step.
     Converged,
-    /// The blend of states from which an implicit step starts, once a step: the known part of the stress at its end.
+    /// The blend of states from which an implicit step starts; evaluated once a step. Gives the known part of the stress at its
+    /// end.
     Start(Blend),
-    /// The end of an implicit step, for each iterate: the part of the stress that is no linear function of the velocity.
+    /// The end of an implicit step; evaluated for each iterate. Gives the part of the stress that is not a linear function of the
+    /// velocity.
     End(Blend),
 }

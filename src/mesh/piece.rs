@@ -1,4 +1,4 @@
-//! A part of a mesh that stands for itself: its cells and every node they touch.
+//! A self-contained part of a mesh: its cells and all of their nodes.
 
 use super::{Boundary, GlobalMesh, Names, partition::Partition};
 use crate::{
@@ -6,11 +6,11 @@ use crate::{
     linear_algebra::tensor::Vector,
 };
 
-/// In place of a position: a node or facet that is not in the piece.
+/// Marker, in place of a position, of a node or facet that is not in the piece.
 const ABSENT: u32 = u32::MAX;
 
-/// Cells with the nodes they touch, and the facets of the surface behind which they are. Original ids are positions in the
-/// whole mesh; nodes, cells and facets stand in their ascending order.
+/// Cells with their nodes, and their facets on the surface. Original ids are positions in the
+/// whole mesh; nodes, cells and facets are sorted by them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Piece<const D: usize> {
     /// Original ids of the nodes.
@@ -31,7 +31,7 @@ pub struct Piece<const D: usize> {
     pub facets: Vec<[u32; D]>,
     /// Positions in this piece of the cells behind the facets.
     pub facet_cells: Vec<u32>,
-    /// The boundary, as an index into the mesh's, and the position of each named facet; ascending.
+    /// The boundary, as an index into those of the mesh, and the position of each named facet; ascending.
     pub named: Vec<[u32; 2]>,
 }
 
@@ -66,7 +66,7 @@ impl<const D: usize> Piece<D> {
         out
     }
 
-    /// What is wrong with a piece that was read, one of `parts`.
+    /// The fault of a piece that was read, one of `parts`; `None` for a valid piece.
     pub fn check(&self, parts: usize, names: &Names) -> std::result::Result<(), &'static str> {
         let below = |numbers: &[u32], limit: usize| numbers.iter().all(|&number| (number as usize) < limit);
         let ascending = |ids: &[u32]| ids.is_sorted_by(|a, b| a < b);
@@ -92,7 +92,7 @@ impl<const D: usize> Piece<D> {
         }
     }
 
-    /// The whole mesh, of which this is all; refused where ids are missing.
+    /// The whole mesh, which this piece must contain completely; refused if ids are missing.
     pub fn into_whole(self, names: Names) -> Result<GlobalMesh<D>> {
         let whole = |ids: &[u32]| ids.iter().zip(0..).all(|(&id, place)| id == place);
         if !(whole(&self.node_ids) && whole(&self.cell_ids) && whole(&self.facet_ids)) {
@@ -115,8 +115,8 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// The ids of all pieces, ascending, each with a piece that has it and its position there; and for each piece where its ids
-/// stand among them.
+/// The ids of all pieces, ascending, each with a piece that contains it and its position there; and for each piece the positions of
+/// its ids among them.
 type Union = (Vec<(u32, usize, usize)>, Vec<Vec<u32>>);
 
 fn union<const D: usize>(pieces: &[Piece<D>], ids: impl Fn(&Piece<D>) -> &Vec<u32>) -> Union {

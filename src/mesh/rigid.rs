@@ -14,7 +14,7 @@ const INDEPENDENT: f64 = 1e-9;
 pub(super) struct Skeleton<const D: usize> {
     /// Coordinates in m.
     pub points: Vec<Vector<D>>,
-    /// Components held at each point by a body that can't move.
+    /// Components held at each point by an immovable body.
     pub held: Vec<[bool; D]>,
     /// The bodies, by number.
     pub bodies: Vec<Body<D>>,
@@ -159,7 +159,7 @@ pub(super) fn extend<I: Iterator<Item = Motion>>(
         if length <= INDEPENDENT {
             break;
         }
-        // Once more, so that rounding in a small rest does not spoil orthogonality.
+        // A second time, because rounding errors of a small remainder would impair orthogonality.
         let again = rest(best.map(|x| x / length));
         let length = norm(&again);
         basis.push(again.map(|x| x / length));
@@ -168,7 +168,7 @@ pub(super) fn extend<I: Iterator<Item = Motion>>(
     taken
 }
 
-/// The motions combined so that each turns about one axis where that is possible; those that don't turn are left out.
+/// Combinations of the motions that rotate about one axis each where possible; translations are omitted.
 fn reduced(mut motions: Vec<Motion>) -> Vec<Motion> {
     let mut done = 0;
     for axis in 3..6 {
@@ -238,7 +238,7 @@ mod tests {
     fn a_clamped_body_cannot_move() {
         assert!(free(&plate(), |p| [p[0] == 0.0; 2]).is_empty());
         assert!(free(&block(), |p| [p[2] == 0.0; 3]).is_empty());
-        // Rollers on three sides hold as well.
+        // Rollers on three sides also suffice.
         assert!(free(&block(), |p| p.map(|x| x == 0.0)).is_empty());
     }
 

@@ -4,10 +4,10 @@ use super::Tags;
 use super::shape::facet_of;
 use crate::error::{Error, Result};
 
-/// In place of a neighbour: the facet is on the outer surface.
+/// Marker, in place of a neighbour, of a facet on the outer surface.
 pub const OUTSIDE: u32 = u32::MAX;
 
-/// The cells behind each facet of each cell.
+/// The neighbours of each cell across its facets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topology<const D: usize> {
     /// `D + 1` a cell: the cell that shares the facet opposite to the cell's first, second, ... node, or [`OUTSIDE`].
@@ -26,7 +26,7 @@ pub(super) struct DualGraph {
 /// The parts of a mesh that are connected through shared facets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bodies {
-    /// How many there are.
+    /// Their number.
     pub count: usize,
     /// The body of each cell; bodies are numbered by their first cell.
     pub of_cell: Vec<u32>,
@@ -87,7 +87,7 @@ impl<const D: usize> Topology<D> {
         Ok(Self { neighbours })
     }
 
-    /// How many facets of cells have no cell on their other side.
+    /// Number of facets of cells without a neighbour.
     pub(super) fn facets_without_neighbour(&self) -> usize {
         self.neighbours.iter().filter(|&&neighbour| neighbour == OUTSIDE).count()
     }

@@ -11,9 +11,9 @@ use std::time::Duration;
 /// Time for which a rank with a fault of a library waits until the other ranks reach the agreement that ends the run.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// A failure that all ranks share: the same kind, rank and words on each of them, so that what a run does next may depend on it.
+/// A failure known to all ranks, with the same kind, rank and message on each, so that control flow may depend on it.
 ///
-/// Only [`agree`] makes one. What failed on one rank alone is an [`Error`], which can't be asked what it is.
+/// Only [`agree`] creates it. A failure of one rank is an [`Error`], whose kind is not accessible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{words}")]
 pub struct Agreed {
@@ -23,17 +23,17 @@ pub struct Agreed {
 }
 
 impl Agreed {
-    /// The exit code that all ranks end with.
+    /// The exit code of all ranks.
     pub fn exit(&self) -> Exit {
         self.exit
     }
 
-    /// The lowest rank that failed; it tells the user.
+    /// The lowest rank that failed, which prints the message.
     pub fn rank(&self) -> usize {
         self.rank
     }
 
-    /// Whether the computation failed, so that another method may succeed; false where the job is refused or a library has a fault.
+    /// Whether the computation failed, so that another method may succeed; false if the job is refused or a library failed.
     pub fn is_failure(&self) -> bool {
         self.exit == Exit::Failed
     }
@@ -45,11 +45,11 @@ impl From<Agreed> for Error {
     }
 }
 
-/// Turns the results of the ranks into one outcome: a value everywhere, or the same failure everywhere, that of the lowest rank
+/// Combines the results of the ranks into one outcome: a value on every rank, or on every rank the failure of the lowest rank
 /// that failed. Collective.
 pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result<T, E>) -> Result<T, Agreed> {
     let (size, rank) = (communicator.size(), communicator.rank());
-    // A value, which may be a file that all ranks close together, lives until they have agreed.
+    // The value may be a file that all ranks close together; it is kept until the ranks have agreed.
     let (value, error) = match result {
         Ok(value) => (Some(value), pass().err()),
         Err(error) => (None, Some(error.into())),
@@ -87,8 +87,10 @@ pub fn agree<T, E: Into<Error>>(communicator: &impl Communicator, result: Result
     })
 }
 
-/// Ends the run on all ranks unless what this gives is dropped in time. A library that fails on one rank amid a collective operation
-/// of its own leaves the others in it, so that they never come to the agreement; the run ends with exit code 4 in either case.
+/// Ends the run on all ranks unless the returned value is dropped in time. A library that fails on one rank amid a collective
+/// operation
+/// of its own leaves the other ranks waiting in it, so that they never reach the agreement; the run ends with exit code 4 in
+/// either case.
 fn end_alone_after_grace(rank: i32, error: &Error) -> Sender<()> {
     let words = format!(
         "error: rank {rank}: {error}\nOther ranks wait inside the library and cannot be notified: the run ends here."
@@ -104,12 +106,12 @@ fn end_alone_after_grace(rank: i32, error: &Error) -> Sender<()> {
 }
 
 thread_local! {
-    /// Agreements and file operations so far, and the one that is to fail.
+    /// Number of agreements and file operations so far, and the number of the one to fail.
     static PASSED: Cell<u64> = const { Cell::new(0) };
     static FAILS: Cell<u64> = const { Cell::new(u64::MAX) };
 }
 
-/// Counts an agreement or a file operation of this process; fails where a test wants it to.
+/// Counts an agreement or a file operation of this process; fails if a test requests it.
 pub(crate) fn pass() -> Result<()> {
     let number = PASSED.replace(PASSED.get() + 1);
     if number == FAILS.get() {
@@ -118,7 +120,8 @@ pub(crate) fn pass() -> Result<()> {
     Ok(())
 }
 
-/// For tests: counts agreements and file operations of this thread from zero, and lets the one of this number fail. Gives how many
+/// For tests: counts agreements and file operations of this thread from zero, and makes the one of this number fail. Returns how
+/// many
 /// there were.
 #[doc(hidden)]
 pub fn fail_at(number: Option<u64>) -> u64 {

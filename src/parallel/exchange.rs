@@ -1,4 +1,4 @@
-//! Messages between ranks whose lengths only the sender knows.
+//! Messages whose lengths are known to the sender only.
 
 use crate::{
     error::{Error, Result},
@@ -11,8 +11,8 @@ use mpi::{
     traits::CommunicatorCollectives,
 };
 
-/// Sends `counts[r]` of the numbers, one rank after the other, to rank `r`; gives what came, in the order of the ranks,
-/// and how many numbers from each. Collective, with the same outcome on all ranks.
+/// Sends `counts[r]` of the numbers, which are sorted by rank, to rank `r`; returns the received numbers in the order of the ranks,
+/// and their count for each rank. Collective, with the same outcome on all ranks.
 ///
 /// Fails where one rank sends or receives 2^31 numbers or more: MPI counts in 32 bits.
 pub fn exchange<T: Equivalence + Copy + Default>(
@@ -92,7 +92,7 @@ impl Gathering {
     }
 }
 
-/// Where each of the counted parts starts.
+/// The start of each of the counted parts.
 pub fn offsets(counts: &[usize]) -> Vec<usize> {
     counts.iter().scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
 }

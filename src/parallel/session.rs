@@ -26,7 +26,8 @@ pub struct Mpi {
 }
 
 impl Mpi {
-    /// Initialises MPI, and installs a panic hook that ends the run on all ranks with exit code 4, so that no rank waits for one that
+    /// Initialises MPI, and installs a panic hook that ends the run on all ranks with exit code 4, so that no rank waits for one
+    /// that
     /// has ended.
     pub fn start() -> Result<Self> {
         let (universe, _) = mpi::initialize_with_threading(Threading::Funneled)
@@ -81,13 +82,14 @@ impl Session {
         &self.petsc
     }
 
-    /// Turns a failure on any rank into the same failure on all ranks. Collective; to be called at the end of each phase in which a rank
+    /// Turns a failure on any rank into the same failure on all ranks. Collective; to be called at the end of each phase in which
+    /// a rank
     /// can fail, and before anything that depends on the outcome.
     pub fn agree<T, E: Into<Error>>(&self, result: Result<T, E>) -> Result<T, Agreed> {
         agree(&self.world, result)
     }
 
-    /// What a function gives on rank 0, where alone it is called; `None` elsewhere, and its failure on all ranks. Collective.
+    /// The value of a function that is called on rank 0 only; `None` on other ranks, and its failure on all ranks. Collective.
     pub fn on_first<T, E: Into<Error>>(
         &self,
         function: impl FnOnce() -> Result<T, E>,
@@ -111,7 +113,7 @@ impl Session {
 
     /// Largest of each entry over all ranks; NaN where it is NaN on any rank. Collective.
     pub fn largest<const N: usize>(&self, mine: [f64; N]) -> [f64; N] {
-        // What MPI makes of NaN in a maximum is not specified, so that integers in the same order are compared.
+        // MPI does not specify maxima of NaN; therefore integers in the same order are compared.
         let mut all = [0; N];
         self.world.all_reduce_into(&mine.map(ordered)[..], &mut all[..], SystemOperation::max());
         all.map(number)
@@ -124,14 +126,14 @@ impl Session {
         usize::try_from(all).unwrap_or(usize::MAX)
     }
 
-    /// Where this rank's share starts when the shares of all ranks stand one after another. Collective.
+    /// The start of this rank's share if the shares of all ranks follow each other in the order of the ranks. Collective.
     pub fn share_start(&self, mine: usize) -> usize {
         let mut end = 0u64;
         self.world.scan_into(&(mine as u64), &mut end, SystemOperation::sum());
         usize::try_from(end).unwrap_or(usize::MAX) - mine
     }
 
-    /// The signal that asked any rank to stop, if one did. Collective.
+    /// The signal by which any rank was asked to stop, if there was one. Collective.
     pub fn stop_requested(&self) -> Option<Signal> {
         let seen = self.signal.load(Ordering::Relaxed) as i32;
         let mut any = 0;
@@ -151,7 +153,8 @@ fn number(ordered: i64) -> f64 {
     f64::from_bits(flipped(ordered).cast_unsigned())
 }
 
-/// Inverts the bits of negative numbers except for the sign, so that the order of the integers is that of the floating-point numbers.
+/// Inverts the bits of negative numbers except for the sign, so that the order of the integers is that of the floating-point
+/// numbers.
 /// The map is its own inverse.
 fn flipped(bits: i64) -> i64 {
     if bits < 0 { bits ^ i64::MAX } else { bits }

@@ -6,19 +6,19 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Environment variable of Slurm with the end of the job, in seconds since 1970.
 const SLURM_END: &str = "SLURM_JOB_END_TIME";
-/// Seconds kept free before the end of a Slurm job, unless `[checkpoint] margin` says how many.
+/// Default of `[checkpoint] margin`: seconds kept free before the end of a Slurm job.
 const MARGIN: f64 = 30.0;
-/// The largest share of the time left at the start that is kept free, unless the job says how much.
+/// By default at most this share of the time left at the start is kept free.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// Limits of wall time, in s.
+/// Limits of wall time in s.
 #[derive(Debug, Clone, Copy)]
 struct Limits {
     /// From the launch on, by `[checkpoint] wall_limit`; infinite without one.
     wall: f64,
     /// From the start of the run to the end of the Slurm job; infinite outside of Slurm.
     slurm: f64,
-    /// Kept free before that end.
+    /// Time kept free before that end.
     margin: f64,
 }
 
@@ -89,12 +89,12 @@ impl Deadline {
         }
     }
 
-    /// Takes in how long a checkpoint took.
+    /// Records the duration of a checkpoint.
     pub(super) fn add_save(&mut self, spent: Duration) {
         self.longest_save = self.longest_save.max(spent);
     }
 
-    /// Takes in how long a step and its output took.
+    /// Records the duration of a step with its output.
     fn add_round(&mut self, spent: Duration) {
         self.longest_round = self.longest_round.max(spent);
     }
@@ -129,7 +129,7 @@ fn now() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// Seconds since 1970; `None` if Slurm sets no end, or a text that is no time.
+/// Seconds since 1970; `None` if Slurm sets no end or an invalid one.
 fn slurm_end(value: Option<&str>) -> Option<f64> {
     value?.trim().parse().ok().filter(|end: &f64| end.is_finite() && *end > 0.0)
 }

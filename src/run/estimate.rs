@@ -1,6 +1,6 @@
 //! Estimates of the memory and time of a run.
 //!
-//! Memory is counted where the run's arrays are known and modelled for the preconditioner. Times come from constants
+//! The memory of arrays is counted, that of the preconditioner is modelled. Times are computed from constants
 //! that were measured on one core of a common server, at 10^4 to 10^5 unknowns; they are divided by the number of ranks
 //! that share the work.
 //! Expect a factor of two either way, and more where ranks share memory bandwidth.
@@ -25,7 +25,7 @@ pub(super) struct Estimate {
 /// Bytes by part, over all ranks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct MemoryEstimate {
-    /// The program itself with MPI, PETSc and HDF5.
+    /// The program with MPI, PETSc and HDF5.
     pub program: u64,
     /// Mesh and geometry.
     pub mesh: u64,

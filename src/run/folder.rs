@@ -1,4 +1,4 @@
-//! The output folder: which results it holds, and how a run locks and prepares it.
+//! The output folder: its contents, and how a run locks and prepares it.
 
 use super::{Start, summary::SUMMARY};
 use crate::{
@@ -9,10 +9,10 @@ use crate::{
 use rustix::fs::{Access, access};
 use std::{io::ErrorKind, path::Path};
 
-/// The file that every run writes, and locks while it does.
+/// The file that every run writes and locks.
 const LOG: &str = "run.log";
 
-/// How many differing keys a refusal names; the others are counted.
+/// Largest number of differing keys that a refusal lists; further ones are counted.
 const SHOWN: usize = 8;
 
 /// Locks the folder for this run if it exists, and refuses one in which the run must not start. On one rank, before anything in it
@@ -41,7 +41,7 @@ pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
     }
 }
 
-/// Refuses a folder with a checkpoint of an unfinished run, which a new start would remove.
+/// Refuses a folder with a checkpoint of an unfinished run, because a new start would remove the checkpoint.
 fn refuse_unfinished(folder: &Path) -> Result<()> {
     let saved = list(folder)?;
     let Some((newest, file)) = saved.first() else { return Ok(()) };
@@ -105,8 +105,9 @@ fn refuse_foreign(job: &Job, start: &Start) -> Result<()> {
     ))
 }
 
-/// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that it is never
-/// taken for that of this run; a new start removes the checkpoints, too. On one rank.
+/// Creates the output folder, locks it for this run, opens the log and removes the summary of an earlier run, so that this summary
+/// is not
+/// mistaken for that of this run; a new start also removes the checkpoints. On one rank.
 pub(super) fn prepare_folder(folder: &Path, is_restart: bool, log: &mut Log) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
     let file = folder.join(LOG);

@@ -26,7 +26,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What a run writes while it steps.
+/// The output of a run.
 pub(super) struct Outputs<const D: usize, const S: usize> {
     folder: PathBuf,
     identity: Identity,
@@ -36,7 +36,7 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     profiles: Profiles<D>,
     fields: FieldOutput<D>,
     every: Option<Every>,
-    /// When profiles are written, unless with the fields.
+    /// The times of profiles, if they differ from those of fields.
     profiles_every: Option<Every>,
     /// The last time in s whose profiles are written, if there is one.
     profiled: Option<f64>,
@@ -45,11 +45,11 @@ pub(super) struct Outputs<const D: usize, const S: usize> {
     before: u64,
     /// Bytes of the checkpoints so far, on rank 0.
     checkpoints: u64,
-    /// Time spent writing.
+    /// Time spent on writing.
     pub spent: Duration,
 }
 
-/// What the files of a run contain.
+/// The data that determine the files of a run.
 pub(super) struct Contents<'a, const D: usize> {
     /// The job.
     pub job: &'a Job,
@@ -78,7 +78,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let mut resultants = ResultantTable::new(session, body, state, job)?;
         let (step, time) = (is_restart.then_some(state.step), is_restart.then_some(state.time));
         let fields = FieldOutput::open(session, job, body, time, log)?;
-        // A state whose fields could not be written, as on a full disk, is written anew, with its profiles.
+        // If the fields of a state could not be written, for instance on a full disk, they are written again, with the profiles.
         let (every, profiles_every) = (job.output.fields.clone(), job.output.profiles.clone());
         let is_there = fields.last_time().is_some_and(|last| last >= state.time);
         let rewrites = if profiles_every.is_some() {
@@ -116,7 +116,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         })
     }
 
-    /// Writes what is due after a step. Collective.
+    /// Writes the output that is due after a step. Collective.
     pub(super) fn after_step(
         &mut self,
         session: &Session,
@@ -151,7 +151,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
     /// Writes the fields and profiles of the last state unless their files have them, and flushes all tables. Collective.
     pub(super) fn at_end(&mut self, session: &Session, body: &Body<D, S>, state: &State) -> Result<()> {
         let start = Instant::now();
-        let fields = !self.fields.set_up_failed() && self.lacks_fields(state);
+        let fields = !self.fields.write_failed() && self.lacks_fields(state);
         let profiles = self.profiles_every.is_some() && self.lacks_profiles(state);
         self.write_state(session, body, state, [fields, profiles])?;
         self.fields.write_out()?;
@@ -168,7 +168,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         self.profiled.is_none_or(|time| time < state.time)
     }
 
-    /// Writes fields and profiles of a state; without times of their own, profiles go with the fields. Collective.
+    /// Writes fields and profiles of a state; without times of their own, profiles are written with the fields. Collective.
     fn write_state(
         &mut self,
         session: &Session,
@@ -213,7 +213,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         totals: &Totals,
     ) -> Result<PathBuf> {
         let start = Instant::now();
-        // A run that goes on from here continues the files: nothing up to here may be missing in them.
+        // A restart continues the files, which must therefore be complete up to this step.
         self.fields.write_out()?;
         session.agree(self.flush())?;
         let path = checkpoint_path(&self.folder, state.step);

@@ -56,8 +56,8 @@ pub(super) fn setup<const D: usize, const S: usize>(
         _ => error.into(),
     })?;
     let longest = steps::longest_step(job);
-    let prepared = scheme.prepare_length(session, &mut body, longest);
-    session.agree(prepared).map_err(|error| match error.exit() {
+    let matrix = scheme.matrix(session, &mut body, longest);
+    let mut matrix = session.agree(matrix).map_err(|error| match error.exit() {
         Exit::Internal => loaded.fault(
             "material",
             format!("the equations of a step can't be solved: {error}"),
@@ -65,11 +65,11 @@ pub(super) fn setup<const D: usize, const S: usize>(
         ),
         _ => error.into(),
     })?;
-    let certificates = session.agree(Certificates::of(session, &body, &state, &mut scheme, longest))?;
+    let certificates = session.agree(Certificates::of(session, &body, &state, &mut matrix, longest))?;
     let unique_step = if certificates.steps_are_unique() {
         None
     } else {
-        session.agree(Certificates::unique_step(session, &body, &state, &mut scheme))?
+        session.agree(Certificates::unique_step(session, &body, &state, &mut matrix))?
     };
     let verdict = certificates.verdict(longest, unique_step, &job.solver.accept);
     session.agree(refuse(loaded, &verdict))?;

@@ -19,7 +19,7 @@ use crate::{
 
 /// A body with its state and scheme, for programs that look at fields after each step.
 pub struct Simulation<const D: usize, const S: usize> {
-    /// The body and what acts on it.
+    /// The body with its loads and contacts.
     pub body: Body<D, S>,
     /// Its converged state.
     pub state: State,
@@ -28,7 +28,7 @@ pub struct Simulation<const D: usize, const S: usize> {
     /// Sums and maxima over the steps.
     pub totals: Totals,
     time: Time,
-    /// Where steps have to end.
+    /// Times at which steps must end.
     pub(super) landings: Landings,
     /// The step size control, if steps are adaptive.
     pub(super) adaptive: Option<Adaptive<D>>,
@@ -49,7 +49,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         Ok(Self::start(session, &loaded.job, (body, state, scheme), None)?)
     }
 
-    /// A job that was set up, with the totals of the run that it continues, if it continues one. Collective.
+    /// A job that was set up, with the totals of the run that it continues, if there is one. Collective.
     pub(super) fn start(
         session: &Session,
         job: &Job,

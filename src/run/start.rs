@@ -1,4 +1,4 @@
-//! What the command line says of a run beside its job.
+//! The options of the command line that affect a run besides its job.
 
 use std::{
     path::PathBuf,
@@ -8,14 +8,14 @@ use std::{
 /// Version of the solver with the id of its source.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("CLARKE_GIT_ID"), ")");
 
-/// Where a run starts from.
+/// The state from which a run starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Start {
     /// The initial state.
     Anew,
     /// The initial state, overwriting the results of another job.
     Over,
-    /// The newest good checkpoint of the output folder.
+    /// The newest valid checkpoint of the output folder.
     Newest,
     /// This checkpoint.
     From(PathBuf),
@@ -31,9 +31,9 @@ impl Start {
 /// The start of the process, and whether its log is shown.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
-    /// The beginning.
+    /// Start of the process.
     pub began: Instant,
-    /// Time until MPI and PETSc were up.
+    /// Time until MPI and PETSc were initialised.
     pub launched: Duration,
     /// Whether the run's log is shown on the terminal too.
     pub on_terminal: bool,

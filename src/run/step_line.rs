@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter, Write};
 /// Longest line, in characters.
 const WIDTH: usize = 100;
 
-/// Writes itself without allocating: runs log many steps.
+/// It is written without allocation, because runs log many steps.
 pub(super) struct StepLine<'a> {
     pub step: u64,
     /// The last step of the run.
@@ -14,7 +14,7 @@ pub(super) struct StepLine<'a> {
     /// In s.
     pub time: f64,
     pub outcome: &'a StepOutcome,
-    /// What the run has, and the line therefore tells.
+    /// The columns of the run.
     pub has: Columns,
     pub imbalance: f64,
     /// Wall time to the end in s.
@@ -32,7 +32,7 @@ pub(super) struct Columns {
 }
 
 impl StepLine<'_> {
-    /// Writes the line, whose columns come in the order of their importance: those for which there is no space are left out.
+    /// Writes the line with its columns in the order of their importance; columns for which there is no space are omitted.
     pub(super) fn write(&self, line: &mut String) {
         let Self { step, last, time, outcome, has, imbalance, left } = self;
         let points = &outcome.points;
@@ -74,7 +74,7 @@ struct Text {
 impl Text {
     fn of(words: fmt::Arguments<'_>) -> Self {
         let mut text = Self { bytes: [0; 48], length: 0 };
-        // What is too long for this text is left out.
+        // Characters beyond its capacity are omitted.
         let _ = text.write_fmt(words);
         text
     }

@@ -1,4 +1,4 @@
-//! The steps that a job asks for.
+//! The steps of a job.
 
 use crate::{
     job::{Every, Job},
@@ -15,7 +15,7 @@ pub(super) fn longest_step(job: &Job) -> f64 {
     adaptive::<2>(job).map_or(job.time.step, |adaptive| adaptive.longest())
 }
 
-/// Where steps of a job have to end; adaptive ones at output times, too.
+/// Times at which steps of a job must end; adaptive steps also end at output times.
 pub(super) fn landings(job: &Job) -> Landings {
     let interval = match (&job.time.adaptive, &job.output.fields) {
         (Some(_), Some(Every::Interval(interval))) => Some(*interval),
@@ -34,7 +34,7 @@ pub(super) fn landings(job: &Job) -> Landings {
     Landings { times: job.time.land_on.clone(), output_times, interval, end: job.time.end }
 }
 
-/// How many steps one matrix serves, about: adaptive steps are taken to change their length every other step.
+/// Estimated number of steps that share a matrix: adaptive steps are assumed to change their length every other step.
 pub(super) fn steps_a_matrix(job: &Job) -> u64 {
     if job.time.adaptive.is_some() { 2 } else { landings(job).steps_after(0.0, job.time.step) }
 }

@@ -21,7 +21,7 @@ const LARGEST_STRAIN: f64 = 0.1;
 pub struct Summary {
     /// `completed`, `stopped` or `failed`.
     pub status: &'static str,
-    /// Why the run failed; absent if it did not.
+    /// The reason why the run failed; absent if it did not fail.
     pub error: Option<String>,
     /// Warnings about the job, its certificates and the run.
     pub warnings: Vec<String>,

@@ -161,7 +161,7 @@ pub fn restore<const D: usize, const S: usize>(
     Ok(header)
 }
 
-/// The state of another run, as far as this job has a place for it.
+/// The part of the state of another run that this job can use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transferred {
     /// Number of steps of that run.
@@ -213,7 +213,7 @@ pub fn transfer<const D: usize, const S: usize>(
         ("nodes", total_nodes, own_nodes, &of_nodes, &nodes),
     ] {
         for (name, width) in own {
-            // A run at its start has not changed: its earlier values are the current ones.
+            // At the start of a run the previous values equal the current ones.
             let current = name.strip_prefix("previous_").unwrap_or(name);
             if there.iter().any(|table| table == current) {
                 known.extend([current, name]);

@@ -128,7 +128,7 @@ fn write_content(
     file.create_group("tables")?;
     for set in sets {
         if !are_whole(communicator, set.total, set.ids) {
-            // The redistribution of the reader finds the error in the ids.
+            // The redistribution in the reader detects wrong ids.
             Redistribution::new(communicator, set.total, set.ids, &[])?;
         }
         let first = file.slab_start(set.ids.len());

@@ -72,8 +72,8 @@ impl<const D: usize> FieldOutput<D> {
     }
 
     /// Whether writing has failed, so that no further step can be written.
-    pub(crate) fn set_up_failed(&self) -> bool {
-        self.file.set_up_failed()
+    pub(crate) fn write_failed(&self) -> bool {
+        self.file.write_failed()
     }
 
     /// The last time appended, if any.
@@ -81,7 +81,7 @@ impl<const D: usize> FieldOutput<D> {
         self.file.times().last().copied()
     }
 
-    /// Appends a state, which may wait in memory until others are written with it. Collective.
+    /// Appends a state, which may be buffered and written later with others. Collective.
     pub(crate) fn write<const S: usize>(&mut self, at: Converged<D, S>) -> Result<()> {
         let computed = self.computed(at, |_| true)?;
         let mut fields = Vec::new();
@@ -129,12 +129,12 @@ impl<const D: usize> FieldOutput<D> {
         Ok(found)
     }
 
-    /// Writes out the states that wait in memory, if the last time was a second ago. Collective.
+    /// Writes the buffered states if the last write was at least a second ago. Collective.
     pub(crate) fn write_out_if_due(&mut self) -> Result<(), Agreed> {
         self.file.write_out_if_due()
     }
 
-    /// Writes out the states that wait in memory. Collective.
+    /// Writes the buffered states. Collective.
     pub(crate) fn write_out(&mut self) -> Result<(), Agreed> {
         self.file.write_out()
     }

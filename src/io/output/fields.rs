@@ -14,7 +14,7 @@
 //! /VTKHDF/Steps            times and offsets; attribute NSteps
 //! ```
 //!
-//! Steps of small meshes wait in memory until some can be written together, because opening, flushing and describing tables takes
+//! Steps of small meshes are buffered and written several at a time, because opening, flushing and describing tables takes
 //! far longer than their numbers. A step counts once `NSteps` counts it, which happens after its numbers were flushed: the file
 //! of a run that dies holds all steps that were written out before.
 
@@ -38,11 +38,11 @@ pub use super::field::{Field, Place, Shape};
 
 /// Rows a chunk of the small tables of steps holds.
 const STEPS_PER_CHUNK: usize = 256;
-/// Bytes that may wait to be written, over all ranks.
+/// Largest number of buffered bytes, over all ranks.
 const WAITING_BYTES: u64 = 1 << 24;
-/// Bytes in the file of a table besides its numbers, at most.
+/// Upper bound of the bytes of a table in the file besides its numbers.
 const TABLE_BYTES: u64 = 1 << 10;
-/// The tables of offsets that stay zero because the mesh does not change.
+/// The tables of offsets, which are zero because the mesh does not change.
 const STATIC_OFFSETS: [&str; 4] = ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
 
 /// This rank's part of the mesh.
@@ -66,11 +66,11 @@ pub struct FieldFile<const D: usize> {
     points: Slab,
     cells: Slab,
     kinds: Vec<FieldKind>,
-    /// Times of all steps, the waiting ones included.
+    /// Times of all steps, including those that are buffered.
     times: Vec<f64>,
-    /// The numbers of the last steps, which are not in the file yet: for each step this rank's rows of each field.
+    /// Buffered steps, which are not in the file yet: for each step this rank's rows of each field.
     waiting: Vec<Vec<Vec<f64>>>,
-    /// When steps were last written out.
+    /// The time of the last write of buffered steps.
     written: Instant,
     compression: u8,
 }
@@ -113,7 +113,8 @@ impl<const D: usize> FieldFile<D> {
         Ok(created)
     }
 
-    /// Opens the files of an earlier run to go on, keeping the steps up to `time` (s). The mesh must be the same, its
+    /// Opens the files of an earlier run to continue them after `time` in s; later steps are removed. The mesh must be the same,
+    /// its
     /// distribution over ranks and the compression of new steps may differ.
     pub fn resume(
         folder: &Path,
@@ -141,18 +142,18 @@ impl<const D: usize> FieldFile<D> {
         Ok(resumed)
     }
 
-    /// Whether writing failed before, so that no step can follow.
-    pub fn set_up_failed(&self) -> bool {
-        self.file.set_up_failed()
+    /// Whether a write has failed, so that no further step can be written.
+    pub fn write_failed(&self) -> bool {
+        self.file.write_failed()
     }
 
-    /// Times of the steps in s, those included that are not written out yet.
+    /// Times of the steps in s, including those that are buffered.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// Appends a step at `time` (s), later than those before. All steps have the same fields. The first step and large ones are
-    /// written out at once, others by [`Self::write_out`] or as soon as many wait.
+    /// Appends a step at `time` (s), later than those before. All steps have the same fields. The first step and large steps are
+    /// written at once, others by [`Self::write_out`] or when the buffer is full.
     pub fn write_step(&mut self, time: f64, fields: &[Field]) -> Result<(), Agreed> {
         agree(&self.communicator, self.check(time, fields))?;
         let step = self.times.len();
@@ -167,7 +168,7 @@ impl<const D: usize> FieldFile<D> {
             self.times.push(time);
             return self.count_steps(step);
         }
-        // Steps that wait have room in the file; where this one has none, they are saved before it fails.
+        // There is space in the file for the buffered steps; if there is none for this step, they are written before it fails.
         if self.file.has_space(bytes * (self.waiting.len() as u64 + 1)).is_err() {
             self.write_out()?;
             self.file.require_space(bytes)?;
@@ -179,7 +180,7 @@ impl<const D: usize> FieldFile<D> {
         if step == 0 || is_full { self.write_out() } else { Ok(()) }
     }
 
-    /// Writes out the steps that wait, if the last time steps were written out is a second ago.
+    /// Writes the buffered steps if the last write was at least a second ago.
     pub fn write_out_if_due(&mut self) -> Result<(), Agreed> {
         if self.waiting.is_empty() {
             return Ok(());
@@ -190,13 +191,13 @@ impl<const D: usize> FieldFile<D> {
         if is_due { self.write_out() } else { Ok(()) }
     }
 
-    /// Writes out all steps that wait: then the file holds them even if the run dies.
+    /// Writes all buffered steps, so that the file contains them even if the process is killed.
     pub fn write_out(&mut self) -> Result<(), Agreed> {
         if self.waiting.is_empty() {
             return Ok(());
         }
         let first = self.times.len() - self.waiting.len();
-        if self.set_up_failed() {
+        if self.write_failed() {
             let lost = format!("{}: the steps from {first} on cannot be written", self.file.path().display());
             return agree(&self.communicator, Err(Error::Failed(lost)));
         }
@@ -217,9 +218,9 @@ impl<const D: usize> FieldFile<D> {
         Ok(())
     }
 
-    /// Writes out all steps and closes the files.
+    /// Writes the buffered steps and closes the files.
     pub fn close(mut self) -> Result<(), Agreed> {
-        if !self.set_up_failed() {
+        if !self.write_failed() {
             self.write_out()?;
         }
         self.file.close()
@@ -248,7 +249,7 @@ impl<const D: usize> FieldFile<D> {
         table.write(slab.first, rows)
     }
 
-    /// Counts the steps from `first` on, whose tables are there.
+    /// Increases the number of steps in the file by the steps from `first` on, whose tables have been written.
     fn count_steps(&mut self, first: usize) -> Result<(), Agreed> {
         let steps = self.times.len();
         for kind in &self.kinds {

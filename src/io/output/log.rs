@@ -26,7 +26,7 @@ impl Log {
 
     /// Locks this file for the run, as long as the log exists; creates a missing one if `create` is set.
     ///
-    /// The system releases the lock of a process that was killed. Where files can't be locked, nothing is refused.
+    /// The system releases the lock of a process that was killed. On file systems without locks nothing is refused.
     pub(crate) fn lock(&mut self, path: &Path, create: bool) -> Result<()> {
         if !self.is_active || self.file.is_some() || !(create || path.exists()) {
             return Ok(());
@@ -88,7 +88,7 @@ impl Log {
 
     fn file_line(&mut self, words: &str) {
         if let Some(file) = &mut self.file {
-            // A log that can't be written must not end a run whose results can.
+            // A failed write to the log must not end the run.
             let _ = writeln!(file, "{words}");
         }
     }
@@ -135,7 +135,7 @@ impl Log {
     }
 }
 
-/// Whether the parent of this process, under mpirun the launcher, writes to a terminal to which it passes what this process writes.
+/// Whether the parent process (under mpirun, the launcher) writes to a terminal and forwards the output of this process to it.
 fn launcher_has_terminal() -> bool {
     if std::env::var_os("OMPI_COMM_WORLD_RANK").is_none() && std::env::var_os("PMI_RANK").is_none() {
         return false;

@@ -15,13 +15,13 @@ use std::ops::Deref;
 pub struct OutputField {
     /// Its name in field files: letters, digits and underscores. Also its key under `[output]` if the job has to ask for it.
     pub name: &'static str,
-    /// What it has a value for.
+    /// Whether it has a value for each node or for each cell.
     pub place: Place,
-    /// What a value is.
+    /// The shape of a value.
     pub shape: Shape,
     /// Its unit in the plane and in space.
     pub units: [&'static str; 2],
-    /// Whether a job asks for it; absent: every run that has it writes it.
+    /// The condition under which a job requests it; absent: every run that has it writes it.
     pub is_asked_for: Option<fn(&Output) -> bool>,
     /// The report's picture of it.
     pub picture: Option<FieldPicture>,
@@ -45,7 +45,7 @@ pub struct FieldPicture {
 pub enum Shading {
     /// Linear, from the smallest to the largest value.
     Linear,
-    /// Of errors: logarithmic, down to a hundredth of the largest; the caption has the root of the sum of their squares.
+    /// For errors: logarithmic, down to a hundredth of the largest; the caption states the root of the sum of their squares.
     Errors,
 }
 
@@ -81,7 +81,7 @@ impl OutputField {
         self.units[usize::from(dimension == 3)]
     }
 
-    /// Whether runs with these keys write it, if they have it.
+    /// Whether a run with these keys writes it if it has it.
     pub fn is_wanted(&self, output: &Output) -> bool {
         self.is_asked_for.is_none_or(|is_asked_for| is_asked_for(output))
     }

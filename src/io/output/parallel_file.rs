@@ -1,16 +1,19 @@
 //! HDF5 files that all ranks of a communicator write and read together.
 //!
 //! A dataset is a table of `rows x width` numbers, one-dimensional where the width is 1; each rank transfers its
-//! own rows (see [`Rows`](super::hyperslab::Rows)). Every function is collective: all ranks call it in the same order with the same names and
+//! own rows (see [`Rows`](super::hyperslab::Rows)). Every function is collective: all ranks call it in the same order with the
+//! same names and
 //! shapes, and a failure on one rank is an error on all, so that no rank goes on alone.
 //!
 //! Metadata carries checksums (superblock 2). Superblock 3 is avoided on purpose: it marks a file that is
 //! open for writing, so that nobody could open the results of a process that died.
 //!
-//! A file that could not be written, as on a full disk, is given up and never closed: HDF5 would write what is left of it,
-//! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks ask for room before they
+//! After a failed write, for instance on a full disk, a file is abandoned and never closed: on closing, HDF5 would write its
+//! remaining data,
+//! some ranks would fail again, and the others would wait for them for ever. For the same reason ranks check the free space before
+//! they
 //! write (free_space.rs). As MPI closes all files of HDF5 when it ends,
-//! a process that gave a file up leaves without (see [`was_abandoned`]).
+//! a process that abandoned a file ends without `MPI_Finalize` (see [`was_abandoned`]).
 
 use super::free_space;
 use crate::error::{Error, Result};
@@ -25,9 +28,9 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What is most often wrong when a file can't be written.
+/// The most frequent reasons why a file can't be written.
 const ROOM: &str = "Is the disk full, or a limit reached (quota, ulimit -f)?";
-/// Whether this process gave a file up.
+/// Whether this process abandoned a file.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 
 /// Whether a file that could not be written is still open: then the process must end without `MPI_Finalize`. The same on all
@@ -51,7 +54,7 @@ impl Element for u8 {}
 /// An HDF5 file opened by all ranks of a communicator.
 pub struct ParallelFile {
     pub(super) file: hdf5::File,
-    broken: Cell<bool>,
+    write_failed: Cell<bool>,
     pub(super) communicator: SimpleCommunicator,
     path: PathBuf,
     pub(super) transfer_bytes: usize,
@@ -104,10 +107,16 @@ impl ParallelFile {
     }
 
     fn new(file: hdf5::File, communicator: SimpleCommunicator, path: &Path) -> Self {
-        Self { file, broken: Cell::new(false), communicator, path: path.into(), transfer_bytes: 1 << 30 }
+        Self {
+            file,
+            write_failed: Cell::new(false),
+            communicator,
+            path: path.into(),
+            transfer_bytes: 1 << 30,
+        }
     }
 
-    /// Sets how many bytes a rank moves in one collective transfer at most (1 GiB unless told; a row is never
+    /// Sets the largest number of bytes that a rank moves in one collective transfer (default 1 GiB; a row is never
     /// split). The same on all ranks.
     pub fn limit_transfer(&mut self, bytes: usize) {
         self.transfer_bytes = bytes.max(1);
@@ -118,17 +127,18 @@ impl ParallelFile {
         &self.path
     }
 
-    /// Whether writing failed before: then nothing more must be done with the file. The same on all ranks.
-    pub fn set_up_failed(&self) -> bool {
-        self.broken.get()
+    /// Whether a write has failed; the file must then not be used any more. The same on all ranks.
+    pub fn write_failed(&self) -> bool {
+        self.write_failed.get()
     }
 
-    /// Makes sure on all ranks that the file may grow by these bytes and its own tables; a file that can't is broken.
+    /// Checks on all ranks that there is space for this number of bytes and for HDF5's tables; without it the file counts as
+    /// failed.
     pub(super) fn require_space(&self, bytes: u64) -> Result<(), Agreed> {
         self.written(&format!("write {bytes} bytes more"), self.space(bytes))
     }
 
-    /// Whether the file may grow by these bytes and its own tables, with the same outcome on all ranks.
+    /// Whether there is space for this number of bytes and for HDF5's tables. The same outcome on all ranks.
     pub(super) fn has_space(&self, bytes: u64) -> Result<(), Agreed> {
         self.agreed(&format!("write {bytes} bytes more"), self.space(bytes))
     }
@@ -138,15 +148,15 @@ impl ParallelFile {
         free_space::check_space(&self.path, more, self.communicator.rank() == 0).map_err(Into::into)
     }
 
-    /// Hands everything written so far to the operating system.
+    /// Passes everything written so far to the operating system.
     pub fn flush(&self) -> Result<(), Agreed> {
         self.require_space(0)?;
         self.written("flush", self.file.flush())
     }
 
-    /// Flushes and closes the file on all ranks; one that could not be written is given up.
+    /// Flushes and closes the file on all ranks; a file whose write failed is abandoned.
     pub fn close(self) -> Result<(), Agreed> {
-        if self.set_up_failed() {
+        if self.write_failed() {
             return Ok(());
         }
         self.flush()?;
@@ -161,7 +171,7 @@ impl ParallelFile {
         end - own
     }
 
-    /// Makes a group; groups above it that are missing are made too.
+    /// Creates a group and its missing parent groups.
     pub fn create_group(&self, name: &str) -> Result<(), Agreed> {
         self.written(&format!("make group {name}"), self.file.create_group(name).map(drop))
     }
@@ -183,7 +193,7 @@ impl ParallelFile {
         Ok(names)
     }
 
-    /// Removes a dataset or group from the file; its space is not given back.
+    /// Removes a dataset or group from the file; its space is not reused.
     pub fn remove(&self, name: &str) -> Result<(), Agreed> {
         self.written(&format!("remove {name}"), self.file.unlink(name))
     }
@@ -236,18 +246,18 @@ impl ParallelFile {
         }
     }
 
-    /// As `agreed`, of something that writes: after a failure the file is given up.
+    /// As `agreed`, for functions that write: after a failure the file is abandoned.
     pub(super) fn written<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
         let outcome = self.agreed(doing, result.map_err(|error| format!("{error}. {ROOM}").into()));
-        if outcome.is_err() && !self.broken.replace(true) {
-            // One more reference, never given back, keeps HDF5 from closing the file.
+        if outcome.is_err() && !self.write_failed.replace(true) {
+            // An additional reference that is never released keeps HDF5 from closing the file.
             std::mem::forget(self.file.clone());
             GIVEN_UP.store(true, Ordering::Relaxed);
         }
         outcome
     }
 
-    /// The same outcome on all ranks, with words about what was being done.
+    /// The same outcome on all ranks; an error states the operation.
     pub(super) fn agreed<T>(&self, doing: &str, result: hdf5::Result<T>) -> Result<T, Agreed> {
         let explain = |error| Error::Failed(format!("{}: cannot {doing}: {error}", self.path.display()));
         agree(&self.communicator, result.map_err(explain))

@@ -19,9 +19,9 @@ pub struct Redistribution {
 }
 
 impl Redistribution {
-    /// Plans the way from rows `held` by this rank to the rows it wants, both given by ids below `total`.
+    /// Plans the transfer of rows `held` by this rank to the `wanted` rows, both given by ids below `total`.
     ///
-    /// Over all ranks each id must be held exactly once; it may be wanted any number of times. Collective, with the
+    /// Over all ranks each id must be held exactly once and may be requested any number of times. Collective, with the
     /// same outcome on all ranks.
     pub fn new(
         communicator: &impl Communicator,
@@ -46,7 +46,7 @@ impl Redistribution {
         Ok(Self { communicator, send_rows, send_counts, receive_positions: grouped.order })
     }
 
-    /// The wanted rows, in the order they were asked for, of a table with `width` numbers a row of which this rank
+    /// The requested rows, in the order of the request, of a table with `width` numbers a row of which this rank
     /// holds `values`. Collective, with the same outcome on all ranks.
     pub fn apply(&self, width: usize, values: &[f64]) -> Result<Vec<f64>, Agreed> {
         let mut packed = Vec::with_capacity(self.send_rows.len() * width);
@@ -64,8 +64,8 @@ impl Redistribution {
     }
 }
 
-/// Whether over all ranks each id below `total` is held exactly once, without telling the ranks each other's ids: ids that are
-/// held and ids that should be have the same sum of hashes, others with a probability of 2^-64. Collective.
+/// Whether over all ranks each id below `total` is held exactly once, without an exchange of ids: the ids that are
+/// held must have the same sum of hashes as the ids below `total`; others have it with a probability of 2^-64. Collective.
 pub fn are_whole(communicator: &impl Communicator, total: u64, held: &[u64]) -> bool {
     let hashes = |ids: &mut dyn Iterator<Item = u64>| {
         ids.fold(0_u64, |sum, id| sum.wrapping_add(xxh3_64(&id.to_le_bytes())))

@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn bonds_give_way_by_hand() {
-        // TimeDependentExpression 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
+        // Driving force 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
         assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 2.0, 0.5), [0.9, -0.18]);
         assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 0.0, 0.5), [0.5, -0.5], "without viscosity at once");
         assert_eq!(Adhesion::relax(0.4, 1.0, 0.5, 2.0, 0.5), [0.4, 0.0], "the drive is too weak");

@@ -99,8 +99,8 @@ impl Default for Gap {
 }
 
 impl Gap {
-    /// Gap in m at `time` of the point that was at `place` at first, along its unit `normal`; infinite where there is
-    /// nothing to touch.
+    /// Gap in m at `time` of the point with the undeformed position `place`, along its unit `normal`; infinite if its ray does
+    /// not meet the obstacle.
     pub fn at<const D: usize>(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<f64> {
         let gap = self.measure(time, place, normal);
         if gap > f64::NEG_INFINITY {
@@ -127,7 +127,7 @@ impl Gap {
         }
     }
 
-    /// How deep in m a place lies in the obstacle at `time`, negative outside; `None` where only the gap is known.
+    /// Depth in m of a point inside the obstacle at `time`, negative outside; `None` if only the gap is given.
     pub fn depth<const D: usize>(&self, time: f64, place: &Vector<D>) -> Option<f64> {
         match self {
             Self::Distance(_) => None,

@@ -50,7 +50,7 @@ use crate::{
         state::State,
     },
     parallel::session::Session,
-    solver::stepping::Stepper,
+    solver::stepping::MatrixOfStep,
 };
 use coverage::not_covered;
 use suprema::{Suprema, Supremum};
@@ -61,13 +61,13 @@ const SMALL: usize = 10_000;
 const RIGID: f64 = 1e10;
 
 impl Certificates {
-    /// Computes the certificates of a body and a scheme that is prepared for its step; no step is longer than `longest` in s.
+    /// Computes the certificates of a body and the matrix of its step; no step is longer than `longest` in s.
     /// Collective.
     pub fn of<const D: usize, const S: usize>(
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut Stepper,
+        matrix: &mut MatrixOfStep<'_>,
         longest: f64,
     ) -> Result<Self> {
         let falls = body.contacts.iter().map(|c| c.monotonicity_constants().into_iter().fold(0.0, f64::max));
@@ -80,8 +80,8 @@ impl Certificates {
             unbounded_growth: growth.err().map(str::to_owned),
             ..Self::default()
         };
-        let scheme_is_implicit = scheme.scheme().is_implicit();
-        let mut suprema = Suprema::new(session, body, state, scheme);
+        let scheme_is_implicit = matrix.scheme.is_implicit();
+        let mut suprema = Suprema::new(session, body, state, matrix);
         let mut find = |supremum| suprema.find(supremum);
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
@@ -125,12 +125,12 @@ impl Certificates {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        scheme: &mut Stepper,
+        matrix: &mut MatrixOfStep<'_>,
     ) -> Result<Option<f64>> {
         if !body.has_form_everywhere(Form::Mass) {
             return Ok(None);
         }
-        Ok(Some(1.0 / Suprema::new(session, body, state, scheme).find(Supremum::UniqueStep)?))
+        Ok(Some(1.0 / Suprema::new(session, body, state, matrix).find(Supremum::UniqueStep)?))
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{
     fem::{body::Body, effect::Form, state::State},
     linear_algebra::petsc::DistributedVector,
     parallel::session::Session,
-    solver::stepping::Stepper,
+    solver::stepping::MatrixOfStep,
 };
 
 /// Convergence limits for the supremum of the explicit step.
@@ -34,33 +34,33 @@ pub(super) enum Supremum {
     SlipPressure,
 }
 
-/// Computes suprema for a body and a scheme that is prepared for its step. Suprema over the motion of the contact boundary have
+/// Computes suprema for a body and the matrix of its step. Suprema over the motion of the contact boundary have
 /// similar maximisers: each iteration starts from the last one.
-pub(super) struct Suprema<'a, const D: usize, const S: usize> {
+pub(super) struct Suprema<'a, 'm, const D: usize, const S: usize> {
     session: &'a Session,
     body: &'a Body<D, S>,
     state: &'a State,
-    scheme: &'a mut Stepper,
+    matrix: &'a mut MatrixOfStep<'m>,
     /// The response to a unit load on the whole contact boundary.
     contact_response: Option<DistributedVector>,
     /// The maximiser of the last supremum.
     peak: Option<DistributedVector>,
 }
 
-impl<'a, const D: usize, const S: usize> Suprema<'a, D, S> {
+impl<'a, 'm, const D: usize, const S: usize> Suprema<'a, 'm, D, S> {
     pub(super) fn new(
         session: &'a Session,
         body: &'a Body<D, S>,
         state: &'a State,
-        scheme: &'a mut Stepper,
+        matrix: &'a mut MatrixOfStep<'m>,
     ) -> Self {
-        Self { session, body, state, scheme, contact_response: None, peak: None }
+        Self { session, body, state, matrix, contact_response: None, peak: None }
     }
 
     /// Approaches the supremum from below. Collective.
     pub(super) fn find(&mut self, supremum: Supremum) -> Result<f64> {
         let (session, body, state) = (self.session, self.body, self.state);
-        let mut pencil = Pencil { body, scheme: &mut *self.scheme, supremum };
+        let mut pencil = Pencil { body, matrix: &mut *self.matrix, supremum };
         if supremum == Supremum::ExplicitStep {
             let start = pseudorandom_vector(body, state)?;
             return Ok(maximise(session, &mut pencil, start, None, EXPLICIT_STEP_LIMITS)?.value);
@@ -91,13 +91,13 @@ fn copy(vector: &DistributedVector) -> Result<DistributedVector> {
     Ok(copy)
 }
 
-struct Pencil<'a, const D: usize, const S: usize> {
+struct Pencil<'a, 'm, const D: usize, const S: usize> {
     body: &'a Body<D, S>,
-    scheme: &'a mut Stepper,
+    matrix: &'a mut MatrixOfStep<'m>,
     supremum: Supremum,
 }
 
-impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
+impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
     fn forms(&self) -> usize {
         if matches!(self.supremum, Supremum::ExplicitStep | Supremum::UniqueStep | Supremum::SlipPressure) {
             3
@@ -113,7 +113,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
             (Supremum::ExplicitStep, 1) | (Supremum::UniqueStep, 2) => Form::Mass,
             (Supremum::ExplicitStep, _) | (Supremum::Theta | Supremum::UniqueStep, 1) => Form::Viscosity,
             (Supremum::TraceNorm, 1) => Form::Strain,
-            (Supremum::ThetaStep | Supremum::SlipPressure, 1) => return self.scheme.multiply(x, y),
+            (Supremum::ThetaStep | Supremum::SlipPressure, 1) => return self.matrix.multiply(x, y),
             (supremum, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
@@ -140,7 +140,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, D, S> {
     }
 
     fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        self.scheme.precondition(r, z)?;
+        self.matrix.precondition(r, z)?;
         forms::clear_fixed_components(self.body, z)
     }
 

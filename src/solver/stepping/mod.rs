@@ -39,4 +39,4 @@ pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
 pub use step_length::{Landing, Landings, TIME_TOLERANCE, next_step};
-pub use stepper::{Stepper, StepperSettings};
+pub use stepper::{MatrixOfStep, Stepper, StepperSettings};

@@ -67,6 +67,25 @@ pub struct Stepper {
     passes: PassBytes,
 }
 
+/// The assembled matrix `K` of a step, with its preconditioner.
+pub struct MatrixOfStep<'a> {
+    /// The time scheme of the step.
+    pub scheme: Scheme,
+    solver: &'a mut StepSolver,
+}
+
+impl MatrixOfStep<'_> {
+    /// `y = K x`. Collective.
+    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
+        self.solver.multiply(x, y)
+    }
+
+    /// Applies the preconditioner. Collective.
+    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
+        self.solver.precondition(r, z)
+    }
+}
+
 impl Stepper {
     /// Prepares the vectors and the solver; the matrix is set by the first step. Collective.
     pub fn new<const D: usize, const S: usize>(
@@ -131,16 +150,17 @@ impl Stepper {
         self.solver.factor_precision()
     }
 
-    /// Assembles the matrix for a first step of this length. Preconditioners are built for this length and powers of two times
-    /// it. Collective.
-    pub fn prepare_length<const D: usize, const S: usize>(
+    /// The matrix of a first step of this length in s. Preconditioners are built for this length and powers of two times it.
+    /// Collective.
+    pub fn matrix<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         length: f64,
-    ) -> Result<()> {
+    ) -> Result<MatrixOfStep<'_>> {
         self.base_length = length;
-        self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })
+        self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })?;
+        Ok(MatrixOfStep { scheme: self.scheme, solver: &mut self.solver })
     }
 
     /// Assembles the matrix of a step, if the previous step had another length. Collective.
@@ -164,16 +184,6 @@ impl Stepper {
             self.clock.first_assembly = self.clock.assembly;
         }
         Ok(())
-    }
-
-    /// `y = K x` with the matrix in use, which must be assembled. Collective.
-    pub fn multiply(&self, x: &DistributedVector, y: &mut DistributedVector) -> Result<()> {
-        self.solver.multiply(x, y)
-    }
-
-    /// Applies the preconditioner of the matrix in use. Collective.
-    pub fn precondition(&mut self, r: &DistributedVector, z: &mut DistributedVector) -> Result<()> {
-        self.solver.precondition(r, z)
     }
 
     /// Takes a step and commits it; on failure the state is unchanged. Collective.

@@ -37,12 +37,12 @@ pub trait Flow {
     /// The elastic tensor `E` in Pa.
     fn elasticity(&self) -> &Isotropic;
 
-    /// `X(s)`, the viscoplastic strain rate in 1/s, and the growth in 1/s of the accumulated viscoplastic strain, after so much of
-    /// it. The stress rate is `-E X(s)`, the dissipation `s : X(s)` without what hardening stores.
+    /// `X(s)`, the viscoplastic strain rate in 1/s, and the rate in 1/s of the accumulated viscoplastic strain, given
+    /// this strain. The stress rate is `-E X(s)`; the dissipation is `s : X(s)` minus the power stored by hardening.
     fn rate<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> (Mandel<S>, f64);
 
-    /// The strain rates of a pack of stresses, as [`rate`](Self::rate) gives them one by one; `None` if all are zero. Writes the
-    /// growths of laws that harden.
+    /// The strain rates of a pack of stresses, equal to those of [`rate`](Self::rate); `None` if all are zero. For laws with
+    /// hardening, writes the rates of the accumulated strain.
     #[inline(always)]
     fn rates<const S: usize>(
         &self,
@@ -53,8 +53,9 @@ pub trait Flow {
         Some(one_by_one(self, stresses, accumulated, growths))
     }
 
-    /// Flow `k X(s)` of a step of `length` s that ends in `s = s* - k E X(s)`, and growth of the accumulated strain, from the stress
-    /// `trial` that would be there without flow; `None` where nothing flows. Where the caller wants it, the tangent `ds/ds*` is
+    /// Flow `k X(s)` of a step of `length` s that ends in `s = s* - k E X(s)`, and growth of the accumulated strain, from the
+    /// stress
+    /// `trial` of a step without flow; `None` without flow. On request, the tangent `ds/ds*` is
     /// written.
     fn flow_to_end<const S: usize>(
         &self,
@@ -64,20 +65,21 @@ pub trait Flow {
         tangent: Option<&mut Tangent<S>>,
     ) -> Option<(Mandel<S>, f64)>;
 
-    /// Which stresses of a pack may flow in a step that would end with them if nothing flowed: where this is false,
+    /// Which trial stresses of a pack may flow: where this is false,
     /// [`flow_to_end`](Self::flow_to_end) finds no flow.
     #[inline(always)]
     fn yielding<const S: usize>(&self, _stresses: &Pack<S>, _accumulated: &[f64; LANES]) -> [bool; LANES] {
         [true; LANES]
     }
 
-    /// Whether the tangent times `E` is symmetric, as it is where flow is associated.
+    /// Whether the tangent times `E` is symmetric, which holds for associated flow.
     fn has_symmetric_tangent<const S: usize>(&self) -> bool {
         true
     }
 
-    /// The fastest relaxation in 1/s of stress and accumulated strain together; of power laws at [overstresses](Self::overstress) up
-    /// to this one. Explicit steps of more than twice its inverse make stress grow.
+    /// The fastest relaxation in 1/s of stress and accumulated strain together; for power laws at [overstresses](Self::overstress)
+    /// up
+    /// to this one. In explicit steps longer than twice its inverse the stress grows.
     fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64;
 
     /// Whether the rate of relaxation grows with the stress without bound.
@@ -85,7 +87,8 @@ pub trait Flow {
         false
     }
 
-    /// The argument of [`fastest_rate`](Self::fastest_rate) at a stress, for power laws: the overstress relative to the yield stress, or,
+    /// The argument of [`fastest_rate`](Self::fastest_rate) at a stress, for power laws: the overstress relative to the yield
+    /// stress, or,
     /// without a yield surface, the stress relative to a reference stress of the law.
     fn overstress<const S: usize>(&self, _s: &Mandel<S>, _accumulated: f64) -> f64 {
         0.0
@@ -96,7 +99,8 @@ pub trait Flow {
         false
     }
 
-    /// The equivalent stress `g(s)` of the yield surface `g(s) = Y + h p` at an accumulated strain `p`, and its derivative; none if any
+    /// The equivalent stress `g(s)` of the yield surface `g(s) = Y + h p` at an accumulated strain `p`, and its derivative; `None`
+    /// if any
     /// stress flows. `g` is convex, and `g(c s) = c g(s)` for positive `c`.
     fn equivalent_stress<const S: usize>(&self, _s: &Mandel<S>) -> Option<(f64, Mandel<S>)> {
         None
@@ -113,7 +117,7 @@ pub trait Flow {
     }
 }
 
-/// The strain rates of a pack of stresses under a law that evaluates one at a time, and the growths.
+/// The strain rates of a pack of stresses under a law that evaluates one at a time, and the rates of the accumulated strains.
 #[inline(always)]
 pub(super) fn one_by_one<const S: usize>(
     law: &(impl Flow + ?Sized),

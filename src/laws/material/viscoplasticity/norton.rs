@@ -8,11 +8,15 @@
 //!
 //! which is regular at `p = 0`. Without hardening it is Norton's law of secondary creep. Under a steady stress
 //! `(1 + p / p0)^(m + 1) = 1 + (m + 1) rate (q / reference stress)^n t / p0`; far beyond `p0` this is Bailey's primary creep, `p`
-//! proportional to `q^(n / (m + 1)) t^(1 / (m + 1))`, in its strain-hardening form. In plane stress `X` is the in-plane part of that of the
-//! plane's stress in space. (F. H. Norton, The Creep of Steel at High Temperatures, 1929; R. W. Bailey, The utilization of creep test
-//! data in engineering design, Proc. Inst. Mech. Eng. 131 (1935), 131-349; J. T. Boyle, J. Spence, Stress Analysis for Creep, 1983.)
+//! proportional to `q^(n / (m + 1)) t^(1 / (m + 1))`, in its strain-hardening form. In plane stress `X` is the in-plane part of
+//! that of the
+//! plane's stress in space. (F. H. Norton, The Creep of Steel at High Temperatures, 1929; R. W. Bailey, The utilization of creep
+//! test
+//! data in engineering design, Proc. Inst. Mech. Eng. 131 (1935), 131-349; J. T. Boyle, J. Spence, Stress Analysis for Creep,
+//! 1983.)
 //!
-//! `3/2 dev s` is `W s` with `W = 3/2 I - 1/2 tr I`, which shares its eigenspaces with `E`. A step ends in `s = s* / (1 + x E W)` with
+//! `3/2 dev s` is `W s` with `W = 3/2 I - 1/2 tr I`, which shares its eigenspaces with `E`. A step ends in `s = s* / (1 + x E W)`
+//! with
 //! `x = dp / q`, whose logarithm is the root of an increasing equation,
 //!
 //! ```text
@@ -75,12 +79,12 @@ impl Parameters for Norton {
 
 /// `W`: the square of the von Mises norm is `s : W s`, also in the plane.
 const WEIGHT: Isotropic = Isotropic { volumetric: -0.5, shear: 1.5 };
-/// Change of the logarithm below which the next step of Newton's method is within rounding.
+/// Change of the logarithm below which the next correction of Newton's method is a rounding error.
 const LAST: f64 = 1e-10;
-/// More than any stress takes.
+/// Larger than the number of iterations for any stress.
 const ITERATIONS: usize = 200;
 
-/// The equation of a step: what is known of it.
+/// The coefficients of the equation of a step.
 struct Step {
     /// Parts of the square of the norm of `s*`, and eigenvalues of `E W`: on multiples of the identity, and on the rest.
     squares: [f64; 2],
@@ -93,9 +97,9 @@ struct Step {
     strain: f64,
 }
 
-/// What `ln x` gives.
+/// The values at `ln x`.
 struct Point {
-    /// How far the equation is from zero, and its derivative.
+    /// The residual of the equation, and its derivative.
     open: f64,
     slope: f64,
     /// `q(x)`.
@@ -223,8 +227,9 @@ impl Flow for Elastic<Norton> {
         Some((weighted.map(|w| x * w), growth))
     }
 
-    /// Along the deviator stress relaxes at `3 G dp'/dq`, which is the most in the plane, too, and hardening at `-dp'/dp`; the two add
-    /// up. Both fall with the strain so far.
+    /// Along the deviator, stress relaxes at the rate `3 G dp'/dq`, also the largest rate in plane stress, and hardening at
+    /// `-dp'/dp`; they add
+    /// up. Both decrease with the accumulated strain.
     fn fastest_rate<const S: usize>(&self, overstress: f64) -> f64 {
         let Norton { rate, reference_stress, exponent: n, hardening_exponent: m, .. } = self.parameters;
         let by_stress = n * rate * overstress.powf(n - 1.0) / reference_stress;
@@ -235,7 +240,7 @@ impl Flow for Elastic<Norton> {
         self.parameters.exponent != 1.0 || self.hardens()
     }
 
-    /// The norm over the reference stress at which material that has not crept yet would creep as fast.
+    /// The ratio of the norm to the reference stress at which material without creep strain would have the same creep rate.
     #[inline]
     fn overstress<const S: usize>(&self, s: &Mandel<S>, accumulated: f64) -> f64 {
         (self.growth(von_mises(s), accumulated) / self.parameters.rate).powf(1.0 / self.parameters.exponent)

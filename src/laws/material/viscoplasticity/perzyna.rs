@@ -118,8 +118,8 @@ impl Flow for Elastic<Perzyna> {
         S != 3
     }
 
-    /// No eigenvalue of the derivative of `-G` is larger where the overstress is at most so many times the yield stress, `r`, which
-    /// only counts for `n > 1`.
+    /// An upper bound of the eigenvalues of the derivative of `-G` if the overstress is at most `r` times the yield stress, which
+    /// matters for `n > 1` only.
     ///
     /// Along the deviator, with radial projections: `n r^(n - 1) 2 mu / (2 lambda)`, which is sharp. In plane stress the largest
     /// eigenvalue `e` of `E` takes the place of `2 mu`, as that of `E (I - P_K')` for a projection in a metric that commutes with

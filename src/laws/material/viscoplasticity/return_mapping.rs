@@ -1,8 +1,9 @@
-//! Implicit flow: the stress at the end of a step, `s = s* - k E X(s)`, from the stress `s*` that the step would end with
-//! if nothing flowed.
+//! Implicit flow: the stress at the end of a step, `s = s* - k E X(s)`, from the trial stress `s*`, which is the stress at the end
+//! without flow in the step.
 //!
-//! Each law comes down to one scalar equation, or to none ([`Flow::flow_to_end`]). The tangent `ds/ds*` is that of the mapping itself
-//! (the algorithmic or consistent one), so that Newton's method on whole bodies keeps its order. As the relaxation of laws with a yield
+//! Each law reduces to at most one scalar equation ([`Flow::flow_to_end`]). The tangent `ds/ds*` is that of the mapping itself
+//! (the algorithmic or consistent one), so that Newton's method on whole bodies keeps its order. As the relaxation of laws with a
+//! yield
 //! surface tends to 0 their mappings tend to those of rate-independent plasticity.
 //!
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3; E. de Souza Neto, D. Peric, D. Owen,
@@ -15,7 +16,7 @@ pub use extrapolated::Extrapolated;
 use super::{FlowLaw, flow::Flow, tangent::Tangent};
 use crate::linear_algebra::tensor::{Mandel, add_scaled};
 
-/// How a step ends where stress flows.
+/// The end of a step with flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Returned<const S: usize> {
     /// `s`, the stress at the end in Pa.
@@ -27,8 +28,8 @@ pub struct Returned<const S: usize> {
 }
 
 impl FlowLaw {
-    /// Flows for `length` s from the stress `trial` that would be there without flow; `accumulated` is the viscoplastic
-    /// strain of hardening before. `None` where nothing flows, the tangent being the identity. Where the caller wants it, the
+    /// Computes the flow of a step of `length` in s from the stress `trial` without flow; `accumulated` is the viscoplastic
+    /// strain at its start. `None` without flow; the tangent is then the identity. On request, the
     /// tangent `ds/ds*` is written.
     pub fn return_stress<const S: usize>(
         &self,

@@ -1,7 +1,7 @@
 //! Linear isotropic hardening of Perzyna's law.
 //!
 //! The yield stress grows with the accumulated viscoplastic strain `p`: `yield stress + h p`, with hardening modulus `h` and
-//! `dp/dt = s : X / von Mises norm of s`, the equivalent rate that does the work of `X`. Where the projection is radial this is
+//! `dp/dt = s : X / von Mises norm of s`, the equivalent rate with the same work as `X`. If the projection is radial this is
 //! `sqrt(2/3 X : X)`. Of the work `s : X` the part `h p dp/dt` is stored, `h p² / 2` in all; the rest,
 //! `(von Mises norm - h p) dp/dt >= yield stress dp/dt >= 0`, is dissipated.
 //! (J. Simo, T. Hughes, Computational Inelasticity, 1998, chapters 2 and 3.)
@@ -10,17 +10,17 @@ use super::Perzyna;
 use crate::laws::material::{Elastic, viscoplasticity::flow::Flow};
 
 impl Elastic<Perzyna> {
-    /// The law after so much accumulated strain.
+    /// The law at this accumulated strain.
     pub(super) fn hardened(&self, accumulated: f64) -> Self {
         let parameters = Perzyna { yield_stress: self.strength(accumulated), ..self.parameters };
         Self { parameters, ..*self }
     }
 
-    /// What hardening adds to the fastest rate in 1/s where the overstress is at most so many times the yield stress reached, `r`.
+    /// Contribution of hardening to the fastest rate in 1/s if the overstress is at most `r` times the current yield stress.
     ///
     /// The yield stress rises by `h dp/dt` to meet the stress. Along the deviator `dp/dt` is `2/3 r^(n - 1) f / (2 lambda)`, in
     /// equibiaxial plane stress three times that, and more where the metric of the projection is far from a radial one: by the
-    /// third root of the ratio of its eigenvalues, of which nothing shows up to a ratio of 9. The power of `f` over the yield
+    /// third root of the ratio of its eigenvalues, without an effect up to a ratio of 9. The power of `f` over the yield
     /// stress falls with the latter: `n + (n - 1) r` in place of `n`.
     pub(super) fn hardening_rate<const S: usize>(&self, overstress: f64) -> f64 {
         let Perzyna { exponent: n, hardening_modulus: Some(modulus), .. } = self.parameters else {

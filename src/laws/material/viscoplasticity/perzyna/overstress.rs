@@ -56,13 +56,13 @@ pub enum Metric {
     Frobenius,
 }
 
-/// Share of the stress below which a yield stress counts as none in plane stress: squares of their ratio would overflow.
+/// In plane stress, yield stresses below this share of the stress are treated as zero, because squares of the ratio would overflow.
 pub(super) const NO_YIELD_STRESS: f64 = 1e-100;
 
 impl Elastic<Perzyna> {
-    /// `(f / yield stress)^(n - 1) (s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s: zero inside the yield surface.
+    /// `(f / yield stress)^(n - 1) (s - P_K s) / (2 lambda)`, the viscoplastic strain rate in 1/s; zero inside the yield surface.
     ///
-    /// The stress rate is `G(s) = -E` of it, the dissipation `s :` it.
+    /// With this rate `X`, the stress rate is `G(s) = -E X` and the dissipation is `s : X`.
     #[inline]
     pub fn strain_rate<const S: usize>(&self, s: &Mandel<S>) -> Mandel<S> {
         let mut out = [0.0; S];
@@ -85,7 +85,7 @@ impl Elastic<Perzyna> {
         if exponent == 1.0 { rate_factor } else { rate_factor * overstress.powf(exponent - 1.0) }
     }
 
-    /// How far the metric is from that in which the projection is radial, in plane stress: the ratio of its eigenvalues, at
+    /// Deviation, in plane stress, of the metric from that in which the projection is radial: the ratio of its eigenvalues, at
     /// least 1.
     pub(super) fn skewness(&self) -> f64 {
         let (along, across) = self.inverse_metric();
@@ -119,7 +119,7 @@ impl Elastic<Perzyna> {
         out
     }
 
-    /// The strain rates of stresses side by side without hardening, as [`strain_rate`](Self::strain_rate) gives them one by one;
+    /// The strain rates of a pack of stresses without hardening, equal to those of [`strain_rate`](Self::strain_rate);
     /// `None` if all are zero.
     pub fn strain_rates<const S: usize>(&self, stresses: &Pack<S>) -> Option<Pack<S>> {
         strain_rates(self, stresses)

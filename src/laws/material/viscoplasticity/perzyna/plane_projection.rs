@@ -1,14 +1,15 @@
 //! The projection on the von Mises surface in plane stress, of several stresses at once.
 //!
-//! Stresses go through Newton's method side by side, so that the processor works on all of them at a time.
+//! Newton's method runs on a pack of stresses at a time, so that the compiler can use vector instructions.
 
 use std::array;
 
-/// Share of the multiplier below which a step is the last: the next one would be its square.
+/// Newton's method ends with a correction below this share of the multiplier, because the next one would be of the order of its
+/// square.
 const LAST: f64 = 1e-8;
 const ITERATIONS: usize = 60;
 
-/// What the multiplier acts on.
+/// The coefficients of the multiplier.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surface {
     /// Inverse eigenvalue of the metric on `p`.
@@ -33,7 +34,7 @@ impl Surface {
     ) -> [f64; N] {
         let Self { along, across, yield_stress } = *self;
         let outside = norms.map(|norm| norm > yield_stress);
-        // Stresses inside go along as one on the surface.
+        // Stresses inside the surface are replaced by one on the surface.
         let volumetric: [f64; N] = array::from_fn(|i| if outside[i] { volumetric[i] } else { 0.0 });
         let deviatoric: [f64; N] =
             array::from_fn(|i| if outside[i] { deviatoric[i] } else { yield_stress * yield_stress });

@@ -44,7 +44,7 @@ struct Step {
     power: f64,
 }
 
-/// What `m` and `eta` give.
+/// The stresses and norms for `m` and `eta`.
 struct Point {
     /// `s` and `t`.
     stress: [f64; 3],
@@ -58,7 +58,7 @@ struct Point {
     growth: f64,
 }
 
-/// The same with derivatives by `m`, `eta` and the three components of `s*`.
+/// The same with derivatives with respect to `m`, `eta` and the three components of `s*`.
 struct Values {
     growth: f64,
     projected_norm: f64,
@@ -66,11 +66,11 @@ struct Values {
     by_projected_norm: [f64; 5],
     by_norm: [f64; 5],
     by_growth: [f64; 5],
-    /// Of each component of the stress by `m`, `eta` and its own `s*`.
+    /// For each component of the stress the derivatives with respect to `m`, `eta` and the same component of `s*`.
     by_stress: [[f64; 3]; 3],
 }
 
-/// Flow of the step, and growth of the accumulated strain. `start` holds the norm of `s*` and `Y*`.
+/// Flow of the step, and increment of the accumulated strain. `start` contains the norm of `s*` and `Y*`.
 pub(super) fn flow<const S: usize>(
     law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
@@ -125,7 +125,7 @@ fn turned(s: &[f64; 3]) -> [f64; 3] {
 }
 
 impl Step {
-    /// `m` and `eta`, for a stress outside.
+    /// `m` and `eta`, for a stress outside the yield surface.
     fn solve(&self, norm: f64) -> (f64, f64) {
         if self.power == 0.0 {
             return (self.multiplier(self.rate), self.rate);

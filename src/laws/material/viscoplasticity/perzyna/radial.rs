@@ -7,8 +7,9 @@
 //! q = q* - 3 G dp,   f = q - Y,   Y = Y* + h dp,   dp = (k / (3 lambda)) (f / Y)^(n - 1) f
 //! ```
 //!
-//! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`: increasing, and linear for `n = 1`. Else its logarithm is solved for that of
-//! `f`, so that neither large exponents nor overstresses far beyond the yield stress take many iterations or overflow.
+//! so that `f + c dp(f) = q* - Y*` with `c = 3 G + h`, which is increasing, and linear for `n = 1`. Otherwise its logarithm is
+//! solved for that of
+//! `f`, so that large exponents and overstresses far above the yield stress neither need many iterations nor overflow.
 
 use super::overstress::Perzyna;
 use crate::{
@@ -22,10 +23,10 @@ use crate::{
     linear_algebra::tensor::{Mandel, dot, normal_components, trace},
 };
 
-/// More than any law takes.
+/// Larger than the number of iterations for any law.
 const ITERATIONS: usize = 100;
 
-/// Flow of the step, and growth of the accumulated strain. `start` holds `q*` and `Y*`.
+/// Flow of the step, and increment of the accumulated strain. `start` contains `q*` and `Y*`.
 pub(super) fn flow<const S: usize>(
     law: &Elastic<Perzyna>,
     trial: &Mandel<S>,
@@ -78,12 +79,12 @@ impl Equation {
     /// `dp`, and its derivative by `q*`, for `n` above 1.
     fn solve_power(&self) -> (f64, f64) {
         let Self { excess, yield_stress, power, rate, stiffness, hardening } = *self;
-        // `c dp / f`, the flow against the overstress that is left, as a logarithm: powers overflow.
+        // The logarithm of `c dp / f`, the ratio of flow to remaining overstress; the ratio itself may overflow.
         let flow_at = |f: f64| {
             let y = yield_stress + hardening * (excess - f) / stiffness;
             ((stiffness * rate).ln() + (power - 1.0) * (f / y).ln(), y)
         };
-        // Convex in the logarithm of `f`, so that Newton's method comes down to the root from above.
+        // Convex in the logarithm of `f`, so that Newton's method converges from above.
         let mut logarithm = excess.ln();
         for _ in 0..ITERATIONS {
             let f = logarithm.exp();

@@ -1,18 +1,19 @@
-//! Flow in a step of a two-step formula, which goes on with a share of the flow of the step before.
+//! Flow in a step of a two-step formula, which contains a share of the flow of the previous step.
 //!
-//! The formula asks for the viscoplastic strain `m`, and its growth `p_m` of the accumulated strain, beside what flows at the
-//! rate of the end. From the stress `s0` that the step would end with if nothing flowed
+//! The formula adds the viscoplastic strain `m`, with the increment `p_m` of the accumulated strain, to the flow at the
+//! rate at the end of the step. With the stress `s0` at the end without flow
 //!
 //! ```text
 //! s* = s0 - phi E m,   p* = p_{n-1} + phi p_m,   s_n = s* - k' E X(s_n)
 //! phi = min(1, f / (2 (g(E m) + h p_m)), s0:m / (2 m:E m)), not negative,   f = g(s0) - Y - h p_{n-1}
 //! ```
 //!
-//! with the equivalent stress `g` of the yield surface `g(s) = Y + h p`. Where `s0` does not yield nothing flows. `g` is convex
-//! and `g(c s) = c g(s)` for positive `c`, so that `g(s*) - Y - h p* >= f - phi (g(E m) + h p_m) >= f / 2`: what is extrapolated
-//! takes at most half of the overstress and never brings a stress inside the yield surface, and `s*` moves by half of what `s0`
-//! does at the least. Nor does it feed energy, as `s*:m >= 0`. Of steady flow less than half is extrapolated, however long the
-//! steps are, `w / (1 + 2 w)` at the ratio `w` of two steps; so `phi` is 1 where flow is smooth, and the formula keeps its order.
+//! with the equivalent stress `g` of the yield surface `g(s) = Y + h p`. If `s0` does not yield there is no flow. `g` is convex
+//! and `g(c s) = c g(s)` for positive `c`, so that `g(s*) - Y - h p* >= f - phi (g(E m) + h p_m) >= f / 2`: the extrapolated flow
+//! removes at most half of the overstress and never moves a stress inside the yield surface, and `s*` changes by at least half of
+//! the
+//! change of `s0`. It supplies no energy, because `s*:m >= 0`. Of steady flow less than half is extrapolated for any length of the
+//! steps, `w / (1 + 2 w)` at the ratio `w` of two steps; therefore `phi` is 1 for smooth flow, and the formula keeps its order.
 
 use super::Returned;
 use crate::{
@@ -24,25 +25,26 @@ use crate::{
     linear_algebra::tensor::{Mandel, add_scaled, dot},
 };
 
-/// What a two-step formula extrapolates of the flow of the step before.
+/// The flow that a two-step formula extrapolates from the previous step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extrapolated<const S: usize> {
     /// `m`, a viscoplastic strain.
     pub flow: Mandel<S>,
-    /// `p_m`, a growth of the accumulated viscoplastic strain.
+    /// `p_m`, an increment of the accumulated viscoplastic strain.
     pub growth: f64,
 }
 
-/// `phi` between 0 and 1, and its derivative by `s0` where it is neither.
+/// `phi`, from 0 to 1, and its derivative with respect to `s0` if it is neither 0 nor 1.
 struct Share<const S: usize> {
     value: f64,
     gradient: Option<Mandel<S>>,
 }
 
 impl FlowLaw {
-    /// Flows for `length` s, and on with what is extrapolated, from the stress `elastic` that would be there without flow;
-    /// `accumulated` is the viscoplastic strain of hardening before. `None` where nothing flows. Where the caller wants it, the
-    /// derivative of the stress by `elastic` is written. Tells also whether that is as symmetric as the law's own tangent.
+    /// Computes the flow of a step of `length` in s, with the extrapolated flow, from the stress `elastic` without flow;
+    /// `accumulated` is the accumulated viscoplastic strain at its start. `None` without flow. On request, the
+    /// derivative of the stress with respect to `elastic` is written. Also returns whether it is symmetric if the tangent of the
+    /// law is.
     pub fn continue_flow<const S: usize>(
         &self,
         elastic: &Mandel<S>,
@@ -74,7 +76,7 @@ impl FlowLaw {
         Some((Returned { stress, flow, ..found }, share.gradient.is_none()))
     }
 
-    /// `phi`, or nothing where the stress does not yield.
+    /// `phi`, or `None` if the stress does not yield.
     fn share<const S: usize>(
         &self,
         elastic: &Mandel<S>,
@@ -107,8 +109,10 @@ impl FlowLaw {
     }
 }
 
-/// The derivative by `phi` of the `stress` at the end, given the tangent `T` and the growth of the yield stress `Y*` at `p*` with `phi`,
-/// relative to it. Stresses at the end grow by a factor with `s*` and `Y*`, so that their derivative by `Y*` is `(s - T s*) / Y*`.
+/// The derivative of the `stress` at the end with respect to `phi`, given the tangent `T` and the derivative of the yield stress
+/// `Y*` at
+/// `p*` with respect to `phi`, relative to `Y*`. The stress at the end is homogeneous in `s*` and `Y*`, so that its derivative
+/// with respect to `Y*` is `(s - T s*) / Y*`.
 fn by_share<const S: usize>(
     growth: f64,
     release: &Mandel<S>,
