@@ -42,13 +42,13 @@ fn small_jobs_take_as_many_iterations_as_they_did() {
     assert_counts(&[
         ("lagged_euler, 16 steps", &few, 1, [60.0, 141.0]),
         ("lagged_euler, 64 steps", &many, 1, [153.0, 353.0]),
-        ("implicit_euler", &euler, 1, [58.0, 151.0]),
-        ("bdf2", &bdf2, 1, [62.0, 155.0]),
-        (jobs[0], &adaptive, 1, [150.0, 352.0]),
+        ("implicit_euler", &euler, 1, [220.0, 490.0]),
+        ("bdf2", &bdf2, 1, [205.0, 460.0]),
+        (jobs[0], &adaptive, 1, [319.0, 663.0]),
         (jobs[1], &jump, 1, [397.0, 396.0]),
         (jobs[2], &oblique, 1, [100.0, 103.0]),
         ("lagged_euler, 16 steps", &few, 2, [60.0, 141.0]),
-        ("implicit_euler", &euler, 2, [58.0, 151.0]),
+        ("implicit_euler", &euler, 2, [220.0, 490.0]),
     ]);
 }
 

@@ -16,6 +16,7 @@ mod damage;
 mod effects;
 mod energy;
 mod fast_flow;
+mod flowing_contact;
 mod held_by_contact;
 mod inclusion;
 mod indefinite;
@@ -114,6 +115,7 @@ fn scenario() {
         "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
         "power_laws" => fast_flow::power_laws(&session),
+        "flowing_contact" => flowing_contact::all(&session),
         "flow_together" => fast_flow::together(&session),
         "flowing_plane" => manufactured_flow::plane(&session),
         "flowing_space" => manufactured_flow::space(&session),

@@ -39,6 +39,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         !self.is_explicit() && (!self.surface_effects.is_empty() || !self.called(|p| p.end).is_empty())
     }
 
+    /// Whether implicit steps are nonlinear without contact by flow alone, without damage and effects at the surface.
+    pub fn only_cells_flow(&self) -> bool {
+        self.flows() && self.surface_effects.is_empty() && self.called(|p| p.end && p.weakens).is_empty()
+    }
+
     /// Names of the effects, without contact, whose forces at the end of an implicit step may fall with the displacement.
     pub fn softening(&self) -> impl Iterator<Item = &'static str> {
         let cells = self.called(|p| p.end && p.weakens).select(&self.effects).map(|e| e.name());

@@ -11,10 +11,13 @@
 //! r_c`, and the contact system is `S (v + d) + C(v + d) = L_c y_c + r_c + S v`. The remaining error `-E d` is measured and
 //! corrected in the same way.
 
+mod flowing;
+
 use super::{
     StepOutcome,
     condensed_matrix::{CondensedMatrix, Motion, Subspace, Workspace},
     equations::StepMatrix,
+    flow_corrections::FlowCorrections,
     frames::Frames,
     linear_solver::SolverSettings,
     newton::Newton,
@@ -56,6 +59,8 @@ pub(super) struct Condensed {
     converged: DistributedVector,
     /// Data for corrections, if factors are in single precision.
     refinement: Option<Refinement>,
+    /// Data for cells that flow, if there are any.
+    flowing: Option<Box<FlowCorrections>>,
 }
 
 /// A factored matrix.
@@ -108,17 +113,18 @@ impl Refinement {
 }
 
 impl Condensed {
-    /// A solver for the contacts of a body, which numbers their unknowns; the matrix is set by [`Condensed::prepare`]. Collective.
+    /// A solver for the contacts of a body, which numbers their unknowns; the matrix is set by [`Condensed::prepare`]. `velocities` has
+    /// the layout of those of the body. Collective.
     pub(super) fn new<const D: usize, const S: usize>(
         session: &Session,
         body: &mut Body<D, S>,
+        velocities: &DistributedVector,
         settings: &SolverSettings,
         precision: Precision,
     ) -> Result<Self> {
         let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
         let nodes = ContactNodes::new(&contact);
-        let number = |node: usize| nodes.nodes.partition_point(|other| *other < node);
-        body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(number));
+        body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| nodes.number(node)));
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;
         let mut linear_solver = ProjectedKsp::new("", &like, D)?;
         linear_solver.linear_solver().set_method("cg")?;
@@ -126,6 +132,8 @@ impl Condensed {
         let newton = Newton::new(&like, &body.contacts, linear_solver, settings)?;
         let frames = Frames::new(session, &body.mesh, &contact)?;
         let start = session.share_start(nodes.motions.len());
+        let flowing =
+            if body.flows() { Some(Box::new(FlowCorrections::new(velocities, settings)?)) } else { None };
         Ok(Self {
             newton,
             elimination: Elimination {
@@ -142,6 +150,7 @@ impl Condensed {
             velocity: like.like()?,
             converged: like.like()?,
             refinement: None,
+            flowing,
         })
     }
 
@@ -223,12 +232,13 @@ impl Condensed {
         self.elimination.factored.iter().for_each(|factored| factored.condensed.restart_traffic());
     }
 
-    /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product.
-    pub(super) fn traffic(&self) -> u64 {
+    /// Least number of bytes that this rank has read since then: the factor for each half solve, its last block for each product;
+    /// `None` where cells flow, which is not counted.
+    pub(super) fn traffic(&self) -> Option<u64> {
         let Elimination { factored, half_solves, .. } = &self.elimination;
         let bytes =
             |factored: &Factored| half_solves * factored.factors.bytes() + factored.condensed.traffic();
-        factored.as_ref().map_or(0, bytes)
+        self.flowing.is_none().then(|| factored.as_ref().map_or(0, bytes))
     }
 
     /// Solves a step from the velocity in `trial` with a factor in double precision, and writes the new velocity there. Collective.
@@ -238,6 +248,11 @@ impl Condensed {
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
+        if let Some(mut flowing) = self.flowing.take() {
+            let outcome = self.solve_flowing(&mut flowing, problem, system, trial);
+            self.flowing = Some(flowing);
+            return outcome;
+        }
         let Self { newton, elimination, nodes, right_hand_side, velocity, converged, .. } = self;
         elimination.forward(system.right_hand_side)?;
         nodes.restrict::<D>(system.converged, converged)?;
@@ -387,6 +402,20 @@ impl ContactNodes {
             contact.frame[..contact.active].iter().map(motion)
         });
         Self { nodes: contact.iter().map(|contact| contact.node).collect(), motions: motions.collect() }
+    }
+
+    /// The position of a node in vectors of contact nodes.
+    fn number(&self, node: usize) -> usize {
+        self.nodes.partition_point(|other| *other < node)
+    }
+
+    /// Sets the values of contact nodes, and all others to zero.
+    fn extend<const D: usize>(&self, from: &DistributedVector, to: &mut DistributedVector) -> Result<()> {
+        let (from, mut to) = (from.owned()?, to.owned_mut()?);
+        to.fill(0.0);
+        let pairs = from.chunks_exact(D).zip(&self.nodes);
+        pairs.for_each(|(from, &node)| to[node * D..][..D].copy_from_slice(from));
+        Ok(())
     }
 
     /// Copies the values of contact nodes.

@@ -127,6 +127,11 @@ impl CondensedMatrix {
         self.workspace.borrow().traffic
     }
 
+    /// Whether [`StepMatrix::precondition`] inverts the matrix on a subspace only.
+    pub(super) fn is_on_subspace(&self) -> bool {
+        self.subspace.borrow().is_active
+    }
+
     /// Reads the amounts of all motions in a vector of contact nodes into the first work vector, in the order of the factor.
     /// Collective.
     fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {

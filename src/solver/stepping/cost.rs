@@ -80,10 +80,10 @@ impl ProblemSize {
             contact: !contacts.is_empty(),
             condensed: !contacts.is_empty()
                 && !contacts.iter().any(Contact::needs_ghosts)
-                && !body.flows()
+                && (!body.flows() || body.only_cells_flow())
                 && motions <= MAX_CONDENSED_MOTIONS,
             friction: contacts.iter().any(|contact| contact.friction().is_some()),
-            precision,
+            precision: if body.flows() { FactorPrecision::Double } else { precision },
         })
     }
 

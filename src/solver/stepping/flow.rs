@@ -84,6 +84,22 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
         Ok(())
     }
 
+    /// Writes the forces at a velocity, without their derivatives. Collective.
+    pub(super) fn write_forces(
+        &mut self,
+        velocity: &DistributedVector,
+        out: &mut DistributedVector,
+    ) -> Result<()> {
+        self.displace(velocity)?;
+        {
+            let (values, mut forces) = (self.flow.values.local()?, self.flow.forces.local_mut()?);
+            forces.fill(0.0);
+            self.cells.add_flow(&values, None, &mut forces);
+        }
+        out.fill(0.0)?;
+        self.flow.add_to_free_components(self.cells.fixed, out)
+    }
+
     /// Evaluates the forces at a velocity with their derivatives.
     fn evaluate(&mut self, velocity: &DistributedVector) -> Result<()> {
         self.displace(velocity)?;

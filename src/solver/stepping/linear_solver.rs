@@ -26,12 +26,12 @@ pub struct ProblemSize {
     pub interface: usize,
     /// Whether there is contact.
     pub contact: bool,
-    /// Whether a factor condenses steps to the contact: there is contact, at nodes that are not too many, and nothing in the bodies
-    /// flows during a step.
+    /// Whether a factor condenses steps to the contact: there is contact, at nodes that are not too many, and without contact nothing
+    /// but flow makes steps nonlinear.
     pub condensed: bool,
     /// Whether there is friction.
     pub friction: bool,
-    /// The requested precision of factors.
+    /// The requested precision of factors; double where cells flow at the end of a step.
     pub precision: FactorPrecision,
 }
 

@@ -11,6 +11,7 @@ mod equations;
 mod factor_cache;
 mod fallbacks;
 mod flow;
+mod flow_corrections;
 mod frames;
 mod implicit;
 mod integrator;

@@ -40,7 +40,7 @@ impl Solver {
         }
         if can_condense(settings, problem)? {
             let precision = problem.factor_precision();
-            return Ok(Self::Condensed(Box::new(Condensed::new(session, body, settings, precision)?)));
+            return Ok(Self::Condensed(Box::new(Condensed::new(session, body, like, settings, precision)?)));
         }
         Self::whole(session, body, like, settings)
     }

@@ -257,7 +257,7 @@ impl StepSolver {
         let product = self.matrix()?.bytes_of_a_product()?;
         let products = self.products.get() * product;
         match &mut self.solver {
-            Solver::Condensed(condensed) => Ok(Some(products + condensed.traffic())),
+            Solver::Condensed(condensed) => Ok(condensed.traffic().map(|bytes| products + bytes)),
             Solver::Newton(newton) if newton.flow.is_some() || newton.bounded.is_some() => Ok(None),
             Solver::Newton(newton) => {
                 let applications = newton.linear_solver.applications();
