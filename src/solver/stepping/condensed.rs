@@ -226,6 +226,11 @@ impl Condensed {
         self.elimination.backward(solution)
     }
 
+    /// Whether cells flow at the end of a step.
+    pub(super) fn flows(&self) -> bool {
+        self.flowing.is_some()
+    }
+
     /// Restarts the count of traffic.
     pub(super) fn restart_traffic(&mut self) {
         self.elimination.half_solves = 0;
@@ -241,15 +246,17 @@ impl Condensed {
         self.flowing.is_none().then(|| factored.as_ref().map_or(0, bytes))
     }
 
-    /// Solves a step from the velocity in `trial` with a factor in double precision, and writes the new velocity there. Collective.
+    /// Solves a step from the velocity in `trial` with a factor in double precision, and writes the new velocity there. `factor_is_own`
+    /// states whether the factor is that of the matrix of the step; this is always so without flow. Collective.
     pub(super) fn solve<const D: usize, const S: usize>(
         &mut self,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
         trial: &mut DistributedVector,
+        factor_is_own: bool,
     ) -> Result<StepOutcome> {
         if let Some(mut flowing) = self.flowing.take() {
-            let outcome = self.solve_flowing(&mut flowing, problem, system, trial);
+            let outcome = self.solve_flowing(&mut flowing, problem, system, (trial, factor_is_own));
             self.flowing = Some(flowing);
             return outcome;
         }

@@ -145,9 +145,13 @@ impl StepSolver {
         Ok(is_new)
     }
 
-    /// The length whose preconditioner is set up: a condensed matrix is valid only for its own length.
+    /// The length whose preconditioner is set up: a condensed matrix is valid only for its own length, but where cells flow its factor
+    /// preconditions Newton's method for nearby lengths.
     fn cached_length(&self, lengths: Lengths) -> f64 {
-        if matches!(self.solver, Solver::Condensed(_)) { lengths.matrix } else { lengths.cached }
+        match &self.solver {
+            Solver::Condensed(condensed) if !condensed.flows() => lengths.matrix,
+            _ => lengths.cached,
+        }
     }
 
     /// Activates another linear solver: `next`, or a new one that is not set up. The matrix in use, if there is one, is stored in
@@ -303,7 +307,10 @@ impl StepSolver {
                 Solver::Linear(ksp) => solve_linear(ksp, problem, tolerance, trial),
                 Solver::Newton(newton) => newton.solve(problem, system, trial),
                 Solver::Condensed(condensed) if is_single => condensed.refine(problem, system, trial),
-                Solver::Condensed(condensed) => condensed.solve(problem, system, trial),
+                Solver::Condensed(condensed) => {
+                    let is_own = self.step_matrix.is_none();
+                    condensed.solve(problem, system, trial, is_own)
+                }
             };
             let failure = match session.agree(solved) {
                 Err(failure) if failure.is_failure() => failure,

@@ -37,14 +37,18 @@ enum Corrected {
 }
 
 impl Condensed {
-    /// Solves a step in which cells flow from the velocity in `trial`, and writes the new one there. Collective.
+    /// Solves a step in which cells flow from the velocity in `trial`, and writes the new one there; by corrections only if the factor
+    /// is that of the matrix of the step. Collective.
     pub(super) fn solve_flowing<const D: usize, const S: usize>(
         &mut self,
         flowing: &mut FlowCorrections,
         problem: &mut StepProblem<'_, D, S>,
         system: System<'_>,
-        trial: &mut DistributedVector,
+        (trial, factor_is_own): (&mut DistributedVector, bool),
     ) -> Result<StepOutcome> {
+        if !factor_is_own {
+            return self.solve_whole(flowing, problem, system, trial);
+        }
         flowing.start.copy_from(trial)?;
         let mut sum = StepOutcome::default();
         if let Corrected::Solved = self.correct(flowing, problem, system, (trial, &mut sum))? {
