@@ -4,6 +4,7 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, simulation};
 use clarke::{
+    fem::effect::VISCOPLASTIC,
     mesh::{
         GlobalMesh,
         generate::{Diagonal, box_mesh, rectangle},
@@ -52,7 +53,7 @@ fn same_motion<const D: usize, const S: usize>(session: &Session, mesh: &GlobalM
             run
         };
         let [factored, multigrid] = ["cholesky", "gamg"].map(run);
-        let flowed = factored.totals.energy.viscoplastic;
+        let flowed = factored.totals.energy[VISCOPLASTIC];
         assert!(session.largest([flowed])[0] > 1e-3, "{material}: {flowed} J");
         let [found, expected] =
             [&factored, &multigrid].map(|run| run.state.velocity.owned().expect("values").to_vec());

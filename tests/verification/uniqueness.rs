@@ -4,7 +4,11 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, brick, crossed, set_nodal, simulation};
 use clarke::{
-    fem::effect::{Contact, ContactConditions, Form, Quadrature, choose_unknowns},
+    fem::{
+        body::Body,
+        effect::{Contact, ContactConditions, Form, Quadrature, choose_unknowns},
+        state::State,
+    },
     job::Job,
     laws::contact::Gap,
     linear_algebra::petsc::DistributedVector,
@@ -82,10 +86,10 @@ fn combine(factor: f64, a: &Dense, other: &Dense) -> Dense {
 /// The matrix of a map between nodal vectors. Collective.
 fn dense<const D: usize, const S: usize>(
     session: &Session,
-    run: &Simulation<D, S>,
+    (body, state): (&Body<D, S>, &State),
     mut map: impl FnMut(&DistributedVector, &mut DistributedVector),
 ) -> Dense {
-    let (body, vector) = (&run.body, || run.state.velocity.like().expect("vector"));
+    let vector = || state.velocity.like().expect("vector");
     let size = session.total(body.mesh.owned) * D;
     let gather = |values: &[f64]| {
         let mut mine = vec![0.0; size];
@@ -114,7 +118,7 @@ fn dense_form<const D: usize, const S: usize>(
     run: &Simulation<D, S>,
     mut add: impl FnMut(&[f64], &mut [f64]),
 ) -> Dense {
-    dense(session, run, |x, y| {
+    dense(session, (&run.body, &run.state), |x, y| {
         {
             let (x, mut y) = (x.local().expect("values"), y.local_mut().expect("values"));
             y.fill(0.0);
@@ -188,11 +192,11 @@ fn compare<const D: usize, const S: usize>(
 ) {
     let what = format!("{what}, {D}D, {density} kg, {} ranks", session.ranks());
     let mut run = simulation::<D, S>(session, &job::<D>(contacts, density), mesh);
-    let found =
-        Certificates::of(session, &run.body, &run.state, &mut run.scheme, STEP).expect("certificates");
+    let mut of_step = run.scheme.matrix(session, &mut run.body, STEP).expect("matrix");
+    let found = Certificates::of(session, &run.body, &run.state, &mut of_step, STEP).expect("certificates");
     let largest_step =
-        Certificates::unique_step(session, &run.body, &run.state, &mut run.scheme).expect("certificate");
-    let matrix = dense(session, &run, |x, y| run.scheme.multiply(x, y).expect("product"));
+        Certificates::unique_step(session, &run.body, &run.state, &mut of_step).expect("certificate");
+    let matrix = dense(session, (&run.body, &run.state), |x, y| of_step.multiply(x, y).expect("product"));
     let form = |form| dense_form(session, &run, |x, y| run.body.add_form(form, x, y));
     let (mass, viscosity, strain) = (form(Form::Mass), form(Form::Viscosity), form(Form::Strain));
     let mut own = std::mem::take(&mut run.body.contacts);
@@ -282,8 +286,8 @@ fn cube(quadrature: &str, solver: &str) -> String {
 
 fn theta_of_cube(session: &Session, mesh: &GlobalMesh<3>, quadrature: &str) -> f64 {
     let mut run = simulation::<3, 6>(session, &cube(quadrature, "accept = ['uniqueness']"), mesh);
-    let found =
-        Certificates::of(session, &run.body, &run.state, &mut run.scheme, 0.04).expect("certificates");
+    let mut matrix = run.scheme.matrix(session, &mut run.body, 0.04).expect("matrix");
+    let found = Certificates::of(session, &run.body, &run.state, &mut matrix, 0.04).expect("certificates");
     found.theta_step.expect("theta")
 }
 
