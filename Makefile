@@ -27,7 +27,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs bench-accuracy lint install clean
+.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs bench-accuracy verification lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -42,6 +42,7 @@ help:
 	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost; ARGS=--write puts the tables into docs'
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make bench-accuracy  the studies of docs/what-accuracy-costs.md; ARGS=--write puts their tables into it'
+	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
 	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
@@ -103,6 +104,11 @@ bench-runs: deps
 # The studies behind docs/what-accuracy-costs.md, some ten minutes; ARGS=--write puts their tables into it.
 bench-accuracy: deps
 	cargo bench --locked --bench accuracy -- $(ARGS)
+
+# The cases of docs/verification on three meshes each, under every scheme and preconditioner and on several ranks; ARGS=--write puts tables and pictures
+# into the pages; words in ARGS that begin the names of pages select them.
+verification: deps
+	cargo bench --locked --bench verification -- $(ARGS)
 
 lint: deps
 	cargo fmt --all --check

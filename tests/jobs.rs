@@ -1,16 +1,12 @@
 //! Every job under jobs/ reproduces the numbers of its `[check]` table, on one and on two ranks.
-//!
-//! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
-//! end: `history.COLUMN`, `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or
-//! `.min.` over the boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
+
+#[path = "checked/mod.rs"]
+mod checked;
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-use clarke::{
-    job::{Expected, Job},
-    linear_algebra::tensor::larger,
-};
+use checked::{measured, run};
+use clarke::job::{Expected, Job};
 
 /// All jobs of the repository, without studies.
 fn jobs() -> Vec<PathBuf> {
@@ -29,80 +25,6 @@ fn jobs() -> Vec<PathBuf> {
     }
     found.sort();
     found
-}
-
-fn run(job: &Path, ranks: usize, output: &Path) -> Result<(), String> {
-    // Launchers that share this folder compete in creating and removing it.
-    let own = tempfile::tempdir().map_err(|error| format!("folder: {error}"))?;
-    let run = Command::new("mpirun")
-        .env("OMPI_MCA_orte_tmpdir_base", own.path())
-        .args([
-            "--oversubscribe",
-            "--bind-to",
-            "none",
-            "-n",
-            &ranks.to_string(),
-            env!("CARGO_BIN_EXE_solver"),
-        ])
-        .arg(job)
-        .args(["--set", &format!("output.folder={output:?}")])
-        .env("OMP_NUM_THREADS", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .output()
-        .map_err(|error| format!("mpirun: {error}"))?;
-    let words = String::from_utf8_lossy(&run.stderr);
-    if run.status.success() { Ok(()) } else { Err(format!("{}\n{words}", run.status)) }
-}
-
-/// The numbers of a column in the rows in which another column contains this word (in all rows without a filter).
-fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) -> Option<Vec<f64>> {
-    let text = std::fs::read_to_string(folder.join(table)).ok()?;
-    let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let header = rows.next()?;
-    let place = |name: &str| header.iter().position(|column| *column == name);
-    let (wanted, filter) = match filter {
-        Some((column, word)) => (place(name)?, Some((place(column)?, word))),
-        None => (place(name)?, None),
-    };
-    let kept = rows.filter(|row| filter.is_none_or(|(column, word)| row[column] == word));
-    kept.map(|row| row[wanted].parse().ok()).collect()
-}
-
-fn extreme(side: &str, values: impl Iterator<Item = f64>) -> Option<f64> {
-    match side {
-        "max" => values.reduce(larger),
-        "min" => values.reduce(|a, b| -larger(-a, -b)),
-        _ => None,
-    }
-}
-
-/// The quantity in the results of the run in `folder`, if it exists.
-fn measured(folder: &Path, quantity: &str) -> Option<f64> {
-    let parts: Vec<&str> = quantity.split('.').collect();
-    match parts[..] {
-        ["probe", name, field] => column(folder, "probes.csv", Some(("probe", name)), field)?.pop(),
-        ["probe", name, side, field] => {
-            let all = column(folder, "probes.csv", Some(("probe", name)), field)?.into_iter();
-            extreme(side, all)
-        }
-        ["resultant", source, field] => {
-            column(folder, "resultants.csv", Some(("source", source)), field)?.pop()
-        }
-        ["history", field] => column(folder, "history.csv", None, field)?.pop(),
-        ["profile", boundary, side, field] => {
-            let filter = Some(("profile", boundary));
-            let times = column(folder, "profiles.csv", filter, "time")?;
-            let values = column(folder, "profiles.csv", filter, field)?;
-            let rows = times.iter().zip(values).filter(|(time, _)| Some(*time) == times.last());
-            extreme(side, rows.map(|(_, value)| value))
-        }
-        _ => {
-            let text = std::fs::read_to_string(folder.join("summary.json")).ok()?;
-            let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-            summary.pointer(&format!("/{}", parts.join("/")))?.as_f64()
-        }
-    }
 }
 
 /// The error of a number, if there is one.
@@ -124,7 +46,7 @@ fn faults(ranks: usize) -> Vec<String> {
             continue;
         }
         let output = tempfile::tempdir().expect("folder");
-        if let Err(words) = run(&file, ranks, output.path()) {
+        if let Err(words) = run(&file, ranks, output.path(), &[]) {
             faults.push(format!("{name}: {words}"));
             continue;
         }

@@ -3,17 +3,18 @@
 use std::{fs, path::Path, process::Command};
 
 /// Replaces the table `name` of a document by `body`, under a line that says on what machine, with what memory bandwidth (bytes a
-/// second) and when it was measured, and by which command.
-pub fn write(document: &str, name: &str, command: &str, bandwidth: f64, body: &str) {
+/// second; `None` if the numbers do not depend on it) and when it was measured, and by which command.
+pub fn write(document: &str, name: &str, command: &str, bandwidth: impl Into<Option<f64>>, body: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(document);
     let text = fs::read_to_string(&path).expect("the document");
     let (begin, end) = (format!("<!-- table {name} -->\n"), format!("<!-- end of table {name} -->"));
     let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("{document} has no {begin}"));
     let (_, after) = rest.split_once(&end).unwrap_or_else(|| panic!("{document} has no {end}"));
+    let triad = bandwidth.into().map(|bytes| format!(" triad {:.1} GB/s,", bytes / 1e9));
     let head = format!(
-        "`{command}` on {}, triad {:.1} GB/s, {}:",
+        "`{command}` on {},{} {}:",
         machine(),
-        bandwidth / 1e9,
+        triad.unwrap_or_default(),
         output("date", &["--utc", "+%F"]).unwrap_or_else(|| "unknown date".into())
     );
     fs::write(&path, format!("{before}{begin}{head}\n\n{}\n\n{end}{after}", body.trim_end()))

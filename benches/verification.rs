@@ -1,0 +1,563 @@
+//! The cases of the verification manual, docs/verification: `cargo bench --bench verification -- [--write] [PAGE]..`.
+//!
+//! A case is a job of jobs/verification whose `[check]` table holds reference values only. Its page shows the values that are found on
+//! several meshes, and a chart of their errors. The first page lists all cases on the meshes of their jobs. `--write` puts tables and
+//! charts into the pages, those of the named ones only if there are names (`hertz`).
+
+#[path = "../tests/checked/mod.rs"]
+mod checked;
+#[path = "table/mod.rs"]
+mod table;
+
+use clarke::{
+    job::{Expected, Job},
+    postprocessing::drawing::chart::{Axis, Chart, Look, Series},
+};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+const COMMAND: &str = "make verification ARGS=--write";
+const PAGES: &str = "docs/verification";
+
+/// A column of a table: a job with changed keys on some ranks.
+struct Run {
+    label: &'static str,
+    ranks: usize,
+    changes: &'static [&'static str],
+}
+
+const fn with(label: &'static str, changes: &'static [&'static str]) -> Run {
+    Run { label, ranks: 1, changes }
+}
+
+const fn on_ranks(label: &'static str, ranks: usize, changes: &'static [&'static str]) -> Run {
+    Run { label, ranks, changes }
+}
+
+/// What the columns of a table are.
+#[derive(Clone, Copy, PartialEq)]
+enum Columns {
+    /// Meshes whose cells are halved from column to column: the errors have an order.
+    Meshes,
+    /// Variants of the job, each with the error against the same reference.
+    Variants,
+    /// Ways to solve the same equations: the table shows how much the results differ.
+    Agreement,
+}
+
+/// A table of a page.
+struct Table {
+    page: &'static str,
+    name: &'static str,
+    /// Relative to jobs/, without extension.
+    job: &'static str,
+    columns: Columns,
+    /// Whether the page shows the deformed body on the first mesh, as `solver report` draws it.
+    pictured: bool,
+    runs: &'static [Run],
+}
+
+/// To add a mesh, an order of elements or a case, add a line here, a mark in the page and, for a case, a job.
+const TABLES: &[Table] = &[
+    Table {
+        page: "elastic-bar",
+        name: "bdf2",
+        job: "verification/elastic_bar_hits_a_wall",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("80", &["mesh.rectangle.cells=[80, 1]", "time.step=5e-7"]),
+            with("160", &[]),
+            with("320", &["mesh.rectangle.cells=[320, 1]", "time.step=1.25e-7"]),
+        ],
+    },
+    Table {
+        page: "elastic-bar",
+        name: "schemes",
+        job: "verification/elastic_bar_hits_a_wall",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with("lagged_euler", &["time.scheme=lagged_euler", "time.step=1.25e-7"]),
+            with("implicit_euler", &["time.scheme=implicit_euler", "time.step=1.25e-7"]),
+            with("bdf2", &["time.step=1.25e-7"]),
+        ],
+    },
+    Table {
+        page: "raous-plate",
+        name: "meshes",
+        job: "verification/raous_plate",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("16 x 16", &["mesh.rectangle.cells=[16, 16]"]),
+            with("32 x 32", &[]),
+            with("64 x 64", &["mesh.rectangle.cells=[64, 64]"]),
+        ],
+    },
+    Table {
+        page: "coulomb-limit",
+        name: "sticking",
+        job: "verification/coulomb_limit",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("8 x 4", &["mesh.rectangle.cells=[8, 4]"]),
+            with("16 x 8", &[]),
+            with("32 x 16", &["mesh.rectangle.cells=[32, 16]"]),
+        ],
+    },
+    Table {
+        page: "coulomb-limit",
+        name: "sliding",
+        job: "verification/coulomb_slip",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("8 x 4", &["mesh.rectangle.cells=[8, 4]"]),
+            with("16 x 8", &[]),
+            with("32 x 16", &["mesh.rectangle.cells=[32, 16]"]),
+        ],
+    },
+    Table {
+        page: "sliding-wedge",
+        name: "friction",
+        job: "verification/sliding_wedge",
+        columns: Columns::Variants,
+        pictured: false,
+        runs: &[
+            with(
+                "0, 1194 N/m",
+                &["contact.0.friction.coulomb.coefficient=0", "contact.1.normal.compliance.stiffness=2985.5"],
+            ),
+            with("0.1, 882.2 N/m", &[]),
+            with(
+                "0.2, 563.9 N/m",
+                &[
+                    "contact.0.friction.coulomb.coefficient=0.2",
+                    "contact.1.normal.compliance.stiffness=1409.6938775510205",
+                ],
+            ),
+        ],
+    },
+    Table {
+        page: "hertz",
+        name: "line",
+        job: "verification/hertz_line",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("16 x 16", &["mesh.rectangle.cells=[16, 16]"]),
+            with("32 x 32", &[]),
+            with("64 x 64", &["mesh.rectangle.cells=[64, 64]"]),
+        ],
+    },
+    Table {
+        page: "hertz",
+        name: "point",
+        job: "verification/hertz_point",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("6^3", &["mesh.box.cells=[6, 6, 6]"]),
+            with("12^3", &[]),
+            with("24^3", &["mesh.box.cells=[24, 24, 24]"]),
+        ],
+    },
+    Table {
+        page: "prandtl-punch",
+        name: "crossed",
+        job: "verification/prandtl_punch",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("10 x 10", &["mesh.rectangle.cells=[10, 10]"]),
+            with("20 x 20", &[]),
+            with("40 x 40", &["mesh.rectangle.cells=[40, 40]"]),
+        ],
+    },
+    Table {
+        page: "prandtl-punch",
+        name: "alternating",
+        job: "verification/prandtl_punch",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("20 x 20", &["mesh.rectangle.diagonal=alternating"]),
+            with("40 x 40", &["mesh.rectangle.diagonal=alternating", "mesh.rectangle.cells=[40, 40]"]),
+            with("80 x 80", &["mesh.rectangle.diagonal=alternating", "mesh.rectangle.cells=[80, 80]"]),
+        ],
+    },
+    Table {
+        page: "prandtl-punch",
+        name: "right",
+        job: "verification/prandtl_punch",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: &[
+            with("20 x 20", &["mesh.rectangle.diagonal=right"]),
+            with("40 x 40", &["mesh.rectangle.diagonal=right", "mesh.rectangle.cells=[40, 40]"]),
+            with("80 x 80", &["mesh.rectangle.diagonal=right", "mesh.rectangle.cells=[80, 80]"]),
+        ],
+    },
+    Table {
+        page: "timoshenko-beam",
+        name: "meshes",
+        job: "verification/timoshenko_beam",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("32 x 8", &["mesh.rectangle.cells=[32, 8]"]),
+            with("64 x 16", &[]),
+            with("128 x 32", &["mesh.rectangle.cells=[128, 32]"]),
+        ],
+    },
+    Table {
+        page: "ring",
+        name: "elastic",
+        job: "verification/lame_ring",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: RINGS,
+    },
+    Table {
+        page: "ring",
+        name: "creep",
+        job: "verification/norton_ring",
+        columns: Columns::Meshes,
+        pictured: false,
+        runs: RINGS,
+    },
+    Table {
+        page: "agreement",
+        name: "schemes",
+        job: "papers/wang_cheng_2022",
+        columns: Columns::Agreement,
+        pictured: false,
+        runs: &[
+            with("lagged_euler", &["mesh.rectangle.cells=[16, 16]", "time.step=0.00048828125"]),
+            with(
+                "implicit_euler",
+                &["mesh.rectangle.cells=[16, 16]", "time.step=0.00048828125", "time.scheme=implicit_euler"],
+            ),
+            with("bdf2", &["mesh.rectangle.cells=[16, 16]", "time.step=0.00048828125", "time.scheme=bdf2"]),
+        ],
+    },
+    Table {
+        page: "agreement",
+        name: "preconditioners",
+        job: "papers/wang_cheng_2022",
+        columns: Columns::Agreement,
+        pictured: false,
+        runs: &[
+            with("cholesky", &["solver.preconditioner=cholesky", "solver.factor_precision=double"]),
+            with("cholesky, single", &["solver.preconditioner=cholesky", "solver.factor_precision=single"]),
+            with("gamg", &["solver.preconditioner=gamg"]),
+            with("boomeramg", &["solver.preconditioner=boomeramg"]),
+        ],
+    },
+    Table {
+        page: "agreement",
+        name: "ranks",
+        job: "papers/wang_cheng_2022",
+        columns: Columns::Agreement,
+        pictured: false,
+        runs: &[
+            on_ranks("1", 1, &[]),
+            on_ranks("2", 2, &[]),
+            on_ranks("3", 3, &[]),
+            on_ranks("4", 4, &[]),
+            on_ranks("4, gamg", 4, &["solver.preconditioner=gamg"]),
+        ],
+    },
+    Table {
+        page: "agreement",
+        name: "friction",
+        job: "verification/raous_plate",
+        columns: Columns::Agreement,
+        pictured: false,
+        runs: &[
+            on_ranks("newton, 1", 1, &[]),
+            on_ranks("newton, 3", 3, &[]),
+            on_ranks("fixed_point, 1", 1, &["solver.friction=fixed_point"]),
+        ],
+    },
+];
+
+const RINGS: &[Run] = &[
+    with("4 x 8", &["mesh.file=../../meshes/ring_coarse.msh"]),
+    with("8 x 16", &[]),
+    with("16 x 32", &["mesh.file=../../meshes/ring_fine.msh"]),
+];
+
+/// Closed forms in other jobs, relative to jobs/: those numbers of their `[check]` tables that are references.
+const ELSEWHERE: &[(&str, &[&str])] = &[
+    (
+        "block_in_a_corner",
+        &[
+            "profile.right.max.contact_pressure",
+            "profile.bottom.max.contact_pressure",
+            "profile.bottom.max.normal_displacement",
+            "probe.left.displacement_x",
+        ],
+    ),
+    (
+        "compliant_foundation",
+        &["probe.bottom.displacement_y", "profile.bottom.max.contact_pressure", "history.contact_energy"],
+    ),
+    (
+        "conveyor_belt",
+        &["probe.centre.displacement_x", "history.external_work", "history.contact_dissipation"],
+    ),
+    ("creep_rupture", &["probe.end.displacement_x", "history.damage_dissipation"]),
+    ("dilatant_shear", &["final_von_mises"]),
+    ("hardening_bar", &["probe.tip.displacement_x"]),
+    ("oblique_sliding", &["probe.centre.velocity_x", "probe.centre.velocity_y"]),
+    (
+        "one_way_guide",
+        &[
+            "profile.bottom.max.normal_displacement",
+            "profile.bottom.max.contact_pressure",
+            "probe.top.velocity_y",
+        ],
+    ),
+    ("permanent_set", &["probe.tip.displacement_x", "history.viscoplastic_dissipation"]),
+    ("power_law_creep", &["probe.tip.velocity_x"]),
+    ("remembering_foundation", &["probe.foot.displacement_y", "history.contact_dissipation"]),
+    ("sinking_block", &["probe.corner.velocity_y", "profile.bottom.max.contact_pressure"]),
+    ("sliding_block", &["probe.centre.displacement_x"]),
+    ("slip_weakening_block", &["probe.centre.velocity_x"]),
+    ("stick_on_a_jump", &["profile.bottom.max.normal_velocity"]),
+    ("strain_hardening_creep", &["probe.tip.displacement_x", "history.viscoplastic_dissipation"]),
+    ("stress_relaxation", &["final_von_mises"]),
+    ("stuck_beam", &["history.elastic_energy"]),
+    ("torn_off", &["probe.middle.velocity_y", "history.adhesion_dissipation"]),
+    ("hard/graded_by_a_million", &["probe.corner.displacement_x", "probe.corner.displacement_y"]),
+    ("hard/nearly_incompressible", &["probe.top.displacement_y"]),
+    ("hard/nearly_perfect_plasticity_in_space", &["probe.end.displacement_x", "final_von_mises"]),
+    ("hard/slivers_in_space", &["probe.corner.displacement_x", "probe.corner.displacement_z"]),
+    ("hard/three_solutions", &["probe.bottom.velocity_y"]),
+    ("hard/twentieth_power_of_the_overstress", &["probe.end.displacement_x"]),
+];
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// The numbers of the `[check]` table of a job.
+fn expected(job: &str) -> Vec<(String, Expected)> {
+    let job =
+        Job::load(&folder("jobs").join(format!("{job}.toml")), &[]).expect("a job of the repository").job;
+    job.check.into_iter().collect()
+}
+
+/// These quantities as a run of the job leaves them in this folder.
+fn found(job: &str, run: &Run, quantities: &[&str], output: &Path) -> Vec<f64> {
+    let file = folder("jobs").join(format!("{job}.toml"));
+    if let Err(words) = checked::run(&file, run.ranks, output, run.changes) {
+        panic!("{job}, {}: {words}", run.label);
+    }
+    let number =
+        |name: &&str| checked::measured(output, name).unwrap_or_else(|| panic!("{job} left no {name}"));
+    quantities.iter().map(number).collect()
+}
+
+/// The error, relative to the reference unless that is zero.
+fn error(found: f64, reference: f64) -> f64 {
+    let scale = if reference == 0.0 { 1.0 } else { reference.abs() };
+    (found - reference).abs() / scale
+}
+
+/// A number as the tables show it.
+fn number(value: f64) -> String {
+    if value == 0.0 { "0".into() } else { format!("{value:.5e}") }
+}
+
+fn short(value: f64) -> String {
+    if value == 0.0 { "0".into() } else { format!("{value:.1e}") }
+}
+
+/// Errors of an exact result are rounding errors and have no order.
+const ROUNDING: f64 = 1e-7;
+
+/// The order of the last of these errors on meshes that are halved.
+fn order(errors: &[f64]) -> String {
+    match errors {
+        [.., before, last] if *last > ROUNDING => format!("{:.2}", (before / last).log2()),
+        _ => "-".into(),
+    }
+}
+
+/// The file of a picture that belongs to a table.
+fn picture(table: &Table, shows: &str) -> PathBuf {
+    let name = format!("{}_{}_{shows}.svg", table.page.replace('-', "_"), table.name);
+    folder(PAGES).join("pictures").join(name)
+}
+
+/// Writes the picture of the deformed body that `solver report` draws of the run in the folder.
+fn draw_body(output: &Path, file: &Path) {
+    let report = Command::new(env!("CARGO_BIN_EXE_solver")).arg("report").arg(output).output();
+    let report = report.expect("started");
+    assert!(report.status.success(), "{}", String::from_utf8_lossy(&report.stderr));
+    fs::copy(output.join("report/von_mises.svg"), file).expect("the picture of the body");
+}
+
+/// The table, and the relative errors of each quantity.
+fn rows(table: &Table, writes: bool) -> (String, Vec<(String, Vec<f64>)>) {
+    let kept = |name: &str| match table.columns {
+        Columns::Agreement => ["probe.", "history.", "profile.", "resultant.", "final_"]
+            .iter()
+            .any(|start| name.starts_with(start)),
+        _ => name != "max_energy_imbalance",
+    };
+    let expected: Vec<_> = expected(table.job).into_iter().filter(|(name, _)| kept(name)).collect();
+    let names: Vec<&str> = expected.iter().map(|(name, _)| name.as_str()).collect();
+    let columns = table.runs.iter().enumerate().map(|(column, run)| {
+        let output = tempfile::tempdir().expect("folder");
+        let values = found(table.job, run, &names, output.path());
+        if let (true, true, 0) = (table.pictured, writes, column) {
+            draw_body(output.path(), &picture(table, "body"));
+        }
+        values
+    });
+    let columns: Vec<Vec<f64>> = columns.collect();
+    let labels: Vec<&str> = table.runs.iter().map(|run| run.label).collect();
+    let last = match table.columns {
+        Columns::Meshes => "error of the last | order",
+        Columns::Variants => "largest error",
+        Columns::Agreement => "largest difference",
+    };
+    let reference = if table.columns == Columns::Agreement { "" } else { "reference | " };
+    let mut text = format!("| quantity | {reference}{} | {last} |\n", labels.join(" | "));
+    text += &format!("|:--|{}\n", "--:|".repeat(text.matches(" | ").count()));
+    let mut all = vec![];
+    for (row, (name, expected)) in expected.iter().enumerate() {
+        let values: Vec<f64> = columns.iter().map(|column| column[row]).collect();
+        let against = if table.columns == Columns::Agreement { values[0] } else { expected.value };
+        let errors: Vec<f64> = values.iter().map(|value| error(*value, against)).collect();
+        let largest = errors.iter().copied().fold(0.0, f64::max);
+        let tail = match table.columns {
+            Columns::Meshes => format!("{} | {}", short(errors[errors.len() - 1]), order(&errors)),
+            _ => short(largest),
+        };
+        let shown = values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(" | ");
+        let reference =
+            if table.columns == Columns::Agreement { String::new() } else { number(expected.value) + " | " };
+        text += &format!("| `{name}` | {reference}{shown} | {tail} |\n");
+        if expected.value != 0.0 {
+            all.push((name.clone(), errors));
+        }
+    }
+    (text, all)
+}
+
+/// A chart of errors over the mesh, where they are not rounding errors.
+fn chart(errors: &[(String, Vec<f64>)]) -> Option<String> {
+    let wanted = errors.iter().filter(|(_, errors)| errors.iter().all(|error| *error > ROUNDING));
+    let series: Vec<Series> = wanted
+        .enumerate()
+        .map(|(place, (name, errors))| {
+            let points = errors.iter().enumerate().map(|(level, error)| [0.5_f64.powi(level as i32), *error]);
+            Series::new(place, name.clone(), Look::Dotted, points.collect())
+        })
+        .collect();
+    if series.is_empty() {
+        return None;
+    }
+    let x = Axis { quantity: "size of the cells, relative to the first mesh", unit: "" };
+    let mut chart = Chart::new(x, Axis { quantity: "relative error", unit: "" }, series);
+    (chart.logarithmic, chart.logarithmic_x) = (true, true);
+    Some(chart.svg().expect("a chart"))
+}
+
+/// The table of all cases: every job of jobs/verification and the closed forms elsewhere, on the meshes of the jobs.
+fn overview() -> String {
+    let jobs = fs::read_dir(folder("jobs/verification")).expect("folder").filter_map(|entry| {
+        let path = entry.expect("entry").path();
+        let stem = path.file_stem()?.to_str()?.to_owned();
+        path.extension().is_some_and(|word| word == "toml").then(|| format!("verification/{stem}"))
+    });
+    let mut jobs: Vec<String> = jobs.collect();
+    jobs.sort();
+    let elsewhere = ELSEWHERE.iter().map(|(job, names)| (job.to_string(), Some(*names)));
+    let mut text =
+        "| job | quantity | reference | found | error | accepted |\n|:--|:--|--:|--:|--:|--:|\n".to_owned();
+    let link = |job: &str| {
+        let page = TABLES.iter().find(|table| table.job == job).map(|table| table.page);
+        assert!(page.is_some() || !job.starts_with("verification/"), "{job} is on no page");
+        page.map_or_else(|| format!("`{job}`"), |page| format!("[{job}]({page}.md)"))
+    };
+    for (job, wanted) in jobs.into_iter().map(|job| (job, None)).chain(elsewhere) {
+        let mut expected = expected(&job);
+        expected.retain(|(name, _)| match wanted {
+            Some(wanted) => wanted.contains(&name.as_str()),
+            None => name != "max_energy_imbalance",
+        });
+        let names: Vec<&str> = expected.iter().map(|(name, _)| name.as_str()).collect();
+        assert!(
+            wanted.is_none_or(|wanted| wanted.len() == names.len()),
+            "{job} does not check all of {wanted:?}"
+        );
+        let output = tempfile::tempdir().expect("folder");
+        let values = found(&job, &with("", &[]), &names, output.path());
+        for ((name, expected), value) in expected.iter().zip(values) {
+            let accepted = expected.relative.or(expected.absolute).unwrap_or(f64::NAN);
+            text += &format!(
+                "| {} | `{name}` | {} | {} | {} | {} |\n",
+                link(&job),
+                number(expected.value),
+                number(value),
+                short(error(value, expected.value)),
+                short(accepted)
+            );
+        }
+    }
+    text
+}
+
+/// The tables of errors beside published ones of the study of Table 1.
+fn table_1() -> String {
+    let output = tempfile::tempdir().expect("folder");
+    let study = Command::new(env!("CARGO_BIN_EXE_solver"))
+        .arg("study")
+        .arg(folder("jobs/studies/wang_cheng_table_1.toml"))
+        .args(["--set", &format!("output.folder={:?}", output.path())])
+        .status()
+        .expect("started");
+    assert!(study.success(), "the study of Table 1: {study}");
+    let document = fs::read_to_string(output.path().join("study.md")).expect("its tables");
+    let parts = document.split("\n## ").skip(1).filter(|part| part.contains("published"));
+    let parts: Vec<&str> = parts.map(str::trim).collect();
+    assert_eq!(parts.len(), 4, "columns of Table 1");
+    format!("### {}", parts.join("\n\n### "))
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let writes = words.iter().any(|word| word == "--write");
+    let pages: Vec<&String> = words.iter().filter(|word| !word.starts_with("--")).collect();
+    let wanted = |page: &str| pages.is_empty() || pages.iter().any(|name| page == name.as_str());
+    let put = |page: &str, name: &str, body: &str| {
+        println!("{page}: {name}\n\n{body}\n");
+        if writes {
+            table::write(&format!("{PAGES}/{page}.md"), name, COMMAND, None, body);
+        }
+    };
+    for table in TABLES.iter().filter(|table| wanted(table.page)) {
+        let (text, errors) = rows(table, writes);
+        put(table.page, table.name, &text);
+        let drawn = (table.columns == Columns::Meshes).then(|| chart(&errors)).flatten();
+        if let (true, Some(svg)) = (writes, drawn) {
+            fs::write(picture(table, "errors"), svg).expect("written");
+        }
+    }
+    if wanted("table-1") {
+        put("table-1", "errors", &table_1());
+    }
+    if wanted("overview") {
+        put("overview", "cases", &overview());
+    }
+}
