@@ -96,6 +96,7 @@ fn numbers_are_read_where_the_quantity_says() {
         ("probe.a.max.velocity_y", 3.0),
         ("profile.low.max.pressure", 5.0),
         ("profile.low.min.pressure", -1.0),
+        ("profile.low.first.pressure", -1.0),
     ];
     for (quantity, value) in cases {
         assert_eq!(measured(folder.path(), quantity), Some(value), "{quantity}");

@@ -1,8 +1,8 @@
 //! Runs of jobs, and the quantities that their `[check]` tables name.
 //!
 //! A quantity is a number of `summary.json` (`max_von_mises`, `certificates.viscosity_modulus`), or of a table at its
-//! end: `history.COLUMN`, `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN` or
-//! `.min.` over the boundary at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
+//! end: `history.COLUMN`, `probe.NAME.COLUMN` and `resultant.SOURCE.COLUMN` at the last step, `profile.BOUNDARY.max.COLUMN`,
+//! `.min.` or `.first.` over the boundary or at its first point, at the last output. `probe.NAME.max.COLUMN` or `.min.` is over all steps.
 
 use std::{path::Path, process::Command};
 
@@ -49,10 +49,11 @@ fn column(folder: &Path, table: &str, filter: Option<(&str, &str)>, name: &str) 
     kept.map(|row| row[wanted].parse().ok()).collect()
 }
 
-fn extreme(side: &str, values: impl Iterator<Item = f64>) -> Option<f64> {
+fn extreme(side: &str, mut values: impl Iterator<Item = f64>) -> Option<f64> {
     match side {
         "max" => values.reduce(larger),
         "min" => values.reduce(|a, b| -larger(-a, -b)),
+        "first" => values.next(),
         _ => None,
     }
 }
