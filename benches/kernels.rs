@@ -36,17 +36,21 @@ fn simulation<const D: usize, const S: usize>(
     session: &Session,
     job: &str,
     mesh: GlobalMesh<D>,
+    order: usize,
 ) -> Simulation<D, S> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers").join(job);
     let text = std::fs::read_to_string(&path).expect("the job");
     let multigrid = "solver.preconditioner=\"gamg\"".to_owned();
-    let mut loaded = Job::from_text(&text, job, Path::new("."), &[multigrid]).expect("a job");
+    let changes = [multigrid, format!("mesh.order={order}")];
+    let mut loaded = Job::from_text(&text, job, Path::new("."), &changes).expect("a job");
     Simulation::new(session, &mut loaded, Some(mesh)).expect("a simulation")
 }
 
-/// Bytes of a pass over cells: their nodes, their geometry, so many numbers of each cell, and so many of each node.
-fn traffic<const D: usize, const S: usize>(body: &Body<D, S>, per_cell: usize, per_node: usize) -> usize {
-    let cell = (D + 1) * size_of::<u32>() + size_of::<Simplex<D>>() + per_cell * size_of::<f64>();
+/// Bytes of a pass over cells: their nodes, their geometry, so many numbers of each point of cells, and so many of each node.
+fn traffic<const D: usize, const S: usize>(body: &Body<D, S>, per_point: usize, per_node: usize) -> usize {
+    let per_cell = per_point * body.geometry.points();
+    let cell =
+        body.mesh.nodes_per_cell() * size_of::<u32>() + size_of::<Simplex<D>>() + per_cell * size_of::<f64>();
     body.mesh.cell_count() * cell + body.mesh.nodes.len() * per_node * size_of::<f64>()
 }
 
@@ -97,11 +101,18 @@ fn main() {
     let session = mpi.session().expect("PETSc");
     let square = rectangle([1.0; 2], [700; 2], Diagonal::Right, [1.0; 2]).expect("a square");
     let cube = box_mesh([1.0; 3], [44; 3], [1.0; 3]).expect("a cube");
-    let mut plane = simulation::<2, 3>(&session, "wang_cheng_2022.toml", square);
-    let mut space = simulation::<3, 6>(&session, "wang_cheng_cube.toml", cube);
+    let mut plane = simulation::<2, 3>(&session, "wang_cheng_2022.toml", square, 1);
+    let mut space = simulation::<3, 6>(&session, "wang_cheng_cube.toml", cube, 1);
+    // With the same number of nodes.
+    let square = rectangle([1.0; 2], [350; 2], Diagonal::Right, [1.0; 2]).expect("a square");
+    let cube = box_mesh([1.0; 3], [22; 3], [1.0; 3]).expect("a cube");
+    let mut plane_of_2 = simulation::<2, 3>(&session, "wang_cheng_2022.toml", square, 2);
+    let mut space_of_2 = simulation::<3, 6>(&session, "wang_cheng_cube.toml", cube, 2);
     let mut all = vec![triad()];
     all.extend(kernels("980,000 triangles", &mut plane));
     all.extend(kernels("511,104 tetrahedra", &mut space));
+    all.extend(kernels("245,000 quadratic triangles", &mut plane_of_2));
+    all.extend(kernels("63,888 quadratic tetrahedra", &mut space_of_2));
     let mut criterion = Criterion::default()
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clarke::job::{
-    Job, Loaded, Mesh, MeshNames, Quadrature, Scheme, describe, describe_json, differing_keys,
+    Job, Loaded, MeshNames, MeshSource, Quadrature, Scheme, describe, describe_json, differing_keys,
 };
 use clarke::laws::material::Metric;
 use proptest::prelude::*;
@@ -125,7 +125,7 @@ fn keys_that_are_absent_have_their_defaults() {
     assert_eq!(job.contact[0].quadrature, Quadrature::Nodal);
     assert_eq!(job.output_folder(), Path::new("/anywhere/jobs/out/case"));
     assert!(job.checkpoint.is_none() && job.initial.is_none() && job.material.elasticity.is_none());
-    let Mesh::Rectangle(rectangle) = job.mesh else { panic!("not a rectangle") };
+    let MeshSource::Rectangle(rectangle) = job.mesh.source else { panic!("not a rectangle") };
     assert_eq!((rectangle.grading.x, rectangle.grading.y), (1.0, 1.0));
 }
 

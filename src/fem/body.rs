@@ -21,7 +21,7 @@ use crate::{
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
-        tensor::{Mandel, larger},
+        tensor::{Mandel, add_scaled, larger},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -152,7 +152,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Energies of this rank's cells, contacts and surface after a committed step, and its largest stress and strain.
     pub fn energy(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
         let (mut energy, mut squares) = (Energy::default(), PeakSquares::default());
-        let SupportForces { packs, forces } = &mut *self.at_supports.borrow_mut();
+        let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         forces.fill(0.0);
         with_nodal(state, |nodal| {
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
@@ -175,7 +175,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 if strained {
                     squares.update(batch.count, &batch.strain, &batch.stress);
                 }
-                if packs.get(batch.number).is_some_and(|requested| *requested) {
+                if runs.get(batch.number / self.geometry.points()).is_some_and(|requested| *requested) {
                     batch.scatter(&self.mesh, forces);
                 }
             });
@@ -290,10 +290,17 @@ impl<const D: usize, const S: usize> Body<D, S> {
         error
     }
 
-    /// Total stress in Pa after a committed step, one a cell.
+    /// Total stress in Pa after a committed step, one a cell: the mean over its points.
     pub fn stress(&self, state: &State) -> Result<Vec<Mandel<S>>> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];
-        let Some(needs) = self.needs(|p| p.stress) else { return Ok(out) };
+        let shares = self.point_shares();
+        self.visit_stress(state, |batch| add_means(&shares, batch, &batch.stress, &mut out))?;
+        Ok(out)
+    }
+
+    /// Visits the batches with the total stress in Pa after a committed step, unless nothing adds to it.
+    pub fn visit_stress(&self, state: &State, mut visit: impl FnMut(&Batch<D, S>)) -> Result<()> {
+        let Some(needs) = self.needs(|p| p.stress) else { return Ok(()) };
         let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
         let [weakening, called] = [self.called(|p| p.weakens), self.called(|p| p.stress.is_some())];
         with_nodal(state, |nodal| {
@@ -301,12 +308,22 @@ impl<const D: usize, const S: usize> Body<D, S> {
                 weakening.select(&self.effects).for_each(|effect| effect.weaken(batch));
                 let effects = called.select(&self.effects);
                 effects.for_each(|effect| effect.add_stress(self.evaluation, step, batch));
-                for (lane, out) in out[batch.first..][..batch.count].iter_mut().enumerate() {
-                    *out = batch.stress.lane(lane);
-                }
+                visit(batch);
             });
-        })?;
-        Ok(out)
+        })
+    }
+
+    /// The share of each point in the volume of its cell, cell by cell; empty where cells have one point.
+    fn point_shares(&self) -> Vec<f64> {
+        if self.geometry.points() == 1 {
+            return Vec::new();
+        }
+        let mut shares = Vec::with_capacity(self.geometry.point_count());
+        for cell in self.geometry.cells() {
+            let volume = cell.whole().volume;
+            shares.extend((0..cell.points()).map(|point| cell.point(point).volume / volume));
+        }
+        shares
     }
 
     /// Appends the forces of the surface effects in the step just committed.
@@ -317,13 +334,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         })
     }
 
-    /// Requests the forces of the interior at nodes of the packs of cells for which this holds, from the next energy balance on.
-    pub fn request_support_forces(&self, packs: Vec<bool>) {
+    /// Requests the forces of the interior at nodes of the runs of cells for which this holds, from the next energy balance on.
+    pub fn request_support_forces(&self, runs: Vec<bool>) {
         let forces = vec![0.0; self.mesh.nodes.len() * D];
-        *self.at_supports.borrow_mut() = SupportForces { packs, forces };
+        *self.at_supports.borrow_mut() = SupportForces { runs, forces };
     }
 
-    /// Passes on the forces at the local nodes of stress and inertia in the requested packs of cells after a committed step whose energy
+    /// Passes on the forces at the local nodes of stress and inertia in the requested runs of cells after a committed step whose energy
     /// was computed: minus what all other forces must balance there. In the step the velocity has changed since `velocity_before` by
     /// `length` in s times its rate.
     pub fn with_support_forces<T>(
@@ -332,18 +349,20 @@ impl<const D: usize, const S: usize> Body<D, S> {
         (velocity_before, length): (&[f64], f64),
         read: impl FnOnce(&[f64]) -> T,
     ) -> Result<T> {
-        let SupportForces { packs, forces } = &mut *self.at_supports.borrow_mut();
+        let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         let inertia = Called::filter(&self.effects, |effect| effect.term().form() == Some(Form::Mass));
         if !inertia.is_empty() {
             let needs = Needs { velocity_change: true, ..Needs::default() };
-            let requested = (0..packs.len()).filter(|number| packs[*number]);
+            let requested = (0..runs.len()).filter(|number| runs[*number]);
             with_nodal(state, |nodal| {
                 let nodal = Nodal { previous_velocity: velocity_before, ..nodal };
                 let cells = (&self.mesh, &self.geometry);
                 Batch::for_each(requested, cells, nodal, needs, |batch: &mut Batch<D, S>| {
                     batch.velocity = batch.velocity_change;
                     inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
-                    for force in &mut batch.force[..=D] {
+                    // Quadratic cells have all their inertia at the first point.
+                    let nodes = if batch.point == 0 { self.mesh.nodes_per_cell() } else { 0 };
+                    for force in &mut batch.force[..nodes] {
                         force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= -1.0 / length);
                     }
                     batch.scatter(&self.mesh, forces);
@@ -353,14 +372,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(read(forces))
     }
 
-    /// Strain of the displacement, one a cell.
+    /// Strain of the displacement, one a cell: the mean over its points.
     pub fn strain(&self, state: &State) -> Result<Vec<Mandel<S>>> {
         let mut out = vec![[0.0; S]; self.mesh.cell_count()];
+        let shares = self.point_shares();
         let needs = Needs { strain: true, ..Needs::default() };
         with_nodal(state, |nodal| {
             Batch::for_all(&self.mesh, &self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
-                let strains = out[batch.first..][..batch.count].iter_mut().enumerate();
-                strains.for_each(|(lane, out)| *out = batch.strain.lane(lane));
+                add_means(&shares, batch, &batch.strain, &mut out);
             });
         })?;
         Ok(out)
@@ -387,9 +406,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.surface_effects.iter_mut().for_each(|effect| effect.visit_histories(visit));
     }
 
-    /// The converged histories of cells.
+    /// The converged histories of cells, as means over their points.
     pub fn cell_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.effects.iter().flat_map(|effect| effect.histories()).map(|store| store.history())
+        let shares = self.point_shares();
+        let stores = self.effects.iter().flat_map(|effect| effect.histories());
+        stores.map(move |store| store.history().means(&shares))
     }
 
     /// The converged histories of nodes.
@@ -397,7 +418,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.surface_effects.iter().flat_map(|effect| effect.histories()).map(|store| store.history())
     }
 
-    /// The histories of cells: the converged ones and, where they are kept, those before the last step.
+    /// The histories of cells at all their points: the converged ones and, where they are kept, those before the last step.
     pub fn all_cell_histories(&self) -> impl Iterator<Item = History<'_>> {
         self.effects.iter().flat_map(|effect| all_of(effect.histories()))
     }
@@ -452,11 +473,29 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 }
 
-/// Forces of the interior on the nodes of some packs of cells.
+/// Adds the values at the points of a batch to the means of its cells, given the share of each point in its cell; empty where cells
+/// have one point.
+fn add_means<const D: usize, const S: usize>(
+    shares: &[f64],
+    batch: &Batch<D, S>,
+    values: &Pack<S>,
+    means: &mut [Mandel<S>],
+) {
+    let points = shares.len() / means.len();
+    for (lane, mean) in means[batch.first_cell..][..batch.count].iter_mut().enumerate() {
+        let value = values.lane(lane);
+        *mean = match shares.get((batch.first_cell + lane) * points + batch.point) {
+            Some(&share) => add_scaled(mean, share, &value),
+            None => value,
+        };
+    }
+}
+
+/// Forces of the interior on the nodes of some runs of cells.
 #[derive(Debug, Default)]
 struct SupportForces {
-    /// Whether each pack is one of them; empty: none.
-    packs: Vec<bool>,
+    /// Whether each run is one of them; empty: none.
+    runs: Vec<bool>,
     /// At the local nodes, in N.
     forces: Vec<f64>,
 }

@@ -92,7 +92,7 @@ impl<const D: usize> Resultants<D> {
         let held: Vec<(u32, u32)> =
             first.iter().enumerate().filter_map(|(at, support)| Some((at as u32, (*support)?))).collect();
         let has_held = |node: &u32| first[*node as usize * D..][..D].iter().any(Option::is_some);
-        let cell_has_held = |cell: usize| mesh.cell(cell).iter().any(has_held);
+        let cell_has_held = |cell: usize| mesh.cell_nodes(cell).any(|node| has_held(&node));
         let runs = body.geometry.runs.iter();
         body.request_support_forces(
             runs.map(|run| (run.first..run.first + run.count).any(cell_has_held)).collect(),

@@ -104,17 +104,18 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
     let tagged = body.tagged();
     let at = all.len();
     let mut keys = Vec::new();
-    let properties: Vec<(&'static str, Schema, bool)> = if body.alternatives().is_empty() {
-        let required: Vec<&str> = body.required().collect();
-        body.properties()
-            .map(|(key, inner)| (key.as_str(), inner, required.contains(&key.as_str())))
-            .collect()
-    } else {
+    let required: Vec<&str> = body.required().collect();
+    let mut properties: Vec<(&'static str, Schema, bool)> = body
+        .properties()
+        .map(|(key, inner)| (key.as_str(), inner, required.contains(&key.as_str())))
+        .collect();
+    if !body.alternatives().is_empty() {
         let names: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
         let choice = if names.len() == 1 { "One table or key" } else { "Exactly one of" };
         meaning.push_str(&format!(" {choice}: {}.", names.join(", ")));
-        tagged.iter().filter_map(|(name, branch)| Some((*name, branch.property(name)?, false))).collect()
-    };
+        let choices = tagged.iter().filter_map(|(name, branch)| Some((*name, branch.property(name)?, false)));
+        properties.extend(choices);
+    }
     for (key, inner, required) in properties {
         let branch = tagged.iter().find(|(name, _)| *name == key).map(|(_, branch)| *branch);
         if inner.accepts("object") && inner.get("additionalProperties").is_boolean()

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Job, Mesh};
+use super::{Job, MeshSource};
 use crate::error::{Error, Result};
 
 /// Keys that, like all keys below them, do not affect the results. A mesh file is among them, because several files may contain the
@@ -30,17 +30,17 @@ const NO_PHYSICS: &[&str] = &[
 impl Job {
     /// The dimension, 2 or 3; `None` for a mesh file, which has to be read first.
     pub fn dimension(&self) -> Option<usize> {
-        match self.mesh {
-            Mesh::Rectangle(_) => Some(2),
-            Mesh::Box(_) => Some(3),
-            Mesh::File(_) => None,
+        match self.mesh.source {
+            MeshSource::Rectangle(_) => Some(2),
+            MeshSource::Box(_) => Some(3),
+            MeshSource::File(_) => None,
         }
     }
 
     /// The mesh file, if there is one.
     pub fn mesh_file(&self) -> Option<&Path> {
-        match &self.mesh {
-            Mesh::File(path) => Some(path),
+        match &self.mesh.source {
+            MeshSource::File(path) => Some(path),
             _ => None,
         }
     }

@@ -10,7 +10,7 @@ use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
 use super::source::{Node, parse};
-use super::{Job, Mesh, set, validate};
+use super::{Job, MeshSource, set, validate};
 use crate::error::{Error, Result};
 
 /// Largest size of a file in bytes.
@@ -132,7 +132,7 @@ impl Job {
         let stem = file.file_stem().unwrap_or(file.as_os_str());
         let output = self.output.folder.take().unwrap_or_else(|| Path::new("out").join(stem));
         self.output.folder = Some(normal(&folder.join(output)));
-        if let Mesh::File(path) = &mut self.mesh {
+        if let MeshSource::File(path) = &mut self.mesh.source {
             *path = normal(&folder.join(&*path));
         }
         if let Some(path) = self.initial.as_mut().and_then(|initial| initial.from.as_mut()) {

@@ -37,7 +37,7 @@ impl Walk<'_> {
             (Value::Text(word), _) if words.contains(&word.as_str()) => {}
             (_, Some(other)) => self.value(node, *other, path),
             (Value::Text(word), None) if !words.is_empty() => self.unknown_word(node, word, &words, path),
-            (Value::Table(table), None) if !tagged.is_empty() => self.one_of(node, table, &tagged, path),
+            (Value::Table(table), None) if !tagged.is_empty() => self.one_of(node, table, schema, path),
             _ => self.wrong_type(node, schema, path),
         }
     }
@@ -86,37 +86,38 @@ impl Walk<'_> {
         }
     }
 
-    fn one_of(
-        &mut self,
-        node: &Node,
-        table: &BTreeMap<String, Node>,
-        tagged: &[(&'static str, Schema)],
-        path: &str,
-    ) {
-        let known: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
+    fn one_of(&mut self, node: &Node, table: &BTreeMap<String, Node>, schema: Schema, path: &str) {
+        let tagged = schema.tagged();
+        let choices: Vec<&str> = tagged.iter().map(|(name, _)| *name).collect();
+        // Keys that each of the choices may have beside it.
+        let common = schema.properties().map(|(key, _)| key.as_str());
+        let known: Vec<&str> = choices.iter().copied().chain(common).collect();
         let mut present: Vec<(&str, &Node)> = Vec::new();
         let mut meant = None;
         for (key, child) in table {
-            match tagged.iter().find(|(name, _)| name == key) {
-                Some((name, branch)) => {
+            let inner = join(path, key);
+            match (tagged.iter().find(|(name, _)| name == key), schema.property(key)) {
+                (Some((name, branch)), _) => {
                     present.push((name, child));
                     if let Some(property) = branch.property(name) {
-                        self.value(child, property, &join(path, key));
+                        self.value(child, property, &inner);
                     }
                 }
-                None => meant = meant.or(self.unknown_key(child, key, &known, path)),
+                (None, Some(property)) => self.value(child, property, &inner),
+                (None, None) => meant = meant.or(self.unknown_key(child, key, &known, path)),
             }
         }
         present.sort_by_key(|(_, child)| &child.key);
         for (name, child) in present.iter().skip(1) {
             let message = format!("`{name}` and `{}` exclude each other", present[0].0);
-            let help = format!("give exactly one of {} in [{path}]", list(&known));
+            let help = format!("give exactly one of {} in [{path}]", list(&choices));
             self.faults
                 .push(Fault::new(child.key.clone(), message, "only one of them is allowed").help(help));
         }
         if present.is_empty() && meant.is_none() {
-            let message = format!("[{path}] is empty");
-            let help = format!("give exactly one of {}", list(&known));
+            let lacks = if table.is_empty() { "is empty" } else { "is incomplete" };
+            let message = format!("[{path}] {lacks}");
+            let help = format!("give exactly one of {}", list(&choices));
             self.faults.push(Fault::new(node.key.clone(), message, "").help(help));
         }
     }

@@ -1,7 +1,7 @@
 //! Checks of a mesh before computation.
 
 use super::hanging::refuse_hanging_nodes;
-use super::shape::{self, longest_edge};
+use super::shape::{self, longest_edge, tangent_measures};
 #[cfg(test)]
 use super::surface::Topology;
 use super::tags::{Tags, place};
@@ -21,7 +21,8 @@ pub(super) const DEGENERATE: f64 = 1e-14;
 /// Two nodes coincide if their distance is below this multiple of the extent of the mesh.
 const COINCIDENT: f64 = 1e-12;
 
-/// Summary of the shape qualities of a mesh.
+/// Summary of the shape qualities of a mesh. The quality of a curved cell is that of its corners times the ratio of its smallest and
+/// its largest Jacobian.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quality {
     /// The smallest quality, in (0, 1].
@@ -87,6 +88,25 @@ pub(super) fn cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result
     )))
 }
 
+/// Refuses curved cells with coordinates that are not finite or with a Jacobian that is not positive.
+pub(super) fn curved_cells<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
+    for cell in 0..mesh.cell_count() {
+        let nodes = mesh.curved_nodes(cell);
+        let [lowest, _] = tangent_measures(&nodes);
+        let smallest = DEGENERATE * longest_edge(&nodes[..=D]).powi(D as i32);
+        if !(lowest > smallest && nodes.as_flattened().iter().all(|x| x.is_finite())) {
+            return Err(Error::Refused(format!(
+                "{} around {} is folded: its edges are so curved that its Jacobian is not positive everywhere. Refine the mesh \
+                 there, optimise it (Gmsh: Mesh.HighOrderOptimize = 2), or mesh with straight edges \
+                 (Mesh.SecondOrderLinear = 1)",
+                tags.cell(cell),
+                place(&mesh.centroid(cell)),
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses coincident and hanging nodes.
 pub(super) fn nodes<const D: usize>(mesh: &GlobalMesh<D>, tags: &Tags) -> Result<()> {
     refuse_coincident_nodes(mesh, tags)?;
@@ -136,12 +156,25 @@ impl<const D: usize> GlobalMesh<D> {
 impl<const D: usize> Mesh<D> {
     /// The shape qualities of the cells of all ranks in short. Collective.
     pub fn quality_summary(&self, session: &Session) -> Quality {
-        let quality = |cell| (self.cell_ids[cell] as usize, shape::quality(&self.corners(cell)[..=D]));
+        let quality = |cell| {
+            let of_corners = shape::quality(&self.corners(cell)[..=D]);
+            let bent = if self.is_curved { self.jacobian_ratio(cell) } else { 1.0 };
+            (self.cell_ids[cell] as usize, of_corners * bent)
+        };
         let own = Quality::of((0..self.cell_count()).map(quality));
         let smallest = -session.largest([-own.smallest])[0];
         let worst = if own.smallest == smallest { own.worst_cell as f64 } else { f64::INFINITY };
         let worst_cell = -session.largest([-worst])[0] as usize;
         Quality { smallest, worst_cell, poor: session.total(own.poor) }
+    }
+}
+
+impl<const D: usize> Mesh<D> {
+    /// The smallest over the largest Jacobian in a quadratic cell: 1 if its edges are straight.
+    fn jacobian_ratio(&self, cell: usize) -> f64 {
+        let nodes: Vec<Vector<D>> = self.cell_nodes(cell).map(|node| self.nodes[node as usize]).collect();
+        let [low, high] = tangent_measures(&nodes);
+        low / high
     }
 }
 

@@ -1,12 +1,13 @@
 //! A digest of a mesh that does not depend on its partition.
 
-use super::{Names, piece::Piece};
+use super::{Names, piece::Piece, shape::edges_of_cell};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
-/// Different seeds for nodes, cells and facets.
+/// Different seeds for nodes, cells, facets and curved edges.
 const NODE: u64 = 1;
 const CELL: u64 = 2;
 const FACET: u64 = 3;
+const EDGE: u64 = 4;
 
 /// Up to 48 bytes of numbers, little endian.
 struct Bytes {
@@ -30,8 +31,8 @@ impl Bytes {
 }
 
 impl<const D: usize> Piece<D> {
-    /// The sum modulo 2^64 of the hashes of the owned nodes (id and position), the cells (ids and region) and the named facets (ids
-    /// and name) of this part. The sum over all parts is the digest of the mesh.
+    /// The sum modulo 2^64 of the hashes of the owned nodes (id and position), the cells (ids and region), their curved edges and the
+    /// named facets (ids and name) of this part. The sum over all parts is the digest of the mesh.
     pub fn digest(&self, part: usize, names: &Names) -> u64 {
         let mut sum = 0_u64;
         let own = |node: &usize| self.owners[*node] as usize == part;
@@ -54,6 +55,14 @@ impl<const D: usize> Piece<D> {
             bytes.add(regions[usize::from(self.cell_regions[cell])]);
             add_nodes(&mut bytes, nodes);
             sum = sum.wrapping_add(bytes.hash(CELL));
+        }
+        let edges = edges_of_cell::<D>().len();
+        for (at, middle) in self.curved.iter().enumerate() {
+            let mut bytes = Bytes::new();
+            bytes.add(self.cell_ids[at / edges].to_le_bytes());
+            bytes.add([(at % edges) as u8]);
+            middle.iter().for_each(|x| bytes.add(x.to_le_bytes()));
+            sum = sum.wrapping_add(bytes.hash(EDGE));
         }
         for &[boundary, facet] in &self.named {
             let mut bytes = Bytes::new();

@@ -42,6 +42,13 @@ pub struct Mesh<const D: usize> {
     pub node_starts: Vec<usize>,
     /// Local nodes, `D + 1` per cell.
     pub cells: Vec<u32>,
+    /// Local numbers of the nodes on the edges of quadratic cells, 3 (triangle) or 6 (tetrahedron) per cell in the order of
+    /// [`edges_of_cell`](super::shape::edges_of_cell); empty for linear cells.
+    pub midsides: Vec<u32>,
+    /// Whether cells are curved: nodes on edges are not at the midpoints.
+    pub is_curved: bool,
+    /// Nodes over all ranks that are corners of cells. Their original ids are below this number; those of nodes on edges are not.
+    pub corner_nodes: usize,
     /// Original ids of the cells, ascending.
     pub cell_ids: Vec<u32>,
     /// Cells over all ranks.
@@ -60,7 +67,7 @@ pub struct Mesh<const D: usize> {
     pub edge_cut: usize,
     /// Ratio of the largest number of cells on a rank to the mean.
     pub imbalance: f64,
-    /// Digest of the whole mesh, independent of the partition.
+    /// Digest of the whole mesh and its order, independent of the partition.
     pub digest: u64,
     /// Whether rank 0 held the whole mesh initially.
     pub handed_out: bool,
@@ -80,13 +87,14 @@ impl<const D: usize> Mesh<D> {
             + size_of_val(&self.node_ids[..])
             + size_of_val(&self.ghosts[..])
             + size_of_val(&self.cells[..])
+            + size_of_val(&self.midsides[..])
             + size_of_val(&self.cell_ids[..])
             + size_of_val(&self.cell_regions[..])
             + size_of_val(&self.facets[..])
             + size_of_val(&self.facet_cells[..])
     }
 
-    /// Local nodes of a cell, `D + 1` of them.
+    /// Local numbers of the corners of a cell, `D + 1` of them.
     #[inline(always)]
     pub fn cell(&self, cell: usize) -> &[u32] {
         &self.cells[cell * (D + 1)..(cell + 1) * (D + 1)]
@@ -129,11 +137,17 @@ impl<const D: usize> Mesh<D> {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Assembles the mesh from the ranks' pieces, whose nodes are owned by ranks: numbers the nodes, asks owners for the numbers of
-    /// ghosts, and computes totals. Collective, with the same outcome on all ranks.
-    pub fn assemble(session: &Session, piece: Piece<D>, names: Names) -> Result<Self, Agreed> {
+    /// Assembles the mesh from the ranks' pieces, whose nodes are owned by ranks: adds the nodes on edges if `order` is 2, numbers the
+    /// nodes, asks owners for the numbers of ghosts, and computes totals. Collective, with the same outcome on all ranks.
+    pub fn assemble(
+        session: &Session,
+        mut piece: Piece<D>,
+        names: Names,
+        order: usize,
+    ) -> Result<Self, Agreed> {
         let (rank, ranks, world) = (session.rank(), session.ranks(), session.world());
         let digest = session.total(piece.digest(rank, &names) as usize) as u64;
+        let midsides = if order == 2 { Some(piece.add_midsides(session)?) } else { None };
         let (owned, mut ghosts): (Vec<usize>, Vec<usize>) =
             (0..piece.node_ids.len()).partition(|&node| piece.owners[node] as usize == rank);
         let ids = |nodes: &[usize]| -> Vec<u32> { nodes.iter().map(|&node| piece.node_ids[node]).collect() };
@@ -162,9 +176,9 @@ impl<const D: usize> Mesh<D> {
         let numbers = session.agree(asked.iter().map(number).collect::<Result<Vec<u32>>>())?;
         let (ghost_numbers, _) = exchange(world, &numbers, &askers)?;
 
-        let order: Vec<usize> = owned.iter().chain(&ghosts).copied().collect();
-        let mut local = vec![0; order.len()];
-        order.iter().zip(0..).for_each(|(&node, place)| local[node] = place);
+        let places: Vec<usize> = owned.iter().chain(&ghosts).copied().collect();
+        let mut local = vec![0; places.len()];
+        places.iter().zip(0..).for_each(|(&node, place)| local[node] = place);
         let mut boundaries: Vec<Boundary> =
             names.boundaries.into_iter().map(|name| Boundary { name, facets: Vec::new() }).collect();
         piece.named.iter().for_each(|&[boundary, facet]| boundaries[boundary as usize].facets.push(facet));
@@ -172,11 +186,15 @@ impl<const D: usize> Mesh<D> {
             owned: owned.len(),
             first_node,
             total_nodes: node_starts[ranks],
-            nodes: order.iter().map(|&node| piece.nodes[node]).collect(),
-            node_ids: ids(&order),
+            nodes: places.iter().map(|&node| piece.nodes[node]).collect(),
+            node_ids: ids(&places),
             ghosts: ghost_numbers,
-            node_starts,
             cells: piece.cells.iter().map(|&node| local[node as usize]).collect(),
+            corner_nodes: midsides.as_ref().map_or(node_starts[ranks], |midsides| midsides.corner_nodes),
+            is_curved: midsides.is_some() && !piece.curved.is_empty(),
+            midsides: (midsides.iter().flat_map(|midsides| &midsides.of_cells))
+                .map(|&node| local[node as usize])
+                .collect(),
             total_cells: session.total(piece.cell_ids.len()),
             cell_ids: piece.cell_ids,
             cell_regions: piece.cell_regions,
@@ -184,6 +202,7 @@ impl<const D: usize> Mesh<D> {
             facets: piece.facets.iter().map(|facet| facet.map(|node| local[node as usize])).collect(),
             facet_cells: piece.facet_cells,
             boundaries,
+            node_starts,
             ..Self::default()
         };
         let [fullest] = session.largest([mesh.cell_count() as f64]);
@@ -192,8 +211,13 @@ impl<const D: usize> Mesh<D> {
             let between = session.agree(mesh.facets_to_others())?;
             mesh.edge_cut = session.total(between) / 2;
         }
-        mesh.digest = digest;
+        mesh.digest = digest.wrapping_add(order as u64 - 1);
         Ok(mesh)
+    }
+
+    /// The digest of the mesh as it was generated or read, without the nodes that `order = 2` adds.
+    pub fn source_digest(&self) -> u64 {
+        self.digest.wrapping_sub(self.order() as u64 - 1)
     }
 
     /// Number of facets between a cell of this rank and one of another rank.
@@ -222,10 +246,11 @@ fn countable(nodes: usize, cells: usize) -> Result<()> {
     }
 }
 
-/// Distributes the parts of `whole` (`None` except on rank 0) to all ranks; rank 0 frees it. Collective.
+/// Distributes the parts of `whole` (`None` except on rank 0) to all ranks; rank 0 frees it. Cells get this order. Collective.
 pub fn distribute<const D: usize>(
     session: &Session,
     whole: Option<(GlobalMesh<D>, Partition)>,
+    order: usize,
 ) -> Result<Mesh<D>, Agreed> {
     let world = session.world();
     let mut names = String::new();
@@ -245,13 +270,14 @@ pub fn distribute<const D: usize>(
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
     let names = session.agree(decode(&String::from_utf8_lossy(&bytes)))?;
-    Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names)? })
+    Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names, order)? })
 }
 
 impl<const D: usize> Piece<D> {
     fn send(&self, world: &impl Communicator, rank: usize) {
         let to = world.process_at_rank(rank as i32);
         to.send(self.nodes.as_flattened());
+        to.send(self.curved.as_flattened());
         for list in [
             &self.node_ids[..],
             &self.owners,
@@ -269,7 +295,7 @@ impl<const D: usize> Piece<D> {
 
     fn receive(world: &impl Communicator) -> Self {
         let from = world.process_at_rank(0);
-        let nodes = from.receive_vec::<f64>().0;
+        let [nodes, curved] = std::array::from_fn(|_| from.receive_vec::<f64>().0);
         let [node_ids, owners, cell_ids, cells, facet_ids, facets, facet_cells, named] =
             std::array::from_fn(|_| from.receive_vec::<u32>().0);
         Self {
@@ -278,6 +304,7 @@ impl<const D: usize> Piece<D> {
             nodes: nodes.as_chunks().0.to_vec(),
             cell_ids,
             cells,
+            curved: curved.as_chunks().0.to_vec(),
             cell_regions: from.receive_vec::<u16>().0,
             facet_ids,
             facets: facets.as_chunks().0.to_vec(),

@@ -11,6 +11,11 @@ pub struct GlobalMesh<const D: usize> {
     pub nodes: Vec<Vector<D>>,
     /// Node ids, `D + 1` per cell.
     pub cells: Vec<u32>,
+    /// Coordinates in m of the nodes on the edges of quadratic cells, in the order of [`edges_of_cell`](super::shape::edges_of_cell),
+    /// cell by cell; empty if all edges are straight with the nodes at their midpoints.
+    pub curved: Vec<Vector<D>>,
+    /// Whether it was read from a file of second-order cells, straight or curved.
+    pub is_second_order: bool,
     /// Index into `regions` for each cell.
     pub cell_regions: Vec<u16>,
     /// Names of the regions; a generated mesh has the single region `body`.

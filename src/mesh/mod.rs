@@ -9,6 +9,7 @@ mod global;
 pub mod gmsh;
 mod hanging;
 mod lookup;
+mod midsides;
 pub mod partition;
 pub mod piece;
 mod rigid;
@@ -20,5 +21,6 @@ pub mod tree;
 
 pub use distributed::{Mesh, distribute};
 pub use global::{Boundary, GlobalMesh, Names};
+pub use midsides::midpoint;
 pub use skeleton::free_motions;
 pub use tags::Tags;

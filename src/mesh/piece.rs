@@ -1,6 +1,6 @@
 //! A self-contained part of a mesh: its cells and all of their nodes.
 
-use super::{Boundary, GlobalMesh, Names, partition::Partition};
+use super::{Boundary, GlobalMesh, Names, partition::Partition, shape::edges_of_cell};
 use crate::{
     error::{Error, Result},
     linear_algebra::tensor::Vector,
@@ -23,6 +23,8 @@ pub struct Piece<const D: usize> {
     pub cell_ids: Vec<u32>,
     /// Positions of nodes in this piece, `D + 1` a cell.
     pub cells: Vec<u32>,
+    /// Coordinates in m of the nodes on the edges of the cells, as in [`GlobalMesh::curved`].
+    pub curved: Vec<Vector<D>>,
     /// Index into the mesh's regions, one a cell.
     pub cell_regions: Vec<u16>,
     /// Positions of the facets among those of the whole mesh.
@@ -51,6 +53,7 @@ impl<const D: usize> Piece<D> {
             out.cell_ids.push(at);
             out.cells.extend(nodes.iter().map(|&node| node_places[piece][node as usize]));
             out.cell_regions.push(pieces[piece].cell_regions[position]);
+            out.curved.extend_from_slice(sides(&pieces[piece].curved, position));
         }
         let (facets, facet_places) = union(pieces, |piece| &piece.facet_ids);
         for (at, piece, position) in facets {
@@ -79,7 +82,7 @@ impl<const D: usize> Piece<D> {
             Err("ids are not in order")
         } else if !below(&self.owners, parts) {
             Err("a node has an owner that is not a part")
-        } else if !self.nodes.as_flattened().iter().all(|x| x.is_finite()) {
+        } else if !self.nodes.iter().chain(&self.curved).flatten().all(|x| x.is_finite()) {
             Err("a coordinate is not finite")
         } else if !(below(&self.cells, nodes) && below(self.facets.as_flattened(), nodes)) {
             Err("a cell or facet has a node that does not exist")
@@ -106,6 +109,8 @@ impl<const D: usize> Piece<D> {
         Ok(GlobalMesh {
             nodes: self.nodes,
             cells: self.cells,
+            is_second_order: !self.curved.is_empty(),
+            curved: self.curved,
             cell_regions: self.cell_regions,
             regions: names.regions,
             facets: self.facets,
@@ -113,6 +118,12 @@ impl<const D: usize> Piece<D> {
             boundaries,
         })
     }
+}
+
+/// The nodes on the edges of a cell; none where edges are straight.
+fn sides<const D: usize>(curved: &[Vector<D>], cell: usize) -> &[Vector<D>] {
+    let edges = edges_of_cell::<D>().len();
+    curved.get(cell * edges..(cell + 1) * edges).unwrap_or(&[])
 }
 
 /// The ids of all pieces, ascending, each with a piece that contains it and its position there; and for each piece the positions of
@@ -194,6 +205,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
             owners: node_ids.iter().map(|&node| self.partition.node_ranks[node as usize]).collect(),
             nodes: node_ids.iter().map(|&node| mesh.nodes[node as usize]).collect(),
             cells: cell_nodes.map(local).collect(),
+            curved: cell_ids.iter().flat_map(|&cell| sides(&mesh.curved, cell as usize)).copied().collect(),
             cell_regions: cell_ids.iter().map(|&cell| mesh.cell_regions[cell as usize]).collect(),
             facets: facet_ids.iter().map(|&f| mesh.facets[f as usize].map(|node| local(&node))).collect(),
             facet_cells: facet_ids.iter().map(behind).collect(),

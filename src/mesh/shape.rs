@@ -14,6 +14,54 @@ pub(super) fn facet_of<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D
     })
 }
 
+/// The corners of each edge of a cell, in the order in which VTK stores the nodes on the edges of quadratic cells (types 22 and 24).
+#[inline]
+pub fn edges_of_cell<const D: usize>() -> &'static [[usize; 2]] {
+    const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
+    &EDGES[..if D == 2 { 3 } else { 6 }]
+}
+
+/// Values of the shape functions of a quadratic cell at a point with these barycentric coordinates: those of the corners, then those of
+/// the nodes on the edges.
+pub fn quadratic_values<const D: usize>(place: &[f64; 4]) -> [f64; 10] {
+    let mut out = [0.0; 10];
+    for a in 0..=D {
+        out[a] = place[a] * (2.0 * place[a] - 1.0);
+    }
+    for (value, &[a, b]) in out[D + 1..].iter_mut().zip(edges_of_cell::<D>()) {
+        *value = 4.0 * place[a] * place[b];
+    }
+    out
+}
+
+/// Corners of the linear cell whose map has the Jacobian of a quadratic cell at a point with these barycentric coordinates; only the
+/// first `D + 1` of the four are meant. `nodes` are the corners, then the nodes on the edges in the order of [`edges_of_cell`].
+pub fn tangent_corners<const D: usize>(nodes: &[Vector<D>], place: &[f64; 4]) -> [Vector<D>; 4] {
+    let mut out = [[0.0; D]; 4];
+    for a in 0..=D {
+        out[a] = add_scaled(&out[a], 4.0 * place[a] - 1.0, &nodes[a]);
+    }
+    for (&[a, b], node) in edges_of_cell::<D>().iter().zip(&nodes[D + 1..]) {
+        out[a] = add_scaled(&out[a], 4.0 * place[b], node);
+        out[b] = add_scaled(&out[b], 4.0 * place[a], node);
+    }
+    out
+}
+
+/// The smallest and the largest measure of the tangent cells of a quadratic cell at its nodes, the middles of its facets and its
+/// centre: equal if edges are straight with nodes at their midpoints; the smallest is negative if the cell is folded.
+pub fn tangent_measures<const D: usize>(nodes: &[Vector<D>]) -> [f64; 2] {
+    let mut places = vec![[0.0; 4]; 0];
+    for corners in 1..1_u8 << (D + 1) {
+        let share = 1.0 / f64::from(corners.count_ones());
+        places.push(std::array::from_fn(|a| if corners >> a & 1 == 1 { share } else { 0.0 }));
+    }
+    let measures = places.iter().map(|place| signed_measure(&tangent_corners(nodes, place)[..=D]));
+    measures.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], measure| {
+        [if measure >= low { low } else { measure }, if measure <= high { high } else { measure }]
+    })
+}
+
 /// Signed measure of the simplex spanned by `D + 1` corners: area in m² or volume in m³, positive when the corners
 /// are positively oriented.
 #[inline]
@@ -106,6 +154,13 @@ impl<const D: usize> GlobalMesh<D> {
         std::array::from_fn(|i| self.nodes[ids[i.min(D)] as usize])
     }
 
+    /// The nodes of a curved cell: its corners, then the nodes on its edges.
+    pub(super) fn curved_nodes(&self, cell: usize) -> Vec<Vector<D>> {
+        let edges = edges_of_cell::<D>().len();
+        let corners = self.cell(cell).iter().map(|&node| self.nodes[node as usize]);
+        corners.chain(self.curved[cell * edges..(cell + 1) * edges].iter().copied()).collect()
+    }
+
     /// Signed area (m²) or volume (m³) of a cell.
     #[inline]
     pub fn measure(&self, cell: usize) -> f64 {
@@ -150,6 +205,22 @@ mod tests {
         let tetrahedron = [[0.1, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 1.0, 0.0], [0.2, 0.1, 0.9]];
         assert!(signed_measure(&tetrahedron) > 0.0);
         outward(&tetrahedron);
+    }
+
+    #[test]
+    fn tangents_of_a_quadratic_cell_are_those_of_its_map() {
+        // x = a + 2b, y = b + b²: the area element is 2 (1 + 2b) times that of the unit triangle.
+        let map = |[a, b]: [f64; 2]| [2.0 * b + a, b + b * b];
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let middles = edges_of_cell::<2>().iter().map(|&[a, b]| centroid(&[corners[a], corners[b]]));
+        let nodes: Vec<Vector<2>> = corners.into_iter().chain(middles).map(map).collect();
+        let measure = |b: f64| signed_measure(&tangent_corners(&nodes, &[0.7 - b, 0.3, b, 0.0])[..3]);
+        assert!((measure(0.4) - 0.5 * 1.8).abs() < 1e-15 && (measure(0.0) - 0.5).abs() < 1e-15);
+        let [low, high] = tangent_measures(&nodes);
+        assert!((low - 0.5).abs() < 1e-15 && (high - 1.5).abs() < 1e-15);
+        let mut folded = nodes;
+        folded[3][1] = 0.6;
+        assert!(tangent_measures(&folded)[0] < 0.0);
     }
 
     fn outward<const D: usize>(corners: &[Vector<D>]) {

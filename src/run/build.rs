@@ -29,7 +29,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
     let fixed = session.agree(fixed_components(&mesh, &job.support, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry.runs))?;
+    let effects = session.agree(effects(&materials, &geometry))?;
     let load = load(job, &mesh);
     let mut contacts = Vec::new();
     for contact in &job.contact {

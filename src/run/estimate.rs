@@ -58,8 +58,8 @@ pub(super) struct TimeEstimate {
 const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
-/// Seconds of stress, history, forces and energies per cell and step, in the plane and in space.
-const CELL: [f64; 2] = [30e-9, 50e-9];
+/// Seconds of stress, history, forces and energies per point of cells and step, in the plane and in space.
+const POINT: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {
     /// For a body under this preconditioner. Collective.
@@ -73,17 +73,18 @@ impl Estimate {
         let mesh = &body.mesh;
         let (nodes, cells) = (mesh.total_nodes as f64, mesh.total_cells as f64);
         let own = [
-            (mesh.bytes() + size_of_val(&body.geometry.packs[..])) as f64,
+            (mesh.bytes() + body.geometry.bytes()) as f64,
             mesh.facets.len() as f64,
             ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
         ];
         let [mesh_bytes, facets, vectors] = session.sum(own);
-        let matrix = matrix_bytes(D, nodes, cells, facets);
+        let matrix = matrix_bytes(D, mesh.order(), nodes, cells, facets);
         let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
         let program = PROGRAM * ranks;
-        let step = cells * CELL[usize::from(D == 3)] / ranks + cost.step;
+        let points = cells * body.geometry.points() as f64;
+        let step = points * POINT[usize::from(D == 3)] / ranks + cost.step;
         let set_up = cost.set_up;
         let preconditioner = cost.memory;
         let whole = nodes * 8.0 * D as f64 + cells * (20.0 * (D + 1) as f64) + facets * (4 * D + 8) as f64;
@@ -104,11 +105,20 @@ impl Estimate {
     }
 }
 
-/// Bytes of the matrix: a block for each node and two for each edge, whose number Euler's formula gives for a body
-/// without holes.
-fn matrix_bytes(dimension: usize, nodes: f64, cells: f64, facets: f64) -> f64 {
-    let edges = if dimension == 2 { nodes + cells - 1.0 } else { nodes + cells + facets / 2.0 - 1.0 };
-    let entries = (nodes + 2.0 * edges) * (dimension * dimension) as f64;
+/// Bytes of the matrix: a block for each node and two for each pair of nodes of a cell. Euler's formula gives the numbers of edges and
+/// faces for a body without holes.
+fn matrix_bytes(dimension: usize, order: usize, nodes: f64, cells: f64, facets: f64) -> f64 {
+    // Edges less corner nodes.
+    let excess = if dimension == 2 { cells - 1.0 } else { cells + facets / 2.0 - 1.0 };
+    let pairs = if order == 1 {
+        nodes + excess
+    } else {
+        // Nodes are corners and edges. Pairs in an edge, in a face beyond those of its edges, in a cell beyond those of its faces.
+        let edges = 0.5 * (nodes + excess);
+        let [faces, inside] = if dimension == 2 { [cells, 0.0] } else { [2.0 * cells + facets / 2.0, cells] };
+        3.0 * edges + 6.0 * faces + 3.0 * inside
+    };
+    let entries = (nodes + 2.0 * pairs) * (dimension * dimension) as f64;
     12.0 * entries + 4.0 * nodes * dimension as f64
 }
 
@@ -119,8 +129,12 @@ mod tests {
     #[test]
     fn the_matrix_of_a_square_is_counted_exactly() {
         // Two triangles: 4 nodes, 5 edges, so 14 blocks of 4 entries and 8 rows.
-        assert_eq!(matrix_bytes(2, 4.0, 2.0, 4.0), 12.0 * 56.0 + 32.0);
+        assert_eq!(matrix_bytes(2, 1, 4.0, 2.0, 4.0), 12.0 * 56.0 + 32.0);
         // One tetrahedron: 4 nodes, 6 edges.
-        assert_eq!(matrix_bytes(3, 4.0, 1.0, 4.0), 12.0 * 144.0 + 48.0);
+        assert_eq!(matrix_bytes(3, 1, 4.0, 1.0, 4.0), 12.0 * 144.0 + 48.0);
+        // A quadratic triangle and tetrahedron couple all of their 6 and 10 nodes; two triangles share 3 of 9.
+        assert_eq!(matrix_bytes(2, 2, 6.0, 1.0, 3.0), 12.0 * 4.0 * 36.0 + 48.0);
+        assert_eq!(matrix_bytes(2, 2, 9.0, 2.0, 4.0), 12.0 * 4.0 * (2.0 * 36.0 - 9.0) + 72.0);
+        assert_eq!(matrix_bytes(3, 2, 10.0, 1.0, 4.0), 12.0 * 9.0 * 100.0 + 120.0);
     }
 }

@@ -22,7 +22,14 @@ pub(super) fn lines<const D: usize, const S: usize>(
     if let Some(title) = job.about.as_ref().and_then(|a| a.title.as_deref()) {
         lines.push(format!("job        {title}"));
     }
-    let kind = if D == 2 { "triangles" } else { "tetrahedra" };
+    let kind = match (D, mesh.order(), mesh.is_curved) {
+        (2, 1, _) => "triangles",
+        (2, _, false) => "quadratic triangles",
+        (2, _, true) => "curved quadratic triangles",
+        (_, 1, _) => "tetrahedra",
+        (_, _, false) => "quadratic tetrahedra",
+        (_, _, true) => "curved quadratic tetrahedra",
+    };
     lines.push(format!(
         "mesh       {} {kind}, {} nodes, {} velocity components",
         mesh.total_cells,

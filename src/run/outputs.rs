@@ -133,7 +133,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         let change = scheme.velocity_change(state);
         self.resultants.write(session, body, state, change, scheme.load())?;
         if !self.probes.is_empty() {
-            session.agree(self.probes.write(session, &body.mesh, state))?;
+            session.agree(self.probes.write(session, state))?;
         }
         self.write_state(session, body, state, [due(&self.every, state), due(&self.profiles_every, state)])?;
         self.fields.write_out_if_due()?;

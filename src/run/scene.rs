@@ -4,7 +4,7 @@ use super::validate::validate;
 use crate::{
     error::{Error, Result},
     io::partitioned::{self, PartitionedFile},
-    job::{self, Loaded, Partition},
+    job::{self, Loaded, MeshSource, Partition},
     mesh::{
         GlobalMesh, Mesh, distribute,
         generate::{Cuboid, Grading, Grid, Rectangle, Toward},
@@ -31,12 +31,23 @@ pub enum Scene {
 impl Scene {
     /// The mesh of a job, checked against the job; adds warnings about the mesh to those of the job. Collective.
     pub fn of(session: &Session, loaded: &mut Loaded) -> Result<Self, Agreed> {
-        let scene = match &loaded.job.mesh {
-            job::Mesh::Rectangle(of) => generated(session, rectangle(of), of.partition).map(Self::Two)?,
-            job::Mesh::Box(of) => generated(session, cuboid(of), of.partition).map(Self::Three)?,
-            job::Mesh::File(path) => {
+        let order = usize::from(loaded.job.mesh.order);
+        let scene = match &loaded.job.mesh.source {
+            MeshSource::Rectangle(of) => {
+                generated(session, rectangle(of), of.partition, order).map(Self::Two)?
+            }
+            MeshSource::Box(of) => generated(session, cuboid(of), of.partition, order).map(Self::Three)?,
+            MeshSource::File(path) => {
                 session.on_first(|| refuse_missing(path, loaded))?;
-                from_file(session, path)?
+                let (scene, is_second_order) = from_file(session, path, order)?;
+                if is_second_order && order == 1 {
+                    loaded.warnings.push(
+                        "the cells of the mesh file are of second order, but the run uses only their corners, joined by straight \
+                         edges: set [mesh] order = 2 to use all their nodes"
+                            .into(),
+                    );
+                }
+                scene
             }
         };
         match &scene {
@@ -47,30 +58,32 @@ impl Scene {
     }
 }
 
-/// Partitions a mesh that is whole on rank 0 (`None` elsewhere) and distributes the parts. Collective.
+/// Partitions a mesh that is whole on rank 0 (`None` elsewhere) and distributes the parts, with cells of this order. Collective.
 pub(super) fn split<const D: usize>(
     session: &Session,
     whole: Option<GlobalMesh<D>>,
+    order: usize,
 ) -> Result<Mesh<D>, Agreed> {
     let split = |mesh: GlobalMesh<D>| {
         let parts = divide(&mesh, session.ranks(), Method::KWay)?;
         Ok::<_, Error>((mesh, parts))
     };
-    distribute(session, session.agree(whole.map(split).transpose())?)
+    distribute(session, session.agree(whole.map(split).transpose())?, order)
 }
 
 fn generated<const D: usize, G: Grid<D>>(
     session: &Session,
     grid: Result<G>,
     partition: Partition,
+    order: usize,
 ) -> Result<Mesh<D>, Agreed> {
     let grid = session.agree(grid)?;
     let large = grid.counts()[1].is_none_or(|cells| cells > MOST_CELLS_ON_ONE_RANK);
     if partition == Partition::Grid || (partition == Partition::Auto && large) {
         let piece = session.agree(grid.part(session.rank(), session.ranks()))?;
-        return Mesh::assemble(session, piece, grid.names());
+        return Mesh::assemble(session, piece, grid.names(), order);
     }
-    split(session, session.on_first(|| grid.whole())?)
+    split(session, session.on_first(|| grid.whole())?, order)
 }
 
 /// Refuses a mesh file that does not exist, at its key in the job.
@@ -81,28 +94,33 @@ fn refuse_missing(path: &Path, loaded: &Loaded) -> Result<()> {
     })
 }
 
-fn from_file(session: &Session, path: &Path) -> Result<Scene, Agreed> {
+/// The mesh of a file, and whether the file has cells of second order.
+fn from_file(session: &Session, path: &Path, order: usize) -> Result<(Scene, bool), Agreed> {
     let mut in_parts = session.is_first() && partitioned::is_meant(path);
     session.world().process_at_rank(0).broadcast_into(&mut in_parts);
     if in_parts {
         let file = PartitionedFile::open(path, session.world())?;
-        return match file.header.dimension {
-            2 => file.mesh(session).map(Scene::Two),
-            _ => file.mesh(session).map(Scene::Three),
+        let scene = match file.header.dimension {
+            2 => file.mesh(session, order).map(Scene::Two)?,
+            _ => file.mesh(session, order).map(Scene::Three)?,
         };
+        return Ok((scene, file.header.curved));
     }
     let whole = session.on_first(|| gmsh::read(path))?;
-    let mut dimension = match whole {
-        Some(AnyMesh::Two(_)) => 2,
-        _ => 3,
+    let mut facts = match &whole {
+        Some(AnyMesh::Two(mesh)) => [2, u8::from(mesh.is_second_order)],
+        Some(AnyMesh::Three(mesh)) => [3, u8::from(mesh.is_second_order)],
+        None => [0; 2],
     };
-    session.world().process_at_rank(0).broadcast_into(&mut dimension);
-    Ok(match (dimension, whole) {
-        (_, Some(AnyMesh::Two(mesh))) => Scene::Two(split(session, Some(mesh))?),
-        (_, Some(AnyMesh::Three(mesh))) => Scene::Three(split(session, Some(mesh))?),
-        (2, None) => Scene::Two(split(session, None)?),
-        (_, None) => Scene::Three(split(session, None)?),
-    })
+    session.world().process_at_rank(0).broadcast_into(&mut facts[..]);
+    let [dimension, is_second_order] = facts;
+    let scene = match (dimension, whole) {
+        (_, Some(AnyMesh::Two(mesh))) => Scene::Two(split(session, Some(mesh), order)?),
+        (_, Some(AnyMesh::Three(mesh))) => Scene::Three(split(session, Some(mesh), order)?),
+        (2, None) => Scene::Two(split(session, None, order)?),
+        (_, None) => Scene::Three(split(session, None, order)?),
+    };
+    Ok((scene, is_second_order == 1))
 }
 
 fn rectangle(of: &job::Rectangle) -> Result<Rectangle> {

@@ -55,7 +55,7 @@ impl Part {
 
     fn mesh(&self) -> FieldMesh<'_, 2> {
         let Self { points, point_ids, cells, cell_ids } = self;
-        FieldMesh { points, point_ids, cells, cell_ids }
+        FieldMesh { points, point_ids, nodes_per_cell: 3, cells, cell_ids }
     }
 
     fn write_step(&self, file: &mut FieldFile<2>, time: f64) {
@@ -123,6 +123,7 @@ pub fn write_solid(world: &impl Communicator, folder: &Path) {
     let mesh = FieldMesh::<3> {
         points: &points[nodes.clone()],
         point_ids: &[0, 1, 2, 3, 4][nodes.clone()],
+        nodes_per_cell: 4,
         cells: &cells[4 * owned.start..4 * owned.end],
         cell_ids: &[0, 1][owned.clone()],
     };

@@ -189,10 +189,10 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
         metric: Metric::Elasticity,
     };
     let laws = || ByMaterial::uniform(FlowLaw::Perzyna(Elastic { parameters, elasticity: tensor }));
-    let runs = Geometry::new(&part(session, whole)).runs;
+    let geometry = Geometry::new(&part(session, whole));
     let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![
-            Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &runs), seen: seen.clone() }),
+            Box::new(Watched { inner: ViscoplasticFlow::<S>::new(laws(), &geometry), seen: seen.clone() }),
             Box::new(ViscousStress { tensor: ByMaterial::uniform(tensor) }),
         ]
     });
@@ -206,7 +206,7 @@ fn phases<const D: usize, const S: usize>(session: &Session, whole: &clarke::mes
     let elastic = || Elasticity { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: false }) };
     let parameters = material::Damage { threshold: 1.0, viscosity: 1.0, exponent: 0.0, largest: 0.9 };
     let law = Elastic { parameters, elasticity: tensor };
-    let damage = || Damage::new(ByMaterial::uniform(law), &runs);
+    let damage = || Damage::new(ByMaterial::uniform(law), &geometry);
     let (seen, batches) = seen_by::<D, S>(session, whole, |seen| {
         vec![Box::new(Watched { inner: elastic(), seen: seen.clone() }), Box::new(damage())]
     });

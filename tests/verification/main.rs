@@ -26,6 +26,7 @@ mod manufactured_contact;
 mod manufactured;
 mod manufactured_flow;
 mod memory;
+mod midsides;
 #[path = "../mpirun/mod.rs"]
 mod mpirun;
 mod obstacles;
@@ -35,6 +36,7 @@ mod patch;
 mod petsc_boundary;
 mod profiles;
 mod pulses;
+mod quadratic;
 mod random_laws;
 mod scenes;
 mod schemes;
@@ -85,6 +87,7 @@ fn scenario() {
         "creep" => creep::all(&session),
         "damage" => damage::all(&session),
         "memory" => memory::all(&session),
+        "midsides" => midsides::all(&session, &folder),
         "adhesion" => adhesion::all(&session),
         "one_cell" => one_cell::all(&session),
         "held_by_contact" => held_by_contact::blocks(&session),
@@ -114,6 +117,9 @@ fn scenario() {
         "scheme_orders" => schemes::orders(&session),
         "scheme_closed_forms" => schemes::closed_forms(&session),
         "manufactured_time" => manufactured::time(&session),
+        "quadratic_plane" => quadratic::plane(&session),
+        "quadratic_space" => quadratic::space(&session),
+        "quadratic_bars" => quadratic::bars(&session),
         "power_laws" => fast_flow::power_laws(&session),
         "flowing_contact" => flowing_contact::all(&session),
         "flow_together" => fast_flow::together(&session),

@@ -25,6 +25,7 @@ fn cell<const D: usize>(nodes: Vec<Vector<D>>, cell: Vec<u32>, facets: Vec<[u32;
         facet_cells: vec![0; facets.len()],
         facets,
         boundaries: vec![boundary("bottom", vec![0]), boundary("top", others)],
+        ..GlobalMesh::default()
     }
 }
 

@@ -47,12 +47,17 @@ pub fn stir<const D: usize>(mut mesh: GlobalMesh<D>, reach: f64) -> GlobalMesh<D
     mesh
 }
 
-/// The part of this rank of a mesh that every rank has generated.
+/// The part of this rank of a mesh of linear cells that every rank has generated.
 pub fn part<const D: usize>(session: &Session, whole: &GlobalMesh<D>) -> Mesh<D> {
+    part_of_order(session, whole, 1)
+}
+
+/// The same with cells of an order.
+pub fn part_of_order<const D: usize>(session: &Session, whole: &GlobalMesh<D>, order: usize) -> Mesh<D> {
     let parts = session
         .is_first()
         .then(|| (whole.clone(), divide(whole, session.ranks(), Method::KWay).expect("partition")));
-    distribute(session, parts).expect("distributed")
+    distribute(session, parts, order).expect("distributed")
 }
 
 /// A body at rest with supports on some boundaries and these effects.

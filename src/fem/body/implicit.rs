@@ -4,7 +4,7 @@ use super::{Body, Called};
 use crate::{
     fem::{
         effect::{Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents, Term},
-        space::{Batch, Geometry, Needs, Nodal},
+        space::{Batch, Geometry, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces},
     },
     linear_algebra::{
         simd::Pack,
@@ -119,7 +119,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         forces: &mut [f64],
     ) {
         if let Some(tangents) = &mut tangents {
-            tangents.restart::<S>(self.mesh.cell_count());
+            tangents.restart::<S>(self.geometry.point_count());
         }
         let mut outcome = Outcome { tangents, ..Outcome::default() };
         for effect in self.surface_effects.iter_mut() {
@@ -132,7 +132,7 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
         let (mesh, nodal) = (self.mesh, Nodal::all(displacement));
         Batch::for_all(mesh, self.geometry, nodal, needs, |batch: &mut Batch<D, S>| {
             self.evaluate(called, needs, batch, &mut outcome);
-            if outcome.has_flowed {
+            if outcome.has_flowed || batch.holds_forces() {
                 batch.scatter(mesh, forces);
             }
         });
@@ -144,12 +144,17 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
     pub fn add_tangents(&self, tangents: &Tangents, velocity: &[f64], forces: &mut [f64]) {
         tangents.add_nodal::<D>(velocity, forces);
         for (number, tangent) in tangents.iter::<S>() {
-            let (cell, nodes) = (self.geometry.cell(number), self.mesh.cell(number));
-            let mut values = [[0.0; D]; 4];
-            for (value, &node) in values.iter_mut().zip(nodes) {
+            let (number, point, cell) = self.geometry.point(number);
+            let place = (self.geometry.points() > 1).then(|| &cell_rule::<D>()[point].0);
+            let mut values = [[0.0; D]; MOST_NODES];
+            for (value, node) in values.iter_mut().zip(self.mesh.cell_nodes(number)) {
                 value.copy_from_slice(&velocity[node as usize * D..][..D]);
             }
-            let rate: Mandel<S> = symmetric_part(&cell.field_gradient(&values[..=D]));
+            let corners = match place {
+                Some(place) => linear_at(D + 1, place, &values),
+                None => std::array::from_fn(|a| values[a]),
+            };
+            let rate: Mandel<S> = symmetric_part(&cell.field_gradient(&corners[..=D]));
             let mut stress = [[0.0; D]; D];
             for (c, row) in tangent.chunks_exact(S).enumerate() {
                 let (i, j, factor) = component::<S>(c);
@@ -159,12 +164,90 @@ impl<const D: usize, const S: usize> Cells<'_, D, S> {
                     stress[j][i] = stress[i][j];
                 }
             }
-            for (a, &node) in nodes.iter().enumerate() {
+            let mut of_corners = [[0.0; D]; 4];
+            for (a, force) in of_corners.iter_mut().enumerate().take(D + 1) {
                 let gradient = cell.gradient(a);
-                for i in 0..D {
-                    forces[node as usize * D + i] += dot(&stress[i], &gradient);
+                *force = std::array::from_fn(|i| dot(&stress[i], &gradient));
+            }
+            let mut add = |node: u32, force: &[f64; D]| {
+                let target = &mut forces[node as usize * D..][..D];
+                target.iter_mut().zip(force).for_each(|(target, force)| *target += force);
+            };
+            match place {
+                Some(place) => {
+                    let all = nodal_forces(D + 1, place, &of_corners);
+                    self.mesh.cell_nodes(number).zip(&all).for_each(|(node, force)| add(node, force));
                 }
+                None => self.mesh.cell(number).iter().zip(&of_corners).for_each(|(&n, force)| add(n, force)),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        fem::{
+            effect::{Blend, Damage, ElasticLaw, Elasticity, ViscoplasticFlow},
+            space::samples::{number, quadratic, row},
+        },
+        laws::material::{self, ByMaterial, Elastic, Hypothesis, Metric, Perzyna, Viscoplasticity},
+    };
+
+    /// The derivative of the forces of flow and damage at the end of a step is that by differences.
+    fn check<const D: usize, const S: usize>(mesh: Mesh<D>, hypothesis: Hypothesis) {
+        let material = material::Elasticity { youngs_modulus: 1000.0, poisson_ratio: 0.4 };
+        let perzyna = Perzyna {
+            relaxation: 100.0,
+            yield_stress: 3.0,
+            exponent: 1.0,
+            hardening_modulus: Some(50.0),
+            metric: Metric::Elasticity,
+        };
+        let law = Viscoplasticity::Perzyna(perzyna).prepare(&material, hypothesis);
+        let tensor = *material::Flow::elasticity(&law);
+        let parameters = material::Damage { threshold: 1e-3, viscosity: 5.0, exponent: 0.0, largest: 0.9 };
+        let damage = Elastic { parameters, elasticity: tensor };
+        let geometry = Geometry::new(&mesh);
+        let effects: Vec<Box<dyn Effect<D, S>>> = vec![
+            Box::new(Elasticity { law: ByMaterial::uniform(ElasticLaw { tensor, with_history: true }) }),
+            Box::new(ViscoplasticFlow::<S>::new(ByMaterial::uniform(law), &geometry)),
+            Box::new(Damage::new(ByMaterial::uniform(damage), &geometry)),
+        ];
+        let count = mesh.nodes.len() * D;
+        let length = 0.25;
+        let (blend, step) = (Blend::euler(length), Step { time: length, length, previous_length: 0.0 });
+        let mut body = Body::<D, S>::new(mesh, geometry, effects, vec![false; count], Evaluation::Converged);
+        let rest = vec![0.0; count];
+        body.add_start_forces(Evaluation::Start(blend), Nodal::all(&rest), step, &mut vec![0.0; count]);
+        let u: Vec<f64> = (0..count).map(|i| 0.1 * number(i)).collect();
+        let v: Vec<f64> = (0..count).map(|i| 0.1 * number(i + 7)).collect();
+        let (mut cells, _) = body.cells_and_contacts();
+        let mut forces = |factor: f64, tangents: Option<&mut Tangents>| {
+            let moved: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + factor * length * v).collect();
+            let mut forces = vec![0.0; count];
+            cells.add_flow(&moved, tangents, &mut forces);
+            forces
+        };
+        let small = 1e-6;
+        let [above, below] = [small, -small].map(|factor| forces(factor, None));
+        let mut tangents = Tangents::default();
+        forces(0.0, Some(&mut tangents));
+        let mut found = vec![0.0; count];
+        cells.add_tangents(&tangents, &v, &mut found);
+        assert!(tangents.iter::<S>().count() > cells.mesh.cell_count());
+        let slopes = above.iter().zip(&below).map(|(above, below)| (above - below) / (2.0 * small));
+        let most = found.iter().fold(0.0, |most: f64, force| most.max(force.abs()));
+        for (found, slope) in found.iter().zip(slopes) {
+            assert!((found - slope).abs() < 1e-5 * most, "{found} {slope}, the most {most}");
+        }
+    }
+
+    #[test]
+    fn derivatives_of_flow_in_quadratic_cells_are_those_by_differences() {
+        check::<2, 3>(quadratic(row(), 0.0), Hypothesis::PlaneStress);
+        check::<2, 4>(quadratic(row(), 0.02), Hypothesis::PlaneStrain);
+        check::<3, 6>(quadratic(row(), 0.0), Hypothesis::Space);
     }
 }

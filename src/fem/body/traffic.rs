@@ -21,7 +21,9 @@ pub struct PassBytes {
 impl PassBytes {
     /// Counts the passes of a step.
     pub fn of<const D: usize, const S: usize>(body: &Body<D, S>) -> Self {
-        let cells = body.mesh.cell_count() * ((D + 1) * size_of::<u32>() + size_of::<Simplex<D>>());
+        let geometries = if body.mesh.is_curved { body.geometry.points() } else { 1 };
+        let cell = body.mesh.nodes_per_cell() * size_of::<u32>() + geometries * size_of::<Simplex<D>>();
+        let cells = body.mesh.cell_count() * cell;
         let field = body.mesh.nodes.len() * D * size_of::<f64>();
         // Histories, of each effect as far as `moved` says.
         let histories = |moved: fn(Phases) -> Moved| -> usize {
@@ -117,7 +119,7 @@ mod tests {
         let elasticity = Elasticity { youngs_modulus: 10.0, poisson_ratio: 0.3 };
         let law = Maxwell { relaxation_time: 0.5, volumetric_relaxation_time: None };
         let law = Viscoplasticity::Maxwell(law).prepare(&elasticity, Hypothesis::PlaneStress);
-        let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry.runs);
+        let history = ViscoplasticFlow::<3>::new(ByMaterial::uniform(law), &geometry);
         let with_history = passes(vec![Box::new(history)], geometry.clone(), mesh.clone());
         // Displacement and velocity are read, forces read and written, three stresses of each cell read and written.
         assert_eq!(with_history.explicit, cells + 4 * field + 2 * 2 * 3 * 8);

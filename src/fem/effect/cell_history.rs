@@ -1,8 +1,11 @@
 use super::{Evaluation, History, HistoryStore};
-use crate::{fem::space::CellRun, linear_algebra::simd::Pack};
+use crate::{
+    fem::space::{CellRun, Geometry},
+    linear_algebra::simd::Pack,
+};
 use std::borrow::Cow;
 
-/// Converged and trial values of the cells of some materials, `W` a cell, in the packs of the geometry. Other cells take no
+/// Converged and trial values at the points of the cells of some materials, `W` a point, in the packs of batches. Other cells take no
 /// storage.
 #[derive(Debug)]
 pub(super) struct CellHistory<const W: usize> {
@@ -11,7 +14,9 @@ pub(super) struct CellHistory<const W: usize> {
     /// Whether the values before the last step are needed only by laws evaluated at the end of steps.
     is_earlier_for_end: bool,
     runs: Vec<CellRun>,
-    /// The position of the pack of each run, if its material keeps any.
+    /// Points in a cell.
+    points: usize,
+    /// The position of the pack of each batch, if its material keeps any.
     places: Vec<Option<u32>>,
     converged: Vec<Pack<W>>,
     trial: Vec<Pack<W>>,
@@ -22,24 +27,26 @@ pub(super) struct CellHistory<const W: usize> {
 impl<const W: usize> CellHistory<W> {
     /// Zeros for the cells of the materials for which `keeps` holds. The names are those of the converged values and of the values
     /// before the last step.
-    pub(super) fn new(
+    pub(super) fn new<const D: usize>(
         [name, earlier_name]: [&'static str; 2],
-        runs: &[CellRun],
+        geometry: &Geometry<D>,
         keeps: impl Fn(usize) -> bool,
     ) -> Self {
-        let mut kept = 0;
+        let (runs, points, mut kept) = (&geometry.runs, geometry.points(), 0);
         let place = |run: &CellRun| {
             let place = keeps(run.material).then_some(kept);
             kept += u32::from(place.is_some());
             place
         };
-        let places = runs.iter().map(place).collect();
+        let batches = runs.iter().flat_map(|run| std::iter::repeat_n(run, points));
+        let places = batches.map(place).collect();
         let zeros = vec![Pack::ZERO; kept as usize];
         Self {
             name,
             earlier_name,
             is_earlier_for_end: false,
-            runs: runs.to_vec(),
+            runs: runs.clone(),
+            points,
             places,
             converged: zeros.clone(),
             trial: zeros,
@@ -113,21 +120,29 @@ impl<const W: usize> CellHistory<W> {
 
     fn written(&self, name: &'static str, values: &[Pack<W>], copies: usize) -> History<'_> {
         let cells = self.runs.last().map_or(0, |run| run.first + run.count);
-        let mut all = vec![[0.0; W]; cells];
-        for (run, values) in self.kept(values) {
-            for (lane, all) in all[run.first..][..run.count].iter_mut().enumerate() {
-                *all = values.lane(lane);
+        let mut all = vec![[0.0; W]; cells * self.points];
+        let mut kept = 0;
+        for (run, point, place) in self.kept() {
+            for lane in 0..run.count {
+                all[(run.first + lane) * self.points + point] = values[place].lane(lane);
             }
+            kept += run.count;
         }
-        let kept: usize = self.kept(values).map(|(run, _)| run.count).sum();
         let bytes = copies * kept * size_of::<[f64; W]>();
-        History { name, width: W, values: Cow::Owned(all.into_flattened()), bytes }
+        History {
+            name,
+            width: W * self.points,
+            points: self.points,
+            values: Cow::Owned(all.into_flattened()),
+            bytes,
+        }
     }
 
-    /// The runs that keep values, with their packs.
-    fn kept<'a>(&'a self, values: &'a [Pack<W>]) -> impl Iterator<Item = (&'a CellRun, &'a Pack<W>)> {
-        let runs = self.runs.iter().zip(&self.places);
-        runs.filter_map(|(run, place)| Some((run, &values[(*place)? as usize])))
+    /// The batches that keep values: their runs, their points and the positions of their packs.
+    fn kept(&self) -> impl Iterator<Item = (&CellRun, usize, usize)> {
+        let batches = self.runs.iter().flat_map(|run| (0..self.points).map(move |point| (run, point)));
+        let places = batches.zip(&self.places);
+        places.filter_map(|((run, point), place)| Some((run, point, (*place)? as usize)))
     }
 }
 
@@ -160,10 +175,11 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
             _ => return,
         };
         let (values, _) = values.as_chunks::<W>();
-        for (run, place) in self.runs.iter().zip(&self.places) {
+        let batches = self.runs.iter().flat_map(|run| (0..self.points).map(move |point| (run, point)));
+        for ((run, point), place) in batches.zip(&self.places) {
             let Some(place) = *place else { continue };
-            for (lane, values) in values[run.first..][..run.count].iter().enumerate() {
-                target[place as usize].set(lane, *values);
+            for lane in 0..run.count {
+                target[place as usize].set(lane, values[(run.first + lane) * self.points + point]);
             }
         }
     }
@@ -172,12 +188,26 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{fem::space::samples::quadratic, mesh::Mesh};
+
+    /// Two cells of a material, one of another, two of the first.
+    fn cells(order: usize) -> Geometry<2> {
+        let mesh = Mesh::<2> {
+            nodes: (0..7).map(|i| [f64::from(i), f64::from(i % 2)]).collect(),
+            cells: (0..5).flat_map(|cell| [cell, cell + 2, cell + 1]).collect(),
+            cell_regions: vec![0, 0, 1, 0, 0],
+            ..Mesh::default()
+        };
+        Geometry::with_materials(&if order == 1 { mesh } else { quadratic(mesh, 0.0) }, |region| region)
+    }
+
+    fn history(order: usize) -> CellHistory<2> {
+        CellHistory::new(["h", "before"], &cells(order), |material| material == 0)
+    }
 
     #[test]
     fn values_are_kept_where_needed_and_written_for_all_cells() {
-        let run = |first, count, material| CellRun { first, count, material };
-        let runs = [run(0, 2, 0), run(2, 1, 1), run(3, 2, 0)];
-        let mut history = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
+        let mut history = history(1);
         assert_eq!(history.converged(1), None);
         history.both_mut(2).expect("values").1.set(1, [7.0, 8.0]);
         history.set_trial(1, 0, [9.0, 9.0]);
@@ -186,7 +216,7 @@ mod tests {
         assert_eq!(*written.values, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 8.0]);
         assert_eq!(written.bytes, 2 * 4 * 2 * 8);
         let values = written.values.into_owned();
-        let mut other = CellHistory::<2>::new(["h", "before"], &runs, |material| material == 0);
+        let mut other = self::history(1);
         other.restore("another", &values);
         assert_eq!(other.converged(2).expect("values").lane(1), [0.0, 0.0]);
         other.restore("h", &values);
@@ -197,5 +227,25 @@ mod tests {
         other.commit();
         assert_eq!(other.last_change(2, 1), [0.5, -2.0]);
         assert_eq!(other.last_change(1, 0), [0.0; 2], "no such cell");
+    }
+
+    #[test]
+    fn values_at_points_are_written_cell_by_cell() {
+        let mut history = history(2);
+        // Batches of three points for each run; point 1 of the last run.
+        history.both_mut(7).expect("values").1.set(1, [7.0, 8.0]);
+        assert!(history.both_mut(4).is_none(), "the other material");
+        history.commit();
+        let written = history.history();
+        assert_eq!((written.width, written.points, written.bytes), (6, 3, 2 * 12 * 2 * 8));
+        let values = written.values.to_vec();
+        assert_eq!(values[24..], [0.0, 0.0, 7.0, 8.0, 0.0, 0.0]);
+        assert!(values[..24].iter().all(|value| *value == 0.0));
+        let means = written.means(&[0.25, 0.5, 0.25].repeat(5));
+        assert_eq!((means.width, &means.values[8..]), (2, &[3.5, 4.0][..]));
+        let mut other = self::history(2);
+        other.restore("h", &values);
+        assert_eq!(other.converged(7), history.converged(7));
+        assert_eq!(*other.history().values, values);
     }
 }

@@ -3,7 +3,7 @@ use super::{
     StressError, cell_history::CellHistory, evolution::Evolution,
 };
 use crate::{
-    fem::space::{Batch, CellRun, Needs},
+    fem::space::{Batch, Geometry, Needs},
     laws::material::{self, ByMaterial, Elastic},
     linear_algebra::{
         simd::{LANES, Pack},
@@ -30,10 +30,10 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Undamaged cells, for the runs whose material has a law.
-    pub fn new(laws: ByMaterial<Elastic<material::Damage>>, runs: &[CellRun]) -> Self {
+    /// Undamaged cells, for the cells whose material has a law.
+    pub fn new<const D: usize>(laws: ByMaterial<Elastic<material::Damage>>, geometry: &Geometry<D>) -> Self {
         let names = ["damage", "previous_damage"];
-        let damage = CellHistory::new(names, runs, |material| laws.get(material).is_some());
+        let damage = CellHistory::new(names, geometry, |material| laws.get(material).is_some());
         Self { laws, damage }
     }
 
@@ -78,7 +78,7 @@ impl Damage {
             }
             batch.stress.set(lane, add_scaled(&batch.stress.lane(lane), damage, &sound));
             if let Some(tangents) = &mut outcome.tangents {
-                let (tangent, flows) = tangents.entry::<S>(batch.first + lane);
+                let (tangent, flows) = tangents.entry::<S>(batch.first_point + lane);
                 let growth = Growth { damage, slope, length: evolution.blend.length };
                 weaken_tangent(law, growth, &sound, tangent);
                 if flows && slope != 0.0 {

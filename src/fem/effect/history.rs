@@ -8,13 +8,33 @@ use std::borrow::Cow;
 pub struct History<'a> {
     /// Name in checkpoints and field files.
     pub name: &'static str,
-    /// Values a cell or node.
+    /// Values a cell or node: those of all points of a cell, point by point.
     pub width: usize,
+    /// Points in a cell; 1 of nodes.
+    pub points: usize,
     /// `width` values for each cell of this rank, or each node it owns; zero where no such history is kept.
     pub values: Cow<'a, [f64]>,
     /// Bytes of the values that are kept, trial values included. The lanes of packs that no cell fills are not counted: how many
     /// they are depends on the ranks.
     pub bytes: usize,
+}
+
+impl History<'_> {
+    /// The means over the points of each cell, given the shares of each point in the volume of its cell, cell by cell.
+    pub fn means(self, shares: &[f64]) -> Self {
+        if self.points == 1 {
+            return self;
+        }
+        let width = self.width / self.points;
+        let mut means = Vec::with_capacity(self.values.len() / self.points);
+        let cells = self.values.chunks_exact(self.width).zip(shares.chunks_exact(self.points));
+        for (values, shares) in cells {
+            let mean =
+                |c: usize| shares.iter().enumerate().map(|(q, s)| s * values[q * width + c]).sum::<f64>();
+            means.extend((0..width).map(mean));
+        }
+        Self { width, points: 1, values: Cow::Owned(means), ..self }
+    }
 }
 
 /// Storage of a history: converged values, trial values and, on request, the values before the last step.

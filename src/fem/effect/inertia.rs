@@ -39,7 +39,7 @@ impl<const D: usize, const S: usize> Effect<D, S> for Inertia {
 
     fn add_energy(&self, _: Evaluation, _: Step, batch: &Batch<D, S>, energy: &mut Energy) {
         let Some(&density) = self.density.get(batch.material) else { return };
-        energy[KINETIC] += 0.5 * mass::square(density, batch.cells, &batch.velocity);
-        energy[NUMERICAL] -= 0.5 * mass::square(density, batch.cells, &batch.velocity_change);
+        energy[KINETIC] += 0.5 * mass::square(density, batch, &batch.velocity);
+        energy[NUMERICAL] -= 0.5 * mass::square(density, batch, &batch.velocity_change);
     }
 }

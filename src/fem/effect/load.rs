@@ -3,10 +3,10 @@
 use super::{EnergyKind, Role};
 use crate::{
     error::{Error, Result},
-    fem::space::{Geometry, cell_rule, facet_rule},
+    fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule, values},
     job::{BodyForce, Scalar},
-    linear_algebra::tensor::{Vector, norm},
-    mesh::{Mesh, shape::facet_normal},
+    linear_algebra::tensor::Vector,
+    mesh::Mesh,
 };
 
 /// Work of loads and of obstacles that move.
@@ -22,7 +22,7 @@ pub struct Traction {
 }
 
 impl Traction {
-    /// Visits the forces in N on the nodes of this rank's facets at `time`, by quadrature of degree 2.
+    /// Visits the forces in N on the nodes of this rank's facets at `time`, by quadrature of degree 2, on quadratic cells of degree 4.
     pub fn forces<const D: usize>(
         &self,
         mesh: &Mesh<D>,
@@ -30,12 +30,11 @@ impl Traction {
         mut visit: impl FnMut(u32, Vector<D>),
     ) -> Result<()> {
         for &facet in &self.facets {
-            let (nodes, corners) = (mesh.facets[facet as usize], mesh.facet_corners(facet));
-            let measure = norm(&facet_normal(&corners));
-            for (place, weight) in facet_rule::<D>() {
-                let value = evaluate(&self.value, time, &point(&corners, place), "traction")?;
-                for (node, share) in nodes.into_iter().zip(place) {
-                    visit(node, value.map(|value| measure * weight * share * value));
+            let (nodes, points) = facet_points(mesh, facet);
+            for point in points {
+                let value = evaluate(&self.value, time, &point.place, "traction")?;
+                for (node, share) in nodes.clone().zip(point.shares) {
+                    visit(node, value.map(|value| point.weight * share * value));
                 }
             }
         }
@@ -65,7 +64,7 @@ impl Load {
     }
 
     /// Adds the nodal forces at `time` to `forces` (`D` a local node, ghosts to be added to their owners), by
-    /// quadrature of degree 2.
+    /// quadrature of degree 2, on quadratic cells of degree 4.
     pub fn add<const D: usize>(
         &self,
         mesh: &Mesh<D>,
@@ -77,12 +76,27 @@ impl Load {
             traction.forces(mesh, time, |node, force| add_at(forces, node, &force))?;
         }
         for body_force in &self.body_forces {
-            for (number, cell) in geometry.iter().enumerate() {
-                let (nodes, corners) = (mesh.cell(number), mesh.corners(number));
-                for (place, weight) in cell_rule::<D>() {
-                    let at = point(&corners[..=D], place);
+            for (number, cell) in geometry.cells().enumerate() {
+                let (volume, corners) = (cell.whole().volume, mesh.corners(number));
+                if let CellShape::Linear = cell.shape() {
+                    let nodes = mesh.cell(number).iter().copied();
+                    for (place, weight) in cell_rule::<D>() {
+                        let at = point(corners[..=D].iter().copied(), place);
+                        let value = evaluate(&body_force.value, time, &at, "body_force")?;
+                        scatter(forces, nodes.clone(), place, volume * weight, &value);
+                    }
+                    continue;
+                }
+                for (k, (place, weight)) in fine_cell_rule::<D>().iter().enumerate() {
+                    let shares = values(D + 1, place);
+                    let coordinates = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]);
+                    let at = point(coordinates, &shares);
                     let value = evaluate(&body_force.value, time, &at, "body_force")?;
-                    scatter(forces, nodes, place, cell.volume * weight, &value);
+                    let weight = match cell.shape() {
+                        CellShape::Curved(weights) => weights[k][cell.lane()],
+                        _ => volume * weight,
+                    };
+                    scatter(forces, mesh.cell_nodes(number), &shares, weight, &value);
                 }
             }
         }
@@ -90,18 +104,24 @@ impl Load {
     }
 }
 
-fn point<const D: usize>(corners: &[Vector<D>], place: &[f64]) -> Vector<D> {
+fn point<const D: usize>(coordinates: impl Iterator<Item = Vector<D>>, shares: &[f64]) -> Vector<D> {
     let mut out = [0.0; D];
-    for (corner, share) in corners.iter().zip(place) {
+    for (coordinates, share) in coordinates.zip(shares) {
         for i in 0..D {
-            out[i] += share * corner[i];
+            out[i] += share * coordinates[i];
         }
     }
     out
 }
 
-fn scatter<const D: usize>(forces: &mut [f64], nodes: &[u32], place: &[f64], weight: f64, value: &Vector<D>) {
-    for (&node, share) in nodes.iter().zip(place) {
+fn scatter<const D: usize>(
+    forces: &mut [f64],
+    nodes: impl Iterator<Item = u32>,
+    shares: &[f64],
+    weight: f64,
+    value: &Vector<D>,
+) {
+    for (node, share) in nodes.zip(shares) {
         add_at(forces, node, &value.map(|value| weight * share * value));
     }
 }

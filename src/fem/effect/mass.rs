@@ -1,21 +1,45 @@
 //! Forces and energies of the consistent mass matrix, for a pack of cells.
 
 use crate::{
-    fem::space::{Batch, Corners, SimplexPack},
+    fem::space::{
+        Batch, CellShape, MOST_NODES, MOST_POINTS, MassCoefficients, NodalPacks, OPPOSITE, SimplexPack,
+        cell_rule, edges, fine_cell_rule, values,
+    },
     laws::material::ByMaterial,
     linear_algebra::simd::{LANES, sum},
 };
 use multiversion::multiversion;
 
-/// Adds `factor * M v` to the forces of a batch.
+/// Adds `factor * M v` to the forces of a batch; of quadratic cells at their first point.
 pub(super) fn add_to_batch<const D: usize, const S: usize>(
     density: &ByMaterial<f64>,
     factor: f64,
     batch: &mut Batch<D, S>,
 ) {
-    let Some(density) = density.get(batch.material) else { return };
-    let factor = factor * density / ((D + 1) * (D + 2)) as f64;
-    add(factor, batch.cells, &batch.velocity, &mut batch.force);
+    let Some(density) = density.get(batch.material).filter(|_| batch.point == 0) else { return };
+    let factor = factor * density;
+    match batch.shape {
+        CellShape::Linear => {
+            let factor = factor / ((D + 1) * (D + 2)) as f64;
+            add(factor, batch.cells, &batch.velocity, &mut batch.force);
+        }
+        CellShape::Straight => add_straight(factor, batch.cells, &batch.velocity, &mut batch.force),
+        CellShape::Curved(weights) => add_curved(factor, weights, &batch.velocity, &mut batch.force),
+    }
+}
+
+/// `integral of density w . w` over the cells of a batch with these nodal values; of quadratic cells all of it at their first point.
+pub(super) fn square<const D: usize, const S: usize>(
+    density: f64,
+    batch: &Batch<D, S>,
+    nodal: &NodalPacks<D>,
+) -> f64 {
+    match batch.shape {
+        CellShape::Linear => square_linear(density, batch.cells, nodal),
+        _ if batch.point > 0 => 0.0,
+        CellShape::Straight => square_straight(density, batch.cells, nodal),
+        CellShape::Curved(weights) => square_curved(density, weights, nodal),
+    }
 }
 
 /// Adds `factor * volume` times each nodal velocity and the sum of them all to the nodal forces.
@@ -23,8 +47,8 @@ pub(super) fn add_to_batch<const D: usize, const S: usize>(
 fn add<const D: usize>(
     factor: f64,
     cells: &SimplexPack<D>,
-    velocities: &Corners<D>,
-    forces: &mut Corners<D>,
+    velocities: &NodalPacks<D>,
+    forces: &mut NodalPacks<D>,
 ) {
     for lane in 0..LANES {
         let factor = factor * cells.volume[lane];
@@ -42,7 +66,7 @@ fn add<const D: usize>(
 
 /// `integral of density w . w` over cells with these nodal values.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn square<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: &Corners<D>) -> f64 {
+fn square_linear<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: &NodalPacks<D>) -> f64 {
     let factor = density / ((D + 1) * (D + 2)) as f64;
     let mut integrals = [0.0; LANES];
     for lane in 0..LANES {
@@ -59,4 +83,130 @@ pub(super) fn square<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal
         integrals[lane] = cells.volume[lane] * sum;
     }
     factor * sum(&integrals)
+}
+
+/// The factor of [`times_straight`], given the weights of points of quadratic cells.
+fn straight_factor<const D: usize>(density: f64) -> f64 {
+    density * MassCoefficients::of::<D>().scale * cell_rule::<D>().len() as f64
+}
+
+/// The mass matrix of a quadratic cell with straight sides times component `i` of nodal values, without its scale and volume.
+#[inline(always)]
+fn times_straight<const D: usize>(nodal: &NodalPacks<D>, i: usize, lane: usize) -> [f64; MOST_NODES] {
+    let form = MassCoefficients::of::<D>();
+    let value = |node: usize| nodal[node].0[i][lane];
+    let (mut of_corners, mut of_edges) = (0.0, 0.0);
+    for a in 0..D + 1 {
+        of_corners += value(a);
+    }
+    for e in 0..D * (D + 1) / 2 {
+        of_edges += value(D + 1 + e);
+    }
+    let mut out = [0.0; MOST_NODES];
+    for a in 0..D + 1 {
+        out[a] = form.corner[0] * value(a) + form.corner[1] * of_corners + form.mixed[0] * of_edges;
+    }
+    for (e, &[a, b]) in edges(D + 1).iter().enumerate() {
+        let own = value(D + 1 + e);
+        out[a] += form.mixed[1] * own;
+        out[b] += form.mixed[1] * own;
+        out[D + 1 + e] = form.edge[0] * own
+            + form.edge[1] * of_edges
+            + form.mixed[0] * of_corners
+            + form.mixed[1] * (value(a) + value(b));
+        if D == 3 {
+            out[D + 1 + e] += form.edge[2] * value(D + 1 + OPPOSITE[e]);
+        }
+    }
+    out
+}
+
+/// The mass matrix of a curved cell of density 1 times component `i` of nodal values.
+#[inline(always)]
+fn times_curved<const D: usize>(
+    weights: &[[f64; LANES]; MOST_POINTS],
+    nodal: &NodalPacks<D>,
+    i: usize,
+    lane: usize,
+) -> [f64; MOST_NODES] {
+    let nodes = D + 1 + D * (D + 1) / 2;
+    let mut out = [0.0; MOST_NODES];
+    for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
+        let shares = values(D + 1, place);
+        let mut value = 0.0;
+        for a in 0..nodes {
+            value += shares[a] * nodal[a].0[i][lane];
+        }
+        for a in 0..nodes {
+            out[a] += weights[lane] * shares[a] * value;
+        }
+    }
+    out
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_straight<const D: usize>(
+    factor: f64,
+    cells: &SimplexPack<D>,
+    velocities: &NodalPacks<D>,
+    forces: &mut NodalPacks<D>,
+) {
+    let factor = straight_factor::<D>(factor);
+    for i in 0..D {
+        for lane in 0..LANES {
+            let momentum = times_straight(velocities, i, lane);
+            let factor = factor * cells.volume[lane];
+            for a in 0..D + 1 + D * (D + 1) / 2 {
+                forces[a].0[i][lane] += factor * momentum[a];
+            }
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn square_straight<const D: usize>(density: f64, cells: &SimplexPack<D>, nodal: &NodalPacks<D>) -> f64 {
+    let mut integrals = [0.0; LANES];
+    for i in 0..D {
+        for lane in 0..LANES {
+            let momentum = times_straight(nodal, i, lane);
+            let mut sum = 0.0;
+            for a in 0..D + 1 + D * (D + 1) / 2 {
+                sum += momentum[a] * nodal[a].0[i][lane];
+            }
+            integrals[lane] += cells.volume[lane] * sum;
+        }
+    }
+    straight_factor::<D>(density) * sum(&integrals)
+}
+
+fn add_curved<const D: usize>(
+    factor: f64,
+    weights: &[[f64; LANES]; MOST_POINTS],
+    velocities: &NodalPacks<D>,
+    forces: &mut NodalPacks<D>,
+) {
+    for i in 0..D {
+        for lane in 0..LANES {
+            let momentum = times_curved(weights, velocities, i, lane);
+            for (force, momentum) in forces.iter_mut().zip(momentum) {
+                force.0[i][lane] += factor * momentum;
+            }
+        }
+    }
+}
+
+fn square_curved<const D: usize>(
+    density: f64,
+    weights: &[[f64; LANES]; MOST_POINTS],
+    nodal: &NodalPacks<D>,
+) -> f64 {
+    let mut integrals = [0.0; LANES];
+    for i in 0..D {
+        for lane in 0..LANES {
+            let momentum = times_curved(weights, nodal, i, lane);
+            let products = momentum.iter().zip(nodal).map(|(m, value)| m * value.0[i][lane]);
+            integrals[lane] += products.take(D + 1 + D * (D + 1) / 2).sum::<f64>();
+        }
+    }
+    density * sum(&integrals)
 }

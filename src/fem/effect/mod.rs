@@ -32,7 +32,7 @@ mod viscous_stress;
 
 use crate::{
     error::{Error, Result},
-    fem::space::{CellRun, facets, surface_points},
+    fem::space::{Geometry, facets, surface_points},
     job::{self, Material},
     laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
     mesh::Mesh,
@@ -80,10 +80,10 @@ pub const ENERGIES: &[EnergyKind] = &[
 
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");
 
-/// The effects in the interior of bodies of these materials, on runs of cells of one material. A table that is absent creates none.
+/// The effects in the interior of bodies of these materials. A table that is absent creates none.
 pub fn effects<const D: usize, const S: usize>(
     materials: &[&Material],
-    runs: &[CellRun],
+    geometry: &Geometry<D>,
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
     if let Some(density) = by_material(materials, |m| m.density) {
@@ -97,11 +97,11 @@ pub fn effects<const D: usize, const S: usize>(
     }
     let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
-        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, runs)));
+        effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, geometry)));
     }
     let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
-        effects.push(Box::new(Damage::new(laws, runs)));
+        effects.push(Box::new(Damage::new(laws, geometry)));
     }
     Ok(effects)
 }

@@ -42,7 +42,7 @@ impl NodeHistory {
     fn written(&self, name: &'static str, values: &[f64], copies: usize) -> History<'_> {
         let mut all = vec![0.0; self.owned];
         self.nodes.iter().zip(values).for_each(|(&node, value)| all[node as usize] = *value);
-        History { name, width: 1, values: Cow::Owned(all), bytes: copies * size_of_val(values) }
+        History { name, width: 1, points: 1, values: Cow::Owned(all), bytes: copies * size_of_val(values) }
     }
 }
 

@@ -14,17 +14,19 @@ fn fixed_axes<const D: usize>(fix: &Fix, mesh: &Mesh<D>, boundary: &str, facet: 
         Fix::Keyword(FixedDirections::All) => out = [true; D],
         Fix::Axes(axes) => axes.iter().for_each(|axis| out[axis.index()] = true),
         Fix::Keyword(FixedDirections::Normal) => {
-            let normal = facet_normal(&mesh.facet_corners(facet));
-            let size = norm(&normal);
-            let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);
-            let Some(axis) = along else {
-                return Err(Error::Refused(format!(
-                    "support on \"{boundary}\": fix = \"normal\" on a boundary that is not perpendicular to an axis is not \
-                     available yet (a facet there has the normal {:?}); fix components instead",
-                    normal.map(|x| x / size)
-                )));
-            };
-            out[axis] = true;
+            for nodes in mesh.sub_facets(facet) {
+                let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
+                let size = norm(&normal);
+                let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);
+                let Some(axis) = along else {
+                    return Err(Error::Refused(format!(
+                        "support on \"{boundary}\": fix = \"normal\" on a boundary that is not perpendicular to an axis is not \
+                         available yet (a facet there has the normal {:?}); fix components instead",
+                        normal.map(|x| x / size)
+                    )));
+                };
+                out[axis] = true;
+            }
         }
     }
     Ok(out)
@@ -47,7 +49,7 @@ pub fn fixed_components<const D: usize>(
                 for &facet in &boundary.facets {
                     match fixed_axes(fix, mesh, &boundary.name, facet) {
                         Ok(axes) => {
-                            for node in mesh.facets[facet as usize] {
+                            for node in mesh.sub_facets(facet).flatten() {
                                 for axis in (0..D).filter(|&axis| axes[axis]) {
                                     values[node as usize * D + axis] = 1.0;
                                 }

@@ -1,11 +1,11 @@
 use crate::laws::material::Tangent;
 
-/// The part of the Jacobian of an implicit step that the constant matrix does not contain: for cells that flow or are damaged, the
+/// The part of the Jacobian of an implicit step that the constant matrix does not contain: for points of cells that flow or are damaged, the
 /// derivative of the stress by the strain rate beyond that of elasticity, in Pa s; for nodes with adhesion or contact memory, the
 /// derivative of minus the force by the velocity, in N s/m.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tangents {
-    cells: Vec<u32>,
+    points: Vec<u32>,
     values: Vec<f64>,
     nodes: Vec<u32>,
     nodal: Vec<f64>,
@@ -13,32 +13,32 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// Removes all cells and nodes, and reserves room for so many cells; the system provides the memory when it is written.
-    pub fn restart<const S: usize>(&mut self, cells: usize) {
+    /// Removes all points and nodes, and reserves room for so many points of cells; the system provides the memory when it is written.
+    pub fn restart<const S: usize>(&mut self, points: usize) {
         self.skew = false;
         self.nodes.clear();
         self.nodal.clear();
-        self.cells.clear();
-        self.cells.reserve(cells);
+        self.points.clear();
+        self.points.reserve(points);
         self.values.clear();
-        self.values.reserve(cells * S * S);
+        self.values.reserve(points * S * S);
     }
 
-    /// Adds the matrix of a cell by its local number; `symmetric` is whether it is symmetric, if
+    /// Adds the matrix of a point by its number, see [`Geometry::point`](crate::fem::space::Geometry::point); `symmetric` is whether it is symmetric, if
     /// [`FlowProperties::has_symmetric_tangent`](super::FlowProperties::has_symmetric_tangent) says so of its effect.
-    pub(super) fn push<const S: usize>(&mut self, cell: usize, tangent: &Tangent<S>, symmetric: bool) {
+    pub(super) fn push<const S: usize>(&mut self, point: usize, tangent: &Tangent<S>, symmetric: bool) {
         self.skew |= !symmetric;
-        self.cells.push(cell as u32);
+        self.points.push(point as u32);
         self.values.extend_from_slice(tangent.as_flattened());
     }
 
-    /// The matrix of a cell, inserted as zero if it is absent, and whether it was present: for effects that change the stress of
+    /// The matrix of a point, inserted as zero if it is absent, and whether it was present: for effects that change the stress of
     /// others.
-    pub(super) fn entry<const S: usize>(&mut self, cell: usize) -> (&mut [f64], bool) {
-        // Cells come in their order.
-        let found = self.cells.binary_search(&(cell as u32));
+    pub(super) fn entry<const S: usize>(&mut self, point: usize) -> (&mut [f64], bool) {
+        // Points come in their order.
+        let found = self.points.binary_search(&(point as u32));
         let at = found.unwrap_or_else(|at| {
-            self.cells.insert(at, cell as u32);
+            self.points.insert(at, point as u32);
             self.values.splice(at * S * S..at * S * S, std::iter::repeat_n(0.0, S * S));
             at
         });
@@ -68,13 +68,13 @@ impl Tangents {
         }
     }
 
-    /// Whether the matrices of all cells and nodes are symmetric.
+    /// Whether the matrices of all points and nodes are symmetric.
     pub fn are_symmetric(&self) -> bool {
         !self.skew
     }
 
-    /// Cells and their matrices, row by row.
+    /// Points and their matrices, row by row.
     pub fn iter<const S: usize>(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        self.cells.iter().map(|&cell| cell as usize).zip(self.values.chunks_exact(S * S))
+        self.points.iter().map(|&point| point as usize).zip(self.values.chunks_exact(S * S))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{isotropic, mass};
 use crate::{
-    fem::space::{Batch, CellMatrix, Simplex},
+    fem::space::{Batch, Cell, CellMatrix},
     laws::material::{ByMaterial, Isotropic},
 };
 
@@ -89,7 +89,7 @@ impl Term<'_> {
     pub fn add_matrix<const D: usize>(
         &self,
         material: usize,
-        cell: &Simplex<D>,
+        cell: Cell<'_, D>,
         length: f64,
         matrix: &mut CellMatrix<D>,
     ) {
@@ -110,5 +110,68 @@ impl Term<'_> {
         } else if let Some(tensor) = self.tensor(batch.material) {
             isotropic::add_stresses(&tensor, -1.0, &batch.strain_rate, &batch.integrity, &mut batch.stress);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        fem::space::{
+            Geometry, Needs, Nodal,
+            samples::{number, quadratic, row},
+        },
+        mesh::Mesh,
+    };
+
+    /// The matrix of cells times a velocity is the force of the same term.
+    fn check<const D: usize, const S: usize>(mesh: &Mesh<D>, what: &str) {
+        let geometry = Geometry::new(mesh);
+        let v: Vec<f64> = (0..mesh.nodes.len() * D).map(number).collect();
+        let density = ByMaterial::uniform(1.7);
+        let tensor = ByMaterial::uniform(Isotropic { volumetric: 7.0, shear: 3.0 });
+        for (term, size) in [(Term::Mass(&density), 0), (Term::Viscosity(&tensor), 1)] {
+            let (mut found, mut expected) = (vec![0.0; v.len()], vec![0.0; v.len()]);
+            let mut matrix = CellMatrix::new(mesh);
+            for (number, cell) in geometry.cells().enumerate() {
+                matrix.clear();
+                term.add_matrix(0, cell, 1.0, &mut matrix);
+                for (a, row) in mesh.cell_nodes(number).enumerate() {
+                    for (b, column) in mesh.cell_nodes(number).enumerate() {
+                        for i in 0..D {
+                            for j in 0..D {
+                                found[row as usize * D + i] +=
+                                    matrix.blocks[a][b][i][j] * v[column as usize * D + j];
+                            }
+                        }
+                    }
+                }
+            }
+            let needs = Needs { strain_rate: true, velocity: true, ..Needs::default() };
+            let mut square = 0.0;
+            Batch::<D, S>::for_all(mesh, &geometry, Nodal::all(&v), needs, |batch| {
+                square += mass::square(1.7, batch, &batch.velocity);
+                term.add_force(batch);
+                batch.scatter(mesh, &mut expected);
+            });
+            let most = expected.iter().fold(0.0, |most: f64, force| most.max(force.abs()));
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found - expected).abs() < 1e-12 * most, "{what} {size}: {found} {expected}");
+            }
+            if size == 0 {
+                let product: f64 = expected.iter().zip(&v).map(|(f, v)| f * v).sum();
+                assert!((product - square).abs() < 1e-12 * square.abs(), "{what}: {product} {square}");
+            }
+        }
+    }
+
+    #[test]
+    fn matrices_of_cells_are_the_derivatives_of_their_forces() {
+        check::<2, 4>(&row(), "linear triangles");
+        check::<3, 6>(&row(), "linear tetrahedra");
+        check::<2, 4>(&quadratic(row(), 0.0), "triangles");
+        check::<3, 6>(&quadratic(row(), 0.0), "tetrahedra");
+        check::<2, 4>(&quadratic(row(), 0.03), "curved triangles");
+        check::<3, 6>(&quadratic(row(), 0.03), "curved tetrahedra");
     }
 }

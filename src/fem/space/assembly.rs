@@ -1,6 +1,10 @@
 //! Assembly of the constant matrix from cell matrices into the rows each rank owns.
 
-use super::{Geometry, Simplex};
+use super::{
+    Cell, CellShape, Geometry, Simplex,
+    quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, values},
+    quadrature::{CellRule, cell_rule, fine_cell_rule},
+};
 use crate::{
     error::Result,
     linear_algebra::petsc::BlockRows,
@@ -8,28 +12,90 @@ use crate::{
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
 
-/// Blocks `[a][b][i][j]` coupling component `i` of local node `a` with component `j` of local node `b`.
+/// A block that couples two nodes: `[i][j]` component `i` of one with component `j` of the other.
+type Block<const D: usize> = [[f64; D]; D];
+
+/// The matrix of a cell: blocks `[a][b]` of its local nodes.
 pub struct CellMatrix<const D: usize> {
-    /// The blocks; `D + 1` nodes are used.
-    pub blocks: [[[[f64; D]; D]; 4]; 4],
+    /// The blocks of [`CellMatrix::nodes`] nodes.
+    pub blocks: [[Block<D>; MOST_NODES]; MOST_NODES],
+    nodes: usize,
+    /// Integrals over quadratic cells with straight sides, of volume 1, and their integrands at the points.
+    products: Vec<Product>,
+    products_at: Vec<Vec<Product>>,
+}
+
+/// The product of the derivatives of the functions of two nodes by two barycentric coordinates, or its integral.
+#[derive(Debug, Clone, Copy)]
+struct Product {
+    nodes: [u8; 2],
+    coordinates: [u8; 2],
+    value: f64,
+}
+
+/// The products that do not vanish, integrated over a cell of volume 1.
+fn products<const D: usize>(rule: CellRule) -> Vec<Product> {
+    let mut out = Vec::new();
+    let all = |n: usize, m: usize| (0..n).flat_map(move |a| (0..m).map(move |b| [a, b]));
+    for [a, b] in all(node_count::<D>(), node_count::<D>()) {
+        for [c, d] in all(D + 1, D + 1) {
+            let at = |(place, weight): &([f64; 4], f64)| {
+                weight * derivatives(D + 1, a, place)[c] * derivatives(D + 1, b, place)[d]
+            };
+            let value: f64 = rule.iter().map(at).sum();
+            if value != 0.0 {
+                let small = |pair: [usize; 2]| pair.map(|n| n as u8);
+                out.push(Product { nodes: small([a, b]), coordinates: small([c, d]), value });
+            }
+        }
+    }
+    out
 }
 
 impl<const D: usize> CellMatrix<D> {
+    /// Zero, for cells with the nodes of those of the mesh.
+    pub fn new(mesh: &Mesh<D>) -> Self {
+        let is_linear = mesh.order() == 1;
+        let (nodes, points) =
+            if is_linear { (D + 1, 0) } else { (node_count::<D>(), cell_rule::<D>().len()) };
+        let one = |point: usize| {
+            let (rule, scale) = (&cell_rule::<D>()[point..=point], points as f64);
+            let unweighted = |product: Product| Product { value: scale * product.value, ..product };
+            products::<D>(rule).into_iter().map(unweighted).collect()
+        };
+        Self {
+            blocks: [[[[0.0; D]; D]; _]; _],
+            nodes,
+            products: if is_linear { Vec::new() } else { products::<D>(cell_rule::<D>()) },
+            products_at: (0..points).map(one).collect(),
+        }
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// Sets the blocks to zero.
+    pub fn clear(&mut self) {
+        let nodes = self.nodes;
+        self.blocks[..nodes].iter_mut().for_each(|row| row[..nodes].fill([[0.0; D]; D]));
+    }
+
     /// Adds `integral of e(w) : T(e(v))` with `T` isotropic.
     #[inline]
-    pub fn add_isotropic(&mut self, cell: &Simplex<D>, volumetric: f64, shear: f64) {
-        for a in 0..=D {
-            let ga = cell.gradient(a);
-            for b in 0..=D {
-                let gb = cell.gradient(b);
-                let inner = 0.5 * shear * crate::linear_algebra::tensor::dot(&ga, &gb);
-                let block = &mut self.blocks[a][b];
-                for i in 0..D {
-                    for j in 0..D {
-                        block[i][j] +=
-                            cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
-                    }
-                    block[i][i] += cell.volume * inner;
+    pub fn add_isotropic(&mut self, cell: Cell<'_, D>, volumetric: f64, shear: f64) {
+        let linear = |cell: &Simplex<D>| {
+            let mut blocks = [[[[0.0; D]; D]; 4]; 4];
+            add_linear(&mut blocks, cell, volumetric, shear);
+            blocks
+        };
+        match cell.shape() {
+            CellShape::Linear => add_linear(&mut self.blocks, &cell.point(0), volumetric, shear),
+            CellShape::Straight => add_products(&mut self.blocks, &self.products, &linear(&cell.whole())),
+            CellShape::Curved(_) => {
+                for (point, products) in self.products_at.iter().enumerate() {
+                    add_products(&mut self.blocks, products, &linear(&cell.point(point)));
                 }
             }
         }
@@ -37,14 +103,75 @@ impl<const D: usize> CellMatrix<D> {
 
     /// Adds `factor * integral of w . v`, consistent.
     #[inline]
-    pub fn add_mass(&mut self, cell: &Simplex<D>, factor: f64) {
-        let off = factor * cell.volume / ((D + 1) * (D + 2)) as f64;
-        for a in 0..=D {
-            for b in 0..=D {
-                let value = if a == b { 2.0 * off } else { off };
+    pub fn add_mass(&mut self, cell: Cell<'_, D>, factor: f64) {
+        match cell.shape() {
+            CellShape::Linear => {
+                let off = factor * cell.point(0).volume / ((D + 1) * (D + 2)) as f64;
+                self.add_scalar(|a, b| if a == b { 2.0 * off } else { off });
+            }
+            CellShape::Straight => {
+                let (form, size) = (MassCoefficients::of::<D>(), factor * cell.whole().volume);
+                self.add_scalar(|a, b| size * form.entry::<D>(a, b));
+            }
+            CellShape::Curved(weights) => {
+                for ((place, _), weights) in fine_cell_rule::<D>().iter().zip(weights) {
+                    let (all, size) = (values(D + 1, place), factor * weights[cell.lane()]);
+                    self.add_scalar(|a, b| size * all[a] * all[b]);
+                }
+            }
+        }
+    }
+
+    /// Adds multiples of the identity to the blocks.
+    #[inline(always)]
+    fn add_scalar(&mut self, entry: impl Fn(usize, usize) -> f64) {
+        for a in 0..self.nodes {
+            for b in 0..self.nodes {
+                let value = entry(a, b);
                 for i in 0..D {
                     self.blocks[a][b][i][i] += value;
                 }
+            }
+        }
+    }
+}
+
+/// Adds the matrix of a linear cell.
+#[inline(always)]
+fn add_linear<const D: usize, const N: usize>(
+    blocks: &mut [[Block<D>; N]; N],
+    cell: &Simplex<D>,
+    volumetric: f64,
+    shear: f64,
+) {
+    for a in 0..=D {
+        let ga = cell.gradient(a);
+        for b in 0..=D {
+            let gb = cell.gradient(b);
+            let inner = 0.5 * shear * crate::linear_algebra::tensor::dot(&ga, &gb);
+            let block = &mut blocks[a][b];
+            for i in 0..D {
+                for j in 0..D {
+                    block[i][j] += cell.volume * (volumetric * ga[i] * gb[j] + 0.5 * shear * ga[j] * gb[i]);
+                }
+                block[i][i] += cell.volume * inner;
+            }
+        }
+    }
+}
+
+/// Adds the matrix of a quadratic cell, given that of the linear one.
+fn add_products<const D: usize>(
+    blocks: &mut [[Block<D>; MOST_NODES]; MOST_NODES],
+    products: &[Product],
+    linear: &[[Block<D>; 4]; 4],
+) {
+    for Product { nodes: [a, b], coordinates: [c, d], value } in products {
+        let (block, linear) =
+            (&mut blocks[usize::from(*a)][usize::from(*b)], &linear[usize::from(*c)][usize::from(*d)]);
+        for i in 0..D {
+            for j in 0..D {
+                block[i][j] += value * linear[i][j];
             }
         }
     }
@@ -59,13 +186,16 @@ pub fn assemble<const D: usize>(
     mesh: &Mesh<D>,
     geometry: &Geometry<D>,
     fixed: &[bool],
-    mut fill: impl FnMut(usize, &Simplex<D>, &mut CellMatrix<D>),
+    mut fill: impl FnMut(usize, Cell<'_, D>, &mut CellMatrix<D>),
 ) -> Result<BlockRows, Agreed> {
     let mut rows = LocalRows::pattern(mesh);
-    for (number, cell) in geometry.iter().enumerate() {
-        let mut matrix = CellMatrix { blocks: [[[[0.0; D]; D]; 4]; 4] };
-        fill(number, &cell, &mut matrix);
-        let nodes = mesh.cell(number);
+    let mut matrix = CellMatrix::new(mesh);
+    let mut nodes = Vec::with_capacity(matrix.nodes());
+    for (number, cell) in geometry.cells().enumerate() {
+        matrix.clear();
+        fill(number, cell, &mut matrix);
+        nodes.clear();
+        nodes.extend(mesh.cell_nodes(number));
         for (a, &row) in nodes.iter().enumerate() {
             for (b, &column) in nodes.iter().enumerate() {
                 let target = rows.block::<D>(row, column);
@@ -93,18 +223,22 @@ struct LocalRows {
 impl LocalRows {
     fn pattern<const D: usize>(mesh: &Mesh<D>) -> Self {
         let mut starts = vec![0usize; mesh.nodes.len() + 1];
-        for &node in &mesh.cells {
+        for &node in mesh.cells.iter().chain(&mesh.midsides) {
             starts[node as usize + 1] += 1;
         }
         for node in 0..mesh.nodes.len() {
             starts[node + 1] += starts[node];
         }
-        let mut around = vec![0u32; mesh.cells.len()];
+        let mut around = vec![0u32; mesh.cells.len() + mesh.midsides.len()];
         let mut next = starts.clone();
-        for (at, &node) in mesh.cells.iter().enumerate() {
-            around[next[node as usize]] = (at / (D + 1)) as u32;
-            next[node as usize] += 1;
-        }
+        let mut put = |nodes: &[u32], count: usize| {
+            for (at, &node) in nodes.iter().enumerate() {
+                around[next[node as usize]] = (at / count) as u32;
+                next[node as usize] += 1;
+            }
+        };
+        put(&mesh.cells, D + 1);
+        put(&mesh.midsides, D * (D + 1) / 2);
         drop(next);
         let mut offsets = Vec::with_capacity(mesh.nodes.len() + 1);
         let mut columns = Vec::with_capacity(mesh.nodes.len() * (1 << (D + 1)));
@@ -114,6 +248,7 @@ impl LocalRows {
             row.clear();
             for &cell in &around[range[0]..range[1]] {
                 row.extend_from_slice(mesh.cell(cell as usize));
+                row.extend_from_slice(mesh.cell_midsides(cell as usize));
             }
             row.sort_unstable();
             row.dedup();

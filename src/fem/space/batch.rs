@@ -1,8 +1,12 @@
 //! Passes over cells, a pack of them at a time: gather nodal values, let the effects work, scatter forces.
 //!
-//! A batch is a pack of cells of one material, so that an effect looks up its law once per batch.
+//! A batch is a pack of cells of one material, so that an effect looks up its law once per batch. Quadratic cells are visited once for
+//! each of their points: a batch then holds one point of each of its cells, and what effects call a cell is such a point.
 
-use super::{Geometry, SimplexPack, kernels, kernels::Corners};
+use super::{
+    CellShape, Geometry, SimplexPack, kernels, kernels::NodalPacks, quadratic::node_count,
+    quadrature::cell_rule,
+};
 use crate::{
     linear_algebra::{
         simd::{LANES, Pack, sum},
@@ -90,15 +94,21 @@ impl Integrity {
 /// ([`Pack::ABSENT`]). A pass keeps its batch on the stack.
 #[derive(Debug)]
 pub struct Batch<'g, const D: usize, const S: usize> {
-    /// Position among the packs of the geometry.
+    /// Position among all batches of a pass.
     pub number: usize,
     /// Position among the body's materials.
     pub material: usize,
     /// Local number of the first cell.
-    pub first: usize,
+    pub first_cell: usize,
     /// Number of cells.
     pub count: usize,
-    /// Geometry of the cells of the batch.
+    /// The point of each of these cells.
+    pub point: usize,
+    /// Number of the point of the first cell among all points of this rank; those of the other cells follow.
+    pub first_point: usize,
+    /// Shape of the cells of the batch.
+    pub shape: CellShape<'g>,
+    /// Geometry of the cells of the batch; volumes are the weights of the point.
     pub cells: &'g SimplexPack<D>,
     /// Strain of the displacement.
     pub strain: Pack<S>,
@@ -107,9 +117,9 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     /// Strain of the velocity in 1/s.
     pub strain_rate: Pack<S>,
     /// Velocity at the nodes of cells.
-    pub velocity: Corners<D>,
+    pub velocity: NodalPacks<D>,
     /// Change of the velocity over the last step at the nodes of cells.
-    pub velocity_change: Corners<D>,
+    pub velocity_change: NodalPacks<D>,
     /// Elastic stress `E e(u) + H` in Pa before anything weakens it; effects add to it.
     pub elastic_stress: Pack<S>,
     /// Elastic stress in Pa before the step; present in the energy balance of an implicit step.
@@ -119,13 +129,16 @@ pub struct Batch<'g, const D: usize, const S: usize> {
     /// Output: stress in Pa.
     pub stress: Pack<S>,
     /// Output: force in N on the nodes of cells.
-    pub force: Corners<D>,
-    /// Nodal values from which only strains are computed.
-    corners: [Corners<D>; 2],
+    pub force: NodalPacks<D>,
+    /// Nodal values from which only strains are computed: displacement, velocity, displacement before the step.
+    nodal: [NodalPacks<D>; 3],
+    /// Whether there are forces at points before this one that have not been added to those of nodes.
+    holds_forces: bool,
 }
 
 impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
-    /// Visits all cells of the mesh in batches with the outputs zero; `visit` may read them afterwards.
+    /// Visits all points of the cells of the mesh in batches with the outputs zero; `visit` may read them afterwards. Forces on nodes
+    /// are zero at the first point of cells, and kept for the others.
     pub fn for_all(
         mesh: &Mesh<D>,
         geometry: &'g Geometry<D>,
@@ -133,10 +146,10 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         needs: Needs,
         visit: impl FnMut(&mut Self),
     ) {
-        Self::for_each(0..geometry.packs.len(), (mesh, geometry), nodal, needs, visit);
+        Self::for_each(0..geometry.runs.len(), (mesh, geometry), nodal, needs, visit);
     }
 
-    /// Visits the packs of cells with these numbers in the same way.
+    /// Visits the runs of cells with these numbers in the same way.
     pub fn for_each(
         numbers: impl Iterator<Item = usize>,
         (mesh, geometry): (&Mesh<D>, &'g Geometry<D>),
@@ -148,35 +161,56 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         let mut batch = Self {
             number: 0,
             material: 0,
-            first: 0,
+            first_cell: 0,
             count: 0,
+            point: 0,
+            first_point: 0,
+            shape: CellShape::Linear,
             cells: first,
             strain: Pack::ABSENT,
             strain_before: Pack::ABSENT,
             strain_rate: Pack::ABSENT,
-            velocity: [Pack::ABSENT; 4],
-            velocity_change: [Pack::ABSENT; 4],
+            velocity: [Pack::ABSENT; _],
+            velocity_change: [Pack::ABSENT; _],
             elastic_stress: Pack::ABSENT,
             elastic_stress_before: Pack::ABSENT,
             integrity: Integrity::default(),
             stress: Pack::ZERO,
-            force: [Pack::ZERO; 4],
-            corners: [[Pack::ZERO; 4]; 2],
+            force: [Pack::ZERO; _],
+            nodal: [[Pack::ZERO; _]; 3],
+            holds_forces: false,
         };
+        let points = geometry.points();
         for number in numbers {
-            let (run, cells) = (&geometry.runs[number], &geometry.packs[number]);
-            (batch.number, batch.material) = (number, run.material);
-            (batch.first, batch.count) = (run.first, run.count);
-            batch.cells = cells;
-            batch.integrity = Integrity::default();
-            gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
-            visit(&mut batch);
+            let run = &geometry.runs[number];
+            batch.material = run.material;
+            (batch.first_cell, batch.count) = (run.first, run.count);
+            batch.shape = geometry.shape(number);
+            for point in 0..points {
+                (batch.number, batch.point) = (number * points + point, point);
+                batch.first_point = run.first * points + point * run.count;
+                batch.cells = geometry.pack(number, point);
+                batch.integrity = Integrity::default();
+                if points == 1 {
+                    gather(&mut batch, mesh, nodal, needs, geometry.packs.get(number + 1));
+                } else {
+                    gather_at_point(&mut batch, mesh, nodal, needs);
+                }
+                visit(&mut batch);
+            }
         }
     }
 
     #[inline(always)]
     fn nodes<'m>(&self, mesh: &'m Mesh<D>) -> &'m [u32] {
-        &mesh.cells[self.first * (D + 1)..(self.first + self.count) * (D + 1)]
+        &mesh.cells[self.first_cell * (D + 1)..(self.first_cell + self.count) * (D + 1)]
+    }
+
+    /// Local nodes on the edges of the cells.
+    #[inline(always)]
+    fn midsides<'m>(&self, mesh: &'m Mesh<D>) -> &'m [u32] {
+        let count = D * (D + 1) / 2;
+        &mesh.midsides[self.first_cell * count..(self.first_cell + self.count) * count]
     }
 
     /// The sum over the cells of the squares of the forces of their stress outputs beyond `before`, as far as the gradients of the nodes
@@ -185,9 +219,24 @@ impl<'g, const D: usize, const S: usize> Batch<'g, D, S> {
         square_of_forces(self.cells, before, &self.stress)
     }
 
-    /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts).
+    /// Adds the force outputs and the divergence of the stress outputs to nodal forces (`D` a node, with ghosts). Once called at a
+    /// point of cells, it must be called at their last one, see [`Batch::holds_forces`].
     pub fn scatter(&mut self, mesh: &Mesh<D>, forces: &mut [f64]) {
-        scatter(self, self.nodes(mesh), forces);
+        match self.shape {
+            CellShape::Linear => scatter(self, self.nodes(mesh), forces),
+            _ => {
+                add_forces_at_point(self);
+                self.holds_forces = self.point + 1 < cell_rule::<D>().len();
+                if !self.holds_forces {
+                    scatter_all(self, mesh, forces);
+                }
+            }
+        }
+    }
+
+    /// Whether forces at points before this one have not been added to those of nodes.
+    pub fn holds_forces(&self) -> bool {
+        self.holds_forces
     }
 }
 
@@ -201,26 +250,26 @@ fn gather<const D: usize, const S: usize>(
     next: Option<&SimplexPack<D>>,
 ) {
     let (nodes, cells) = (batch.nodes(mesh), batch.cells);
-    let [displacement, velocity] = &mut batch.corners;
+    let [displacement, velocity, _] = &mut batch.nodal;
     let velocity = if needs.velocity { &mut batch.velocity } else { velocity };
     if needs.strain {
-        kernels::gather(nodes, nodal.displacement.as_chunks().0, displacement);
+        kernels::gather(D + 1, nodes, nodal.displacement.as_chunks().0, displacement);
     }
     if let Some(next) = next {
         next.prefetch();
     }
     if needs.strain_rate || needs.velocity || needs.velocity_change {
-        kernels::gather(nodes, nodal.velocity.as_chunks().0, velocity);
+        kernels::gather(D + 1, nodes, nodal.velocity.as_chunks().0, velocity);
     }
     if needs.velocity_change {
-        kernels::gather(nodes, nodal.previous_velocity.as_chunks().0, &mut batch.velocity_change);
+        kernels::gather(D + 1, nodes, nodal.previous_velocity.as_chunks().0, &mut batch.velocity_change);
     }
     // Only now: what was stored number by number is not read back at once.
     if needs.strain {
-        batch.strain = kernels::strains(cells, displacement);
+        batch.strain = kernels::strains(cells, &displacement[..]);
     }
     if needs.strain_rate {
-        batch.strain_rate = kernels::strains(cells, velocity);
+        batch.strain_rate = kernels::strains(cells, &velocity[..]);
     }
     if needs.velocity_change {
         for (change, velocity) in batch.velocity_change.iter_mut().zip(&*velocity).take(D + 1) {
@@ -228,8 +277,8 @@ fn gather<const D: usize, const S: usize>(
         }
     }
     if needs.strain_before {
-        kernels::gather(nodes, nodal.previous_displacement.as_chunks().0, displacement);
-        batch.strain_before = kernels::strains(cells, displacement);
+        kernels::gather(D + 1, nodes, nodal.previous_displacement.as_chunks().0, displacement);
+        batch.strain_before = kernels::strains(cells, &displacement[..]);
     }
     if needs.elastic_stress {
         batch.elastic_stress = Pack::ZERO;
@@ -263,13 +312,87 @@ fn square_of_forces<const D: usize, const S: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn scatter<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>, nodes: &[u32], forces: &mut [f64]) {
     kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
-    kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
+    kernels::scatter(D + 1, nodes, &batch.force, forces.as_chunks_mut().0);
+}
+
+/// What [`gather`] does, for one point of quadratic cells; nodal values are gathered at their first point.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn gather_at_point<const D: usize, const S: usize>(
+    batch: &mut Batch<'_, D, S>,
+    mesh: &Mesh<D>,
+    nodal: Nodal<'_>,
+    needs: Needs,
+) {
+    let (corners, midsides) = (batch.nodes(mesh), batch.midsides(mesh));
+    let gather = |values: &[f64], packs: &mut NodalPacks<D>| {
+        let values = values.as_chunks().0;
+        kernels::gather(D + 1, corners, values, packs);
+        kernels::gather(D * (D + 1) / 2, midsides, values, &mut packs[D + 1..]);
+    };
+    let [displacement, velocity, before] = &mut batch.nodal;
+    let velocity = if needs.velocity { &mut batch.velocity } else { velocity };
+    if batch.point == 0 {
+        if needs.strain {
+            gather(nodal.displacement, displacement);
+        }
+        if needs.strain_before {
+            gather(nodal.previous_displacement, before);
+        }
+        if needs.strain_rate || needs.velocity || needs.velocity_change {
+            gather(nodal.velocity, velocity);
+        }
+        if needs.velocity_change {
+            gather(nodal.previous_velocity, &mut batch.velocity_change);
+            for (change, velocity) in batch.velocity_change.iter_mut().zip(&*velocity).take(node_count::<D>())
+            {
+                *change = Pack::from_lanes(|lane| add_scaled(&velocity.lane(lane), -1.0, &change.lane(lane)));
+            }
+        }
+        batch.force.fill(Pack::ZERO);
+    }
+    let (place, _) = &cell_rule::<D>()[batch.point];
+    if needs.strain {
+        batch.strain = kernels::strains(batch.cells, &kernels::linear_at(place, displacement));
+    }
+    if needs.strain_before {
+        batch.strain_before = kernels::strains(batch.cells, &kernels::linear_at(place, before));
+    }
+    if needs.strain_rate {
+        batch.strain_rate = kernels::strains(batch.cells, &kernels::linear_at(place, velocity));
+    }
+    if needs.elastic_stress {
+        batch.elastic_stress = Pack::ZERO;
+    }
+    batch.stress = Pack::ZERO;
+}
+
+/// Adds the divergence of the stress at a point of quadratic cells to the forces on their nodes.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_forces_at_point<const D: usize, const S: usize>(batch: &mut Batch<'_, D, S>) {
+    let mut corners = [Pack::ZERO; 4];
+    kernels::add_divergence(batch.cells, &batch.stress, &mut corners);
+    kernels::add_nodal_forces(&cell_rule::<D>()[batch.point].0, &corners, &mut batch.force);
+}
+
+/// Adds the forces on the nodes of quadratic cells to those of the body.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn scatter_all<const D: usize, const S: usize>(
+    batch: &mut Batch<'_, D, S>,
+    mesh: &Mesh<D>,
+    forces: &mut [f64],
+) {
+    let forces = forces.as_chunks_mut().0;
+    kernels::scatter(D + 1, batch.nodes(mesh), &batch.force, forces);
+    kernels::scatter(D * (D + 1) / 2, batch.midsides(mesh), &batch.force[D + 1..], forces);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::space::samples::{number, row};
+    use crate::fem::space::{
+        quadratic::linear_at,
+        samples::{number, quadratic, row},
+    };
     use crate::linear_algebra::tensor::{Mandel, Vector, apply, symmetric_part};
 
     fn close<const N: usize>(found: [f64; N], expected: [f64; N]) {
@@ -310,7 +433,7 @@ mod tests {
         let mut visited = 0;
         Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
             for lane in 0..batch.count {
-                let number_of_cell = batch.first + lane;
+                let number_of_cell = batch.first_cell + lane;
                 let (cell, nodes) = (geometry.cell(number_of_cell), mesh.cell(number_of_cell));
                 let of = |all: &[f64]| -> Vec<Vector<D>> {
                     nodes.iter().map(|&n| std::array::from_fn(|i| all[n as usize * D + i])).collect()
@@ -369,16 +492,16 @@ mod tests {
         let (mut strains, mut forces) = (Vec::new(), vec![0.0; u.len()]);
         Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
             for lane in 0..batch.count {
-                batch.stress.set(lane, stress_of(batch.first + lane));
-                (0..=D).for_each(|a| batch.force[a].set(lane, force_of(batch.first + lane, a)));
+                batch.stress.set(lane, stress_of(batch.first_cell + lane));
+                (0..=D).for_each(|a| batch.force[a].set(lane, force_of(batch.first_cell + lane, a)));
             }
             let mut strain = batch.strain;
             if portable {
                 let (nodes, mut corners) = (batch.nodes(&mesh), [Pack::ZERO; 4]);
-                kernels::gather(nodes, u.as_chunks().0, &mut corners);
+                kernels::gather(D + 1, nodes, u.as_chunks().0, &mut corners);
                 strain = kernels::strains(batch.cells, &corners);
                 kernels::add_divergence(batch.cells, &batch.stress, &mut batch.force);
-                kernels::scatter(nodes, &batch.force, forces.as_chunks_mut().0);
+                kernels::scatter(D + 1, nodes, &batch.force, forces.as_chunks_mut().0);
             } else {
                 batch.scatter(&mesh, &mut forces);
             }
@@ -398,6 +521,99 @@ mod tests {
         check_bits::<2, 3>();
         check_bits::<2, 4>();
         check_bits::<3, 6>();
+    }
+
+    /// Strains of a quadratic field are exact at points where sides are straight, those of a linear field also where they are
+    /// curved; and the power of the forces of any stress is minus the integral of stress times strain rate.
+    fn check_quadratic<const D: usize, const S: usize>(bend: f64) {
+        let mesh = quadratic(row::<D>(), bend);
+        let geometry = Geometry::with_materials(&mesh, |region| region);
+        let second = if bend == 0.0 { 0.3 } else { 0.0 };
+        let field = |x: &Vector<D>| -> Vector<D> {
+            std::array::from_fn(|i| {
+                let linear: f64 = (0..D).map(|j| number(5 * i + j) * x[j]).sum();
+                linear + second * x[i] * x[(i + 1) % D] - second * x[(i + 1) % D].powi(2)
+            })
+        };
+        let gradient = |x: &Vector<D>| -> [[f64; D]; D] {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let next = (i + 1) % D;
+                    let mut slope = number(5 * i + j);
+                    slope += if j == i { second * x[next] } else { 0.0 };
+                    slope + if j == next { second * (x[i] - 2.0 * x[next]) } else { 0.0 }
+                })
+            })
+        };
+        let u: Vec<f64> = mesh.nodes.iter().flat_map(field).collect();
+        let v: Vec<f64> = (0..u.len()).map(number).collect();
+        let nodal =
+            Nodal { displacement: &u, previous_displacement: &u, velocity: &v, previous_velocity: &u };
+        let (mut forces, mut power, mut visited) = (vec![0.0; u.len()], 0.0, 0);
+        Batch::<D, S>::for_all(&mesh, &geometry, nodal, ALL, |batch| {
+            for lane in 0..batch.count {
+                let cell = batch.first_cell + lane;
+                let nodes: Vec<Vector<D>> = mesh.cell_nodes(cell).map(|n| mesh.nodes[n as usize]).collect();
+                let shares = crate::fem::space::values(D + 1, &cell_rule::<D>()[batch.point].0);
+                let place =
+                    nodes.iter().zip(shares).fold([0.0; D], |sum, (x, share)| add_scaled(&sum, share, x));
+                let expected: Mandel<S> = symmetric_part(&gradient(&place));
+                for (found, expected) in batch.strain.lane(lane).into_iter().zip(expected) {
+                    assert!((found - expected).abs() < 1e-10 * (1.0 + expected.abs()), "{found} {expected}");
+                }
+                assert_eq!(batch.strain_before.lane(lane), batch.strain.lane(lane));
+                let number_of_point = batch.first_point + lane;
+                assert_eq!(geometry.point(number_of_point), (cell, batch.point, batch.cells.simplex(lane)),);
+                let stress = stress_of(number_of_point);
+                batch.stress.set(lane, stress);
+                let rate = batch.strain_rate.lane(lane);
+                let product: f64 = stress.iter().zip(rate).map(|(s, e)| s * e).sum();
+                power -= batch.cells.volume[lane] * product;
+                visited += 1;
+                for (a, node) in mesh.cell_nodes(cell).enumerate() {
+                    let at = node as usize * D;
+                    assert_eq!(batch.velocity[a].lane(lane)[..], v[at..at + D]);
+                    let change: Vec<f64> = (at..at + D).map(|i| v[i] - u[i]).collect();
+                    assert_eq!(batch.velocity_change[a].lane(lane)[..], change);
+                }
+            }
+            assert_eq!(batch.holds_forces(), batch.point > 0);
+            batch.scatter(&mesh, &mut forces);
+        });
+        assert_eq!(visited, geometry.point_count());
+        let work: f64 = forces.iter().zip(&v).map(|(f, v)| f * v).sum();
+        assert!((work - power).abs() < 1e-10 * power.abs().max(1.0), "{work} {power}");
+        assert!(forces.chunks(D).map(|f| f[0]).sum::<f64>().abs() < 1e-9, "no net force");
+    }
+
+    #[test]
+    fn quadratic_cells_are_exact_for_what_they_can_represent() {
+        check_quadratic::<2, 3>(0.0);
+        check_quadratic::<2, 4>(0.02);
+        check_quadratic::<3, 6>(0.0);
+        check_quadratic::<3, 6>(0.02);
+    }
+
+    #[test]
+    fn a_curved_side_adds_two_thirds_of_its_height_times_its_length() {
+        let mut mesh = Mesh::<2> {
+            nodes: vec![[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [2.0, -0.6], [2.0, 1.5], [0.0, 1.5]],
+            cells: vec![0, 1, 2],
+            midsides: vec![3, 4, 5],
+            cell_regions: vec![0],
+            is_curved: true,
+            ..Mesh::default()
+        };
+        let area = |mesh: &Mesh<2>| Geometry::new(mesh).cell(0).volume;
+        assert!((area(&mesh) - (6.0 + 2.0 / 3.0 * 4.0 * 0.6)).abs() < 1e-14);
+        mesh.nodes[3][1] = 0.0;
+        assert!((area(&mesh) - 6.0).abs() < 1e-14);
+        mesh.is_curved = false;
+        let geometry = Geometry::new(&mesh);
+        assert!((geometry.cell(0).volume - 6.0).abs() < 1e-14 && geometry.packs.len() == 1);
+        let corners = linear_at(3, &[0.2, 0.3, 0.5], &mesh.nodes);
+        let edge = add_scaled(&corners[1], -1.0, &corners[0]);
+        close(edge, [4.0, 0.0]);
     }
 
     #[test]

@@ -1,5 +1,12 @@
 //! Volumes and shape function gradients of cells, computed once.
+//!
+//! Stresses live at points: one in a linear cell, several in a quadratic one. A point has the geometry of a linear cell, see
+//! [`super::quadratic`].
 
+use super::{
+    quadratic::linear_at,
+    quadrature::{MOST_POINTS, cell_rule, fine_cell_rule},
+};
 use crate::{
     linear_algebra::{
         simd::{LANES, Pack, prefetch},
@@ -8,10 +15,10 @@ use crate::{
     mesh::{Mesh, shape},
 };
 
-/// One cell: its volume and the gradients of its shape functions.
+/// One linear cell, or a point of a quadratic one: its volume and the gradients of its linear shape functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simplex<const D: usize> {
-    /// Area or volume in m^D.
+    /// Area or volume in m^D; of a point its quadrature weight.
     pub volume: f64,
     /// Gradients in 1/m of the shape functions of the cell's nodes 1 to D; that of node 0 is minus their sum.
     pub gradients: [Vector<D>; D],
@@ -127,10 +134,70 @@ pub struct CellRun {
 /// The cells of a rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry<const D: usize> {
-    /// The pack of each run.
+    /// The pack of each run; where cells are curved, those of each point, run by run.
     pub packs: Vec<SimplexPack<D>>,
     /// All cells in the order of the mesh, split where the material changes: the batches of every pass.
     pub runs: Vec<CellRun>,
+    /// Points in a cell.
+    points: usize,
+    /// Weights of the fine rule in each run; present where cells are curved.
+    fine_weights: Vec<[[f64; LANES]; MOST_POINTS]>,
+}
+
+/// What the integrals of products of shape functions of a pack of cells need.
+#[derive(Debug, Clone, Copy)]
+pub enum CellShape<'g> {
+    /// Linear shape functions.
+    Linear,
+    /// Quadratic shape functions and straight sides.
+    Straight,
+    /// Quadratic shape functions and curved sides: weights in m^D of the points of the fine rule.
+    Curved(&'g [[f64; LANES]; MOST_POINTS]),
+}
+
+/// One cell with all its points.
+#[derive(Debug, Clone, Copy)]
+pub struct Cell<'g, const D: usize> {
+    geometry: &'g Geometry<D>,
+    run: usize,
+    lane: usize,
+}
+
+impl<'g, const D: usize> Cell<'g, D> {
+    /// Its shape, with weights by lane.
+    #[inline(always)]
+    pub fn shape(self) -> CellShape<'g> {
+        self.geometry.shape(self.run)
+    }
+
+    /// Its lane in the weights of its shape.
+    #[inline(always)]
+    pub fn lane(self) -> usize {
+        self.lane
+    }
+
+    /// A point of the cell: its weight, and the gradients there.
+    #[inline(always)]
+    pub fn point(self, point: usize) -> Simplex<D> {
+        self.geometry.pack(self.run, point).simplex(self.lane)
+    }
+
+    /// Number of its points.
+    #[inline(always)]
+    pub fn points(self) -> usize {
+        self.geometry.points
+    }
+
+    /// The whole cell in one: its volume, and the gradients of the linear functions of its corners; of a curved cell those at its
+    /// first point.
+    #[inline(always)]
+    pub fn whole(self) -> Simplex<D> {
+        let first = self.point(0);
+        match self.shape() {
+            CellShape::Linear => first,
+            _ => Simplex { volume: (0..self.points()).map(|q| self.point(q).volume).sum(), ..first },
+        }
+    }
 }
 
 impl<const D: usize> Geometry<D> {
@@ -149,21 +216,91 @@ impl<const D: usize> Geometry<D> {
                 _ => runs.push(CellRun { first: cell, count: 1, material }),
             }
         }
-        let measure = |run: &CellRun| {
+        let points = if mesh.order() == 1 { 1 } else { cell_rule::<D>().len() };
+        let share = 1.0 / points as f64;
+        let pack_of = |run: &CellRun, simplex: &dyn Fn(usize) -> Simplex<D>| {
             let mut pack = SimplexPack::EMPTY;
-            for lane in 0..run.count {
-                pack.set(lane, &Simplex::new(&mesh.corners(run.first + lane)[..=D]));
-            }
+            (0..run.count).for_each(|lane| pack.set(lane, &simplex(run.first + lane)));
             pack
         };
-        Self { packs: runs.iter().map(measure).collect(), runs }
+        if !mesh.is_curved {
+            let simplex = |cell: usize| {
+                let whole = Simplex::new(&mesh.corners(cell)[..=D]);
+                if points == 1 { whole } else { Simplex { volume: share * whole.volume, ..whole } }
+            };
+            let packs = runs.iter().map(|run| pack_of(run, &simplex)).collect();
+            return Self { packs, runs, points, fine_weights: Vec::new() };
+        }
+        let at = |cell: usize, place: &[f64], weight: f64| {
+            let nodes: Vec<Vector<D>> = mesh.cell_nodes(cell).map(|n| mesh.nodes[n as usize]).collect();
+            let simplex = Simplex::new(&linear_at(D + 1, place, &nodes)[..=D]);
+            Simplex { volume: weight * simplex.volume, ..simplex }
+        };
+        let (mut packs, mut fine_weights) = (Vec::new(), Vec::new());
+        for run in &runs {
+            for (place, weight) in cell_rule::<D>() {
+                packs.push(pack_of(run, &|cell| at(cell, place, *weight)));
+            }
+            let mut weights = [[0.0; LANES]; MOST_POINTS];
+            for (weights, (place, weight)) in weights.iter_mut().zip(fine_cell_rule::<D>()) {
+                for lane in 0..run.count {
+                    weights[lane] = at(run.first + lane, place, *weight).volume;
+                }
+            }
+            fine_weights.push(weights);
+        }
+        Self { packs, runs, points, fine_weights }
     }
 
-    /// The cell of this local number.
+    /// Points in a cell, at which stresses live.
+    #[inline(always)]
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Points of the cells of this rank.
+    pub fn point_count(&self) -> usize {
+        self.runs.last().map_or(0, |run| run.first + run.count) * self.points
+    }
+
+    /// Bytes that are kept.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.packs[..]) + size_of_val(&self.runs[..]) + size_of_val(&self.fine_weights[..])
+    }
+
+    /// The geometry of a run of cells at a point.
+    #[inline(always)]
+    pub(super) fn pack(&self, run: usize, point: usize) -> &SimplexPack<D> {
+        if self.fine_weights.is_empty() { &self.packs[run] } else { &self.packs[run * self.points + point] }
+    }
+
+    /// The shape of the cells of a run.
+    #[inline(always)]
+    pub(super) fn shape(&self, run: usize) -> CellShape<'_> {
+        match self.fine_weights.get(run) {
+            _ if self.points == 1 => CellShape::Linear,
+            None => CellShape::Straight,
+            Some(weights) => CellShape::Curved(weights),
+        }
+    }
+
+    /// The whole cell of this local number, see [`Cell::whole`].
     #[inline]
     pub fn cell(&self, number: usize) -> Simplex<D> {
         let run = self.run_of(number);
-        self.packs[run].simplex(number - self.runs[run].first)
+        Cell { geometry: self, run, lane: number - self.runs[run].first }.whole()
+    }
+
+    /// The cell of a point by its number, the place of the point in the cell, and its geometry. Points are numbered in the order in
+    /// which a pass visits them.
+    #[inline]
+    pub fn point(&self, number: usize) -> (usize, usize, Simplex<D>) {
+        let at = self.run_of(number / self.points);
+        let run = &self.runs[at];
+        let within = number - run.first * self.points;
+        let (point, lane) =
+            if self.points == 1 { (0, within) } else { (within / run.count, within % run.count) };
+        (run.first + lane, point, self.pack(at, point).simplex(lane))
     }
 
     /// The run of a cell. Runs have at most as many cells as a pack has lanes, so that the search starts at `cell / LANES`; where all
@@ -176,9 +313,15 @@ impl<const D: usize> Geometry<D> {
     }
 
     /// All cells in the order of the mesh.
+    pub fn cells(&self) -> impl Iterator<Item = Cell<'_, D>> {
+        let cell = |(run, lane)| Cell { geometry: self, run, lane };
+        let runs = self.runs.iter().enumerate();
+        runs.flat_map(|(at, run)| (0..run.count).map(move |lane| (at, lane))).map(cell)
+    }
+
+    /// All cells in the order of the mesh, each in one, see [`Cell::whole`].
     pub fn iter(&self) -> impl Iterator<Item = Simplex<D>> {
-        let packs = self.runs.iter().zip(&self.packs);
-        packs.flat_map(|(run, pack)| (0..run.count).map(|lane| pack.simplex(lane)))
+        self.cells().map(Cell::whole)
     }
 }
 

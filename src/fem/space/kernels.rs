@@ -1,34 +1,85 @@
 //! What a pass does with the nodal values of a pack of cells: gather, differentiate, scatter. Lanes without a cell hold zeros.
 
-use super::SimplexPack;
+use super::{
+    SimplexPack,
+    quadratic::{MOST_NODES, edges},
+};
 use crate::linear_algebra::{
     simd::{LANES, Pack},
     tensor::component,
 };
 
-/// A value at each node of a pack of cells; the first `D + 1` are used.
-pub type Corners<const D: usize> = [Pack<D>; 4];
+/// A value at each node of a pack of cells; the first `D + 1` are used of linear cells.
+pub type NodalPacks<const D: usize> = [Pack<D>; MOST_NODES];
 
-/// Gathers the values of the nodes of cells (`D + 1` a cell).
+/// Gathers the values of `count` nodes a cell.
 #[inline(always)]
-pub(super) fn gather<const D: usize>(nodes: &[u32], nodal: &[[f64; D]], corners: &mut Corners<D>) {
-    if nodes.len() != LANES * (D + 1) {
-        corners[..=D].fill(Pack::ZERO);
-        for (lane, nodes) in nodes.chunks_exact(D + 1).enumerate() {
-            for (corner, &node) in corners.iter_mut().zip(nodes) {
-                corner.set(lane, nodal[node as usize]);
+pub(super) fn gather<const D: usize>(count: usize, nodes: &[u32], nodal: &[[f64; D]], packs: &mut [Pack<D>]) {
+    if nodes.len() != LANES * count {
+        packs[..count].fill(Pack::ZERO);
+        for (lane, nodes) in nodes.chunks_exact(count).enumerate() {
+            for (pack, &node) in packs.iter_mut().zip(nodes) {
+                pack.set(lane, nodal[node as usize]);
             }
         }
         return;
     }
     // Two cells at a time: half as many stores, and of what registers hold.
-    for (pair, nodes) in nodes.chunks_exact(2 * (D + 1)).enumerate() {
-        for a in 0..D + 1 {
+    for (pair, nodes) in nodes.chunks_exact(2 * count).enumerate() {
+        for a in 0..count {
             let one = nodal[nodes[a] as usize];
-            let other = nodal[nodes[D + 1 + a] as usize];
+            let other = nodal[nodes[count + a] as usize];
             for i in 0..D {
-                let (pairs, _) = corners[a].0[i].as_chunks_mut::<2>();
+                let (pairs, _) = packs[a].0[i].as_chunks_mut::<2>();
                 pairs[pair] = [one[i], other[i]];
+            }
+        }
+    }
+}
+
+/// The values at the corners of the linear functions with the gradients that quadratic functions have at a point, as
+/// [`super::quadratic::linear_at`] of one cell.
+#[inline(always)]
+pub(super) fn linear_at<const D: usize>(place: &[f64; 4], nodal: &NodalPacks<D>) -> [Pack<D>; 4] {
+    let mut out = [Pack::ZERO; 4];
+    for i in 0..D {
+        for a in 0..D + 1 {
+            let factor = 4.0 * place[a] - 1.0;
+            for lane in 0..LANES {
+                out[a].0[i][lane] = factor * nodal[a].0[i][lane];
+            }
+        }
+        for (edge, &[a, b]) in edges(D + 1).iter().enumerate() {
+            let [to_a, to_b] = [4.0 * place[b], 4.0 * place[a]];
+            for lane in 0..LANES {
+                let value = nodal[D + 1 + edge].0[i][lane];
+                out[a].0[i][lane] += to_a * value;
+                out[b].0[i][lane] += to_b * value;
+            }
+        }
+    }
+    out
+}
+
+/// Adds to the forces on nodes those that have the virtual work of forces on the corners of linear functions at a point.
+#[inline(always)]
+pub(super) fn add_nodal_forces<const D: usize>(
+    place: &[f64; 4],
+    corners: &[Pack<D>; 4],
+    forces: &mut NodalPacks<D>,
+) {
+    for i in 0..D {
+        for a in 0..D + 1 {
+            let factor = 4.0 * place[a] - 1.0;
+            for lane in 0..LANES {
+                forces[a].0[i][lane] += factor * corners[a].0[i][lane];
+            }
+        }
+        for (edge, &[a, b]) in edges(D + 1).iter().enumerate() {
+            let [of_a, of_b] = [4.0 * place[b], 4.0 * place[a]];
+            for lane in 0..LANES {
+                let force = of_a * corners[a].0[i][lane] + of_b * corners[b].0[i][lane];
+                forces[D + 1 + edge].0[i][lane] += force;
             }
         }
     }
@@ -38,7 +89,7 @@ pub(super) fn gather<const D: usize>(nodes: &[u32], nodal: &[[f64; D]], corners:
 #[inline(always)]
 pub(super) fn strains<const D: usize, const S: usize>(
     cells: &SimplexPack<D>,
-    corners: &Corners<D>,
+    corners: &[Pack<D>],
 ) -> Pack<S> {
     let mut out = Pack::ZERO;
     for lane in 0..LANES {
@@ -69,7 +120,7 @@ pub(super) fn strains<const D: usize, const S: usize>(
 pub(super) fn add_divergence<const D: usize, const S: usize>(
     cells: &SimplexPack<D>,
     stress: &Pack<S>,
-    forces: &mut Corners<D>,
+    forces: &mut [Pack<D>],
 ) {
     for lane in 0..LANES {
         let mut inner = [[0.0; D]; D];
@@ -95,14 +146,19 @@ pub(super) fn add_divergence<const D: usize, const S: usize>(
     }
 }
 
-/// Adds forces on the corners of cells to those of their nodes.
+/// Adds forces on `count` nodes a cell to those of the body.
 #[inline(always)]
-pub(super) fn scatter<const D: usize>(nodes: &[u32], corners: &Corners<D>, forces: &mut [[f64; D]]) {
-    for (nodes, lane) in nodes.chunks_exact(D + 1).zip(0..LANES) {
-        for a in 0..D + 1 {
+pub(super) fn scatter<const D: usize>(
+    count: usize,
+    nodes: &[u32],
+    packs: &[Pack<D>],
+    forces: &mut [[f64; D]],
+) {
+    for (nodes, lane) in nodes.chunks_exact(count).zip(0..LANES) {
+        for a in 0..count {
             let force = &mut forces[nodes[a] as usize];
             for i in 0..D {
-                force[i] += corners[a].0[i][lane];
+                force[i] += packs[a].0[i][lane];
             }
         }
     }

@@ -1,9 +1,10 @@
-//! P1 nodal fields and P0 cell fields: gradients, quadrature, assembly, passes over cells.
+//! Linear and quadratic nodal fields, and fields at the points of cells: gradients, quadrature, assembly, passes over cells.
 
 mod assembly;
 mod batch;
 mod geometry;
 mod kernels;
+mod quadratic;
 mod quadrature;
 #[cfg(test)]
 pub mod samples;
@@ -11,7 +12,8 @@ mod surface;
 
 pub use assembly::{CellMatrix, assemble};
 pub use batch::{Batch, Integrity, Needs, Nodal};
-pub use geometry::{CellRun, Geometry, Simplex, SimplexPack};
-pub use kernels::Corners;
-pub use quadrature::{CellRule, FacetRule, cell_rule, facet_rule};
-pub use surface::{SurfacePoint, facets, surface_points};
+pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
+pub use kernels::NodalPacks;
+pub use quadratic::{MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, values};
+pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
+pub use surface::{FacetPoint, SurfacePoint, facet_points, facets, surface_points};

@@ -1,6 +1,8 @@
 //! Cells for tests of passes over them.
 
+use super::quadratic::edges;
 use crate::{linear_algebra::simd::LANES, mesh::Mesh};
+use std::collections::BTreeMap;
 
 /// A number between -1 and 1.
 pub fn number(i: usize) -> f64 {
@@ -23,4 +25,26 @@ pub fn row<const D: usize>() -> Mesh<D> {
         cell_regions,
         ..Mesh::default()
     }
+}
+
+/// The same cells with nodes on their edges, up to `bend` times a number of magnitude 1 from the midpoints.
+pub fn quadratic<const D: usize>(mut mesh: Mesh<D>, bend: f64) -> Mesh<D> {
+    let mut nodes = BTreeMap::new();
+    for cell in 0..mesh.cell_regions.len() {
+        for &[i, j] in edges(D + 1) {
+            let [a, b] = [i, j].map(|corner| mesh.cell(cell)[corner]);
+            let next = mesh.nodes.len() + nodes.len();
+            let node = *nodes.entry([a.min(b), a.max(b)]).or_insert(next as u32);
+            mesh.midsides.push(node);
+        }
+    }
+    let mut places = vec![[0.0; D]; nodes.len()];
+    for ([a, b], node) in nodes {
+        let [a, b] = [a, b].map(|corner| mesh.nodes[corner as usize]);
+        places[node as usize - mesh.nodes.len()] =
+            std::array::from_fn(|i| 0.5 * (a[i] + b[i]) + bend * number(3 * node as usize + i));
+    }
+    mesh.nodes.append(&mut places);
+    mesh.is_curved = bend != 0.0;
+    mesh
 }

@@ -1,5 +1,9 @@
-//! Points of a boundary at which nodal quadrature evaluates a law.
+//! Points of a boundary: nodes, at which nodal quadrature evaluates a law, and Gauss points of facets.
 
+use super::{
+    quadratic::{linear_at, values},
+    quadrature::{facet_rule, fine_facet_rule},
+};
 use crate::{
     error::Result,
     linear_algebra::tensor::{Vector, dot, norm},
@@ -58,9 +62,9 @@ pub fn surface_points<const D: usize>(
     facets: &[u32],
 ) -> Result<Vec<SurfacePoint<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    for &facet in facets {
-        let nodes = mesh.facets[facet as usize];
-        let normal = facet_normal(&mesh.facet_corners(facet));
+    // Weights of linear facets are positive, those of quadratic ones vanish at corners.
+    for nodes in facets.iter().flat_map(|&facet| mesh.sub_facets(facet)) {
+        let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
         for node in nodes {
             let global = mesh.global_node(node);
             let record = &mut outgoing[mesh.owner(global)];
@@ -80,6 +84,59 @@ pub fn surface_points<const D: usize>(
         })
     });
     Ok(shares.chunk_by(|a, b| a.0 == b.0).flat_map(|around| points_of_node(mesh, around)).collect())
+}
+
+/// A Gauss point of a facet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FacetPoint<const D: usize> {
+    /// Values of the shape functions of the facet's nodes.
+    pub shares: [f64; 6],
+    /// Outward unit normal.
+    pub normal: Vector<D>,
+    /// Quadrature weight in m^(D-1).
+    pub weight: f64,
+    /// Its place in m.
+    pub place: Vector<D>,
+}
+
+/// The Gauss points of a facet of this rank, with its local nodes: exact for products of two shape functions.
+pub fn facet_points<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: u32,
+) -> (impl Iterator<Item = u32> + Clone, impl Iterator<Item = FacetPoint<D>>) {
+    let is_linear = mesh.order() == 1;
+    let mut nodes = [0; 6];
+    nodes[..D].copy_from_slice(&mesh.facets[facet as usize]);
+    let count = if is_linear {
+        D
+    } else {
+        let edges = D * (D - 1) / 2;
+        nodes[D..D + edges].copy_from_slice(&mesh.facet_midsides(facet)[..edges]);
+        D + edges
+    };
+    let coordinates: [Vector<D>; 6] =
+        std::array::from_fn(|a| if a < count { mesh.nodes[nodes[a] as usize] } else { [0.0; D] });
+    let whole = facet_normal(&mesh.facet_corners(facet));
+    let rule = if is_linear { facet_rule::<D>() } else { fine_facet_rule::<D>() };
+    let point = move |(place, weight): &([f64; 3], f64)| {
+        let (mut shares, mut normal) = ([0.0; 6], whole);
+        if is_linear {
+            shares[..D].copy_from_slice(&place[..D]);
+        } else {
+            shares.copy_from_slice(&values(D, place)[..6]);
+            let corners = linear_at(D, place, &coordinates[..count]);
+            normal = facet_normal(&std::array::from_fn(|a| corners[a]));
+        }
+        let measure = norm(&normal);
+        let mut at = [0.0; D];
+        for (coordinates, share) in coordinates.iter().zip(shares).take(count) {
+            for i in 0..D {
+                at[i] += share * coordinates[i];
+            }
+        }
+        FacetPoint { shares, normal: normal.map(|x| x / measure), weight: measure * weight, place: at }
+    };
+    (nodes.into_iter().take(count), rule.iter().map(point))
 }
 
 fn points_of_node<const D: usize>(mesh: &Mesh<D>, shares: &[(u32, Vector<D>)]) -> Vec<SurfacePoint<D>> {

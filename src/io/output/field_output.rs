@@ -41,10 +41,12 @@ impl<const D: usize> FieldOutput<D> {
         let is_wanted = FIELDS.each_ref().map(|field| field.is_wanted(&job.output));
         let wide = |ids: &[u32]| ids.iter().map(|&id| u64::from(id)).collect::<Vec<_>>();
         let (point_ids, cell_ids) = (wide(&mesh.node_ids[..mesh.owned]), wide(&mesh.cell_ids));
-        let cells: Vec<u64> = mesh.cells.iter().map(|&node| u64::from(mesh.global_node(node))).collect();
+        let nodes = (0..mesh.cell_count()).flat_map(|cell| mesh.cell_nodes(cell));
+        let cells: Vec<u64> = nodes.map(|node| u64::from(mesh.global_node(node))).collect();
         let parts = FieldMesh {
             points: &mesh.nodes[..mesh.owned],
             point_ids: &point_ids,
+            nodes_per_cell: mesh.nodes_per_cell(),
             cells: &cells,
             cell_ids: &cell_ids,
         };

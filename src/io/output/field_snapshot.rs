@@ -19,8 +19,10 @@ pub struct Snapshot {
     pub nodes: Vec<[f64; 3]>,
     /// Nodes of all cells, one cell after the other.
     pub cells: Vec<u32>,
-    /// Nodes of a cell: 3 for triangles, 4 for tetrahedra.
+    /// Nodes of a cell: 3 for triangles, 4 for tetrahedra. Quadratic cells are divided into 4 triangles or 8 tetrahedra.
     pub corners: usize,
+    /// Parts into which each cell of the file is divided.
+    pub parts: usize,
     /// Values at that time of the fields that runs write, as files hold them, by their names; tensors are left out.
     pub fields: BTreeMap<&'static str, Vec<f64>>,
 }
@@ -88,8 +90,14 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     let corners = cells.shape().get(1).copied().unwrap_or(0);
     let nodes = triples(&file.dataset("VTKHDF/Points")?.read_raw::<f64>()?);
     let unknown = u32::MAX;
-    let cells = cells.read_raw::<i64>()?.into_iter().map(|n| u32::try_from(n).unwrap_or(unknown)).collect();
-    let mut snapshot = Snapshot { nodes, cells, corners, ..Snapshot::default() };
+    let cells: Vec<u32> =
+        cells.read_raw::<i64>()?.into_iter().map(|n| u32::try_from(n).unwrap_or(unknown)).collect();
+    let (cells, corners, parts) = match corners {
+        6 => (divided(cells, 6, &TRIANGLES), 3, TRIANGLES.len()),
+        10 => (divided(cells, 10, &TETRAHEDRA), 4, TETRAHEDRA.len()),
+        _ => (cells, corners, 1),
+    };
+    let mut snapshot = Snapshot { nodes, cells, corners, parts, ..Snapshot::default() };
     if !file.link_exists("VTKHDF/Steps") {
         return Ok(snapshot);
     }
@@ -98,14 +106,38 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     snapshot.times.truncate(usize::try_from(steps).unwrap_or(0));
     let Some(&time) = snapshot.times.last() else { return Ok(snapshot) };
     snapshot.time = time;
-    for OutputField { name, .. } in FIELDS.iter().filter(|field| field.shape != Shape::Tensor) {
+    for field @ OutputField { name, place, .. } in FIELDS.iter().filter(|field| field.shape != Shape::Tensor)
+    {
         let group = format!("Fields/{name}");
         if file.link_exists(&group) {
             let values = file.dataset(&format!("{group}/{}", steps - 1))?.read_raw::<f64>()?;
+            let repeated = if *place == Place::Cell { parts } else { 1 };
+            let values = values.chunks(field.width()).flat_map(|row| row.repeat(repeated)).collect();
             snapshot.fields.insert(name, values);
         }
     }
     Ok(snapshot)
+}
+
+/// The triangles into which a quadratic triangle is divided, by its nodes in files.
+const TRIANGLES: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
+
+/// The tetrahedra into which a quadratic tetrahedron is divided: one at each corner, four around the line between the middles of
+/// edges 20 and 13.
+const TETRAHEDRA: [[usize; 4]; 8] = [
+    [0, 4, 6, 7],
+    [4, 1, 5, 8],
+    [6, 5, 2, 9],
+    [7, 8, 9, 3],
+    [6, 8, 4, 5],
+    [6, 8, 5, 9],
+    [6, 8, 9, 7],
+    [6, 8, 7, 4],
+];
+
+fn divided<const N: usize>(cells: Vec<u32>, width: usize, parts: &[[usize; N]]) -> Vec<u32> {
+    let of_cell = |nodes: &[u32]| -> Vec<u32> { parts.iter().flatten().map(|&at| nodes[at]).collect() };
+    cells.chunks_exact(width).flat_map(of_cell).collect()
 }
 
 fn triples(flat: &[f64]) -> Vec<[f64; 3]> {
@@ -115,6 +147,10 @@ fn triples(flat: &[f64]) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::{
+        midpoint,
+        shape::{edges_of_cell, signed_measure},
+    };
 
     #[test]
     fn foreign_and_cut_files_are_refused_with_the_reason() {
@@ -125,6 +161,21 @@ mod tests {
         assert!(Snapshot::read(&path).expect_err("cut").to_string().contains("damaged"));
         hdf5::File::create(&path).expect("create").close().expect("close");
         assert!(Snapshot::read(&path).expect_err("foreign").to_string().contains("not a field file"));
+    }
+
+    /// Volumes of the parts of the quadratic unit simplex.
+    fn volumes<const D: usize, const N: usize>(parts: &[[usize; N]]) -> Vec<f64> {
+        let corner = |i: usize| -> [f64; D] { std::array::from_fn(|k| f64::from(u8::from(k + 1 == i))) };
+        let corners: Vec<[f64; D]> = (0..=D).map(corner).collect();
+        let middles = edges_of_cell::<D>().iter().map(|&[a, b]| midpoint(&corners[a], &corners[b]));
+        let nodes: Vec<[f64; D]> = corners.iter().copied().chain(middles).collect();
+        parts.iter().map(|part| signed_measure(&part.map(|node| nodes[node]))).collect()
+    }
+
+    #[test]
+    fn quadratic_cells_are_divided_into_equal_parts_of_positive_volume() {
+        assert!(volumes::<2, 3>(&TRIANGLES).iter().all(|v| (v - 0.125).abs() < 1e-16));
+        assert!(volumes::<3, 4>(&TETRAHEDRA).iter().all(|v| (v - 1.0 / 48.0).abs() < 1e-16));
     }
 
     #[test]

@@ -52,7 +52,9 @@ pub struct FieldMesh<'a, const D: usize> {
     pub points: &'a [Vector<D>],
     /// Ids of these nodes in the mesh as it was read; over all ranks each of `0..total` once.
     pub point_ids: &'a [u64],
-    /// Nodes of the cells this rank owns, `D + 1` a cell, by their number over the ranks.
+    /// Nodes of a cell: `D + 1` corners, and for quadratic cells a node on each edge.
+    pub nodes_per_cell: usize,
+    /// Nodes of the cells this rank owns, by their number over the ranks.
     pub cells: &'a [u64],
     /// Ids of these cells in the mesh as it was read; over all ranks each of `0..total` once.
     pub cell_ids: &'a [u64],
@@ -65,6 +67,7 @@ pub struct FieldFile<const D: usize> {
     xdmf: PathBuf,
     points: Slab,
     cells: Slab,
+    nodes_per_cell: usize,
     kinds: Vec<FieldKind>,
     /// Times of all steps, including those that are buffered.
     times: Vec<f64>,
@@ -86,8 +89,8 @@ impl<const D: usize> FieldFile<D> {
         compression: u8,
     ) -> Result<Self, Agreed> {
         let communicator = communicator.duplicate();
-        let sound =
-            mesh.points.len() == mesh.point_ids.len() && mesh.cells.len() == (D + 1) * mesh.cell_ids.len();
+        let sound = mesh.points.len() == mesh.point_ids.len()
+            && mesh.cells.len() == mesh.nodes_per_cell * mesh.cell_ids.len();
         let fault = || Error::Internal("the mesh for fields.vtkhdf has lists of unequal length".into());
         agree(&communicator, sound.then_some(()).ok_or_else(fault))?;
         let file = ParallelFile::create(&folder.join("fields.vtkhdf"), &communicator)?;
@@ -99,6 +102,7 @@ impl<const D: usize> FieldFile<D> {
             xdmf: folder.join("fields.xdmf"),
             points,
             cells,
+            nodes_per_cell: mesh.nodes_per_cell,
             kinds: Vec::new(),
             times: Vec::new(),
             waiting: Vec::new(),
@@ -135,9 +139,19 @@ impl<const D: usize> FieldFile<D> {
             times.retain(|kept| *kept <= time);
             cut(&file, &kinds, times.len())?;
         }
-        let (waiting, written, xdmf) = (Vec::new(), Instant::now(), folder.join("fields.xdmf"));
-        let resumed =
-            Self { file, communicator, xdmf, points, cells, kinds, times, waiting, written, compression };
+        let resumed = Self {
+            file,
+            communicator,
+            xdmf: folder.join("fields.xdmf"),
+            points,
+            cells,
+            nodes_per_cell: mesh.nodes_per_cell,
+            kinds,
+            times,
+            waiting: Vec::new(),
+            written: Instant::now(),
+            compression,
+        };
         resumed.write_xdmf(0)?;
         Ok(resumed)
     }
@@ -278,12 +292,12 @@ impl<const D: usize> FieldFile<D> {
         file.set_numbers("VTKHDF", "Version", &[2_i64, 3])?;
         file.set_text("VTKHDF", "Type", "UnstructuredGrid")?;
         let first = self.communicator.rank() == 0;
-        let corners = D + 1;
+        let width = self.nodes_per_cell;
         let only_first = |value: u64| if first { vec![value as i64] } else { Vec::new() };
         for (name, count) in [
             ("NumberOfPoints", points.total),
             ("NumberOfCells", cells.total),
-            ("NumberOfConnectivityIds", cells.total * corners as u64),
+            ("NumberOfConnectivityIds", cells.total * width as u64),
         ] {
             file.create_rows::<i64>(&format!("VTKHDF/{name}"), 1, 1)?.write(0, &only_first(count))?;
         }
@@ -291,16 +305,21 @@ impl<const D: usize> FieldFile<D> {
         let coordinates: Vec<f64> = mesh.points.iter().flat_map(|point| pad(point)).collect();
         file.create_packed_rows::<f64>("VTKHDF/Points", points.total, 3, *level)?
             .write(points.first, &coordinates)?;
-        file.create_packed_rows::<i64>("Mesh/cells", cells.total, corners, *level)?
+        file.create_packed_rows::<i64>("Mesh/cells", cells.total, width, *level)?
             .write(cells.first, &whole(mesh.cells))?;
-        file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, corners))?;
+        file.create_flat_view::<i64>("VTKHDF/Connectivity", "/Mesh/cells", (cells.total as usize, width))?;
 
-        let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * corners as i64);
+        let ends = (cells.first + 1..).take(cells.owned).map(|cell| cell as i64 * width as i64);
         let offsets: Vec<i64> = first.then_some(0).into_iter().chain(ends).collect();
         let start = if first { 0 } else { cells.first + 1 };
         file.create_packed_rows::<i64>("VTKHDF/Offsets", cells.total + 1, 1, *level)?
             .write(start, &offsets)?;
-        let kind: u8 = if D == 2 { 5 } else { 10 };
+        let kind: u8 = match (D, width) {
+            (2, 3) => 5,
+            (2, _) => 22,
+            (_, 4) => 10,
+            _ => 24,
+        };
         file.create_packed_rows::<u8>("VTKHDF/Types", cells.total, 1, *level)?
             .write(cells.first, &vec![kind; cells.owned])?;
 
@@ -398,7 +417,8 @@ impl<const D: usize> FieldFile<D> {
 
     /// Adds the steps from `first` on to the file that has those before; writes it anew where it is missing or has none.
     fn write_xdmf(&self, first: usize) -> Result<(), Agreed> {
-        let mesh = xdmf::Mesh { dimension: D, points: self.points.total, cells: self.cells.total };
+        let (points, cells) = (self.points.total, self.cells.total);
+        let mesh = xdmf::Mesh { nodes_per_cell: self.nodes_per_cell, points, cells };
         let written = if self.communicator.rank() != 0 {
             Ok(())
         } else if first > 0 && self.xdmf.exists() {

@@ -6,7 +6,10 @@ use crate::{
     fem::{space::Simplex, state::State},
     job::Probe,
     linear_algebra::tensor::Vector,
-    mesh::Mesh,
+    mesh::{
+        Mesh,
+        shape::{quadratic_values, tangent_corners},
+    },
     parallel::session::Session,
 };
 use mpi::{collective::SystemOperation, traits::CommunicatorCollectives};
@@ -19,8 +22,8 @@ const INSIDE: f64 = -1e-9;
 #[derive(Debug)]
 pub(crate) struct Probes<const D: usize> {
     names: Vec<String>,
-    /// Local cell and barycentric coordinates, on the rank that evaluates.
-    places: Vec<Option<(usize, [f64; 4])>>,
+    /// Local nodes and the values of their shape functions, on the rank that evaluates.
+    places: Vec<Option<Vec<(u32, f64)>>>,
     file: Option<CsvFile>,
     /// Values of this rank and of all ranks.
     room: [Vec<f64>; 2],
@@ -69,15 +72,14 @@ impl<const D: usize> Probes<D> {
     }
 
     /// Finds the values at all probes on all ranks: displacement, then velocity. Collective.
-    fn values(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
+    fn values(&mut self, session: &Session, state: &State) -> Result<()> {
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
         let [mine, all] = &mut self.room;
         mine.clear();
         mine.resize(self.names.len() * 2 * D, 0.0);
         all.clone_from(mine);
         for (place, values) in self.places.iter().zip(mine.chunks_exact_mut(2 * D)) {
-            let Some((cell, shares)) = place else { continue };
-            for (&node, share) in mesh.cell(*cell).iter().zip(shares) {
+            for &(node, share) in place.iter().flatten() {
                 for i in 0..D {
                     values[i] += share * displacement[node as usize * D + i];
                     values[D + i] += share * velocity[node as usize * D + i];
@@ -89,8 +91,8 @@ impl<const D: usize> Probes<D> {
     }
 
     /// Writes the rows of a step. Collective.
-    pub(crate) fn write(&mut self, session: &Session, mesh: &Mesh<D>, state: &State) -> Result<()> {
-        self.values(session, mesh, state)?;
+    pub(crate) fn write(&mut self, session: &Session, state: &State) -> Result<()> {
+        self.values(session, state)?;
         let Some(file) = &mut self.file else { return Ok(()) };
         for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {
             file.row(format_args!("{},{},{name},{}", state.step, Number(state.time), Numbers(values)))?;
@@ -104,25 +106,86 @@ impl<const D: usize> Probes<D> {
     }
 }
 
-fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<(usize, [f64; 4])> {
+/// The nodes of the cell around a point, with the values of their shape functions there.
+fn find<const D: usize>(mesh: &Mesh<D>, point: &Vector<D>) -> Option<Vec<(u32, f64)>> {
     (0..mesh.cell_count()).find_map(|number| {
-        let corners = mesh.corners(number);
+        let nodes: Vec<Vector<D>> = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]).collect();
         let outside = (0..D).any(|i| {
-            let along = corners[..=D].iter().map(|c| c[i]);
+            let along = nodes.iter().map(|node| node[i]);
             let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-            let slack = 1e-9 * (high - low);
+            // A curved edge goes beyond its nodes, by less than its length.
+            let slack = (high - low) * if mesh.is_curved { 1.0 } else { 1e-9 };
             point[i] < low - slack || point[i] > high + slack
         });
         if outside {
             return None;
         }
-        let cell = Simplex::new(&corners[..=D]);
-        let mut shares = [0.0; 4];
-        shares[0] = 1.0;
-        for a in 1..=D {
-            shares[a] = (0..D).map(|i| cell.gradients[a - 1][i] * (point[i] - corners[0][i])).sum();
-            shares[0] -= shares[a];
-        }
-        shares[..=D].iter().all(|s| *s >= INSIDE).then_some((number, shares))
+        let place = place(&nodes, point)?;
+        let shares = match mesh.order() {
+            1 => place.to_vec(),
+            _ => quadratic_values::<D>(&place).to_vec(),
+        };
+        Some(mesh.cell_nodes(number).zip(shares).collect())
     })
+}
+
+/// Barycentric coordinates of a point in the cell with these nodes, if it is inside.
+fn place<const D: usize>(nodes: &[Vector<D>], point: &Vector<D>) -> Option<[f64; 4]> {
+    const MOST_STEPS: usize = 30;
+    let is_linear = nodes.len() == D + 1;
+    let mut place = [0.0; 4];
+    place[0] = 1.0;
+    let mut at = nodes[0];
+    let mut cell = Simplex::new(&nodes[..=D]);
+    // Newton's method from the linear cell with these corners, whose step is exact for straight cells.
+    for _ in 0..MOST_STEPS {
+        let mut longest = 0.0_f64;
+        for a in 1..=D {
+            let step: f64 = (0..D).map(|i| cell.gradients[a - 1][i] * (point[i] - at[i])).sum();
+            place[a] += step;
+            longest = longest.max(step.abs());
+        }
+        place[0] = place[1..=D].iter().fold(1.0, |rest, share| rest - share);
+        if is_linear || longest < 1e-13 {
+            return place[..=D].iter().all(|share| *share >= INSIDE).then_some(place);
+        }
+        if longest.is_nan() || longest > 1e3 {
+            return None;
+        }
+        let shares = quadratic_values::<D>(&place);
+        at = std::array::from_fn(|i| nodes.iter().zip(shares).map(|(node, share)| share * node[i]).sum());
+        cell = Simplex::new(&tangent_corners(nodes, &place)[..=D]);
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{midpoint, shape::edges_of_cell};
+
+    fn map<const D: usize>(x: Vector<D>) -> Vector<D> {
+        std::array::from_fn(|i| x[i] + 0.2 * x[(i + 1) % D] * x[(i + 1) % D])
+    }
+
+    fn points_are_found<const D: usize>(inside: Vector<D>) {
+        let corner = |i: usize| -> Vector<D> { std::array::from_fn(|k| f64::from(u8::from(k + 1 == i))) };
+        let corners: Vec<Vector<D>> = (0..=D).map(corner).collect();
+        let middles = edges_of_cell::<D>().iter().map(|&[a, b]| midpoint(&corners[a], &corners[b]));
+        let straight: Vec<Vector<D>> = corners.iter().copied().chain(middles).collect();
+        let curved: Vec<Vector<D>> = straight.iter().map(|&x| map(x)).collect();
+        for (nodes, point) in [(&corners, inside), (&straight, inside), (&curved, map(inside))] {
+            let found = place(nodes, &point).expect("inside");
+            for i in 0..D {
+                assert!((found[i + 1] - inside[i]).abs() < 1e-12, "{found:?}");
+            }
+            assert_eq!(place(nodes, &[-0.4; D]), None);
+        }
+    }
+
+    #[test]
+    fn points_in_straight_and_curved_cells_are_found() {
+        points_are_found([0.3, 0.45]);
+        points_are_found([0.2, 0.3, 0.4]);
+    }
 }

@@ -164,9 +164,10 @@ impl<const D: usize> Profile<D> {
         {
             let mut sums = sums.local_mut()?;
             sums.fill(0.0);
-            for &facet in &self.facets {
-                let nodes = body.mesh.facets[facet as usize];
-                let normal = facet_normal(&body.mesh.facet_corners(facet));
+            let parts =
+                self.facets.iter().flat_map(|&facet| body.mesh.sub_facets(facet).map(move |n| (facet, n)));
+            for (facet, nodes) in parts {
+                let normal = facet_normal(&nodes.map(|node| body.mesh.nodes[node as usize]));
                 let measure = norm(&normal);
                 let unit = normal.map(|x| x / measure);
                 let sigma = &stress[body.mesh.facet_cells[facet as usize] as usize];

@@ -13,7 +13,7 @@ const END: &str = "</Grid>\n</Domain>\n</Xdmf>\n";
 /// The size of the mesh.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mesh {
-    pub(super) dimension: usize,
+    pub(super) nodes_per_cell: usize,
     pub(super) points: u64,
     pub(super) cells: u64,
 }
@@ -65,14 +65,18 @@ fn grids(mesh: Mesh, kinds: &[FieldKind], times: &[f64], first: usize) -> String
 }
 
 fn grid(mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> String {
-    let Mesh { dimension, points, cells } = mesh;
-    let corners = dimension + 1;
-    let topology = if dimension == 2 { "Triangle" } else { "Tetrahedron" };
+    let Mesh { nodes_per_cell, points, cells } = mesh;
+    let topology = match nodes_per_cell {
+        3 => "Triangle",
+        4 => "Tetrahedron",
+        6 => "Tri_6",
+        _ => "Tet_10",
+    };
     let mut text = format!(
         "<Grid Name=\"step {step}\" GridType=\"Uniform\">\n<Time Value=\"{time:?}\"/>\n\
          <Topology TopologyType=\"{topology}\" NumberOfElements=\"{cells}\">{}</Topology>\n\
          <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
-        item("Int", 8, &format!("{cells} {corners}"), "Mesh/cells"),
+        item("Int", 8, &format!("{cells} {nodes_per_cell}"), "Mesh/cells"),
         item("Float", 8, &format!("{points} 3"), "VTKHDF/Points"),
     );
     let mut attribute = |name: &str, kind: &str, place: Place, item: String| {
@@ -119,7 +123,7 @@ mod tests {
     #[test]
     fn times_are_written_so_that_they_read_back_the_same() {
         let time = 0.1 + 0.2;
-        let text = document(Mesh { dimension: 2, points: 3, cells: 1 }, &[], &[time, 1e-9]);
+        let text = document(Mesh { nodes_per_cell: 3, points: 3, cells: 1 }, &[], &[time, 1e-9]);
         let read: Vec<f64> = text
             .split("<Time Value=\"")
             .skip(1)
@@ -133,7 +137,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("fields.xdmf");
         let kinds = [FieldKind { name: "velocity".into(), place: Place::Node, shape: Shape::Vector }];
-        let mesh = Mesh { dimension: 2, points: 3, cells: 1 };
+        let mesh = Mesh { nodes_per_cell: 3, points: 3, cells: 1 };
         write(&path, mesh, &kinds, &[0.0]).expect("written");
         let times = [0.0, 0.5, 0.75, 1.0];
         for (first, end) in [(1, 2), (2, 4)] {
@@ -146,7 +150,10 @@ mod tests {
     #[test]
     fn each_step_refers_to_its_own_numbers() {
         let kinds = [FieldKind { name: "stress".into(), place: Place::Cell, shape: Shape::Tensor }];
-        let text = document(Mesh { dimension: 3, points: 4, cells: 7 }, &kinds, &[0.5, 1.0]);
+        let text = document(Mesh { nodes_per_cell: 10, points: 14, cells: 7 }, &kinds, &[0.5, 1.0]);
+        assert!(
+            text.contains("TopologyType=\"Tet_10\" NumberOfElements=\"7\"><DataItem Dimensions=\"7 10\"")
+        );
         assert!(text.contains("AttributeType=\"Tensor6\" Center=\"Cell\"><DataItem Dimensions=\"7 6\""));
         assert_eq!(text.matches("fields.vtkhdf:/Fields/stress/0<").count(), 1);
         assert_eq!(text.matches("fields.vtkhdf:/Fields/stress/1<").count(), 1);

@@ -10,6 +10,7 @@
 //! /nodes/place         coordinates in m
 //! /cells/id, region    original id; index into the header's regions
 //! /cells/nodes         positions among the part's nodes
+//! /cells/edges         coordinates in m of the nodes on the edges of a cell, if the mesh has curved cells
 //! /facets/id, cell     position among all facets; position among the part's cells
 //! /facets/nodes        positions among the part's nodes
 //! /named               index into the header's boundaries, position among the part's facets
@@ -59,6 +60,9 @@ pub struct Header {
     pub cells: usize,
     /// Facets of its surface.
     pub facets: usize,
+    /// Whether cells are curved.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub curved: bool,
     /// Names of the regions.
     pub regions: Vec<String>,
     /// Names of the boundaries.

@@ -8,7 +8,7 @@ use crate::{
         redistribution::first_of_part,
         seal,
     },
-    mesh::{GlobalMesh, Mesh, piece::Piece},
+    mesh::{GlobalMesh, Mesh, piece::Piece, shape::edges_of_cell},
     parallel::{
         agreement::{Agreed, agree},
         session::Session,
@@ -51,8 +51,9 @@ impl PartitionedFile {
         Ok(Self { file, communicator, header, counts })
     }
 
-    /// This rank's part: each rank gets consecutive parts of the file. Collective, with the same outcome on all ranks.
-    pub fn mesh<const D: usize>(&self, session: &Session) -> Result<Mesh<D>, Agreed> {
+    /// This rank's part, with cells of this order: each rank gets consecutive parts of the file. Collective, with the same outcome on
+    /// all ranks.
+    pub fn mesh<const D: usize>(&self, session: &Session, order: usize) -> Result<Mesh<D>, Agreed> {
         let (parts, rank, ranks) = (self.header.parts, session.rank(), session.ranks());
         if parts < ranks {
             return session.agree(Err(Error::Refused(format!(
@@ -67,8 +68,8 @@ impl PartitionedFile {
         for owner in &mut piece.owners {
             *owner = starts.partition_point(|&start| start <= *owner as usize) as u32 - 1;
         }
-        let mesh = Mesh::assemble(session, piece, self.header.names())?;
-        let found = (mesh.total_nodes, mesh.total_cells, format!("{:016x}", mesh.digest));
+        let mesh = Mesh::assemble(session, piece, self.header.names(), order)?;
+        let found = (mesh.corner_nodes, mesh.total_cells, format!("{:016x}", mesh.source_digest()));
         let same = found == (self.header.nodes, self.header.cells, self.header.digest.clone());
         session.agree(if same {
             Ok(mesh)
@@ -91,6 +92,11 @@ impl PartitionedFile {
         let cell_ids = self.table::<u32>("cells/id", 1, &parts)?;
         let regions = self.table::<u32>("cells/region", 1, &parts)?;
         let cells = self.table::<u32>("cells/nodes", D + 1, &parts)?;
+        let edges = edges_of_cell::<D>().len();
+        let curved = match self.header.curved {
+            true => self.table::<f64>("cells/edges", edges * D, &parts)?,
+            false => Vec::new(),
+        };
         let facet_ids = self.table::<u32>("facets/id", 1, &parts)?;
         let facet_cells = self.table::<u32>("facets/cell", 1, &parts)?;
         let facets = self.table::<u32>("facets/nodes", D, &parts)?;
@@ -111,6 +117,7 @@ impl PartitionedFile {
                 nodes: places[wide(&nodes, D)].as_chunks().0.to_vec(),
                 cell_ids: cell_ids[of_cells.clone()].to_vec(),
                 cells: cells[wide(&of_cells, D + 1)].to_vec(),
+                curved: curved.as_chunks().0.get(wide(&of_cells, edges)).unwrap_or(&[]).to_vec(),
                 cell_regions: regions[of_cells].iter().map(region).collect(),
                 facet_ids: facet_ids[of_facets.clone()].to_vec(),
                 facets: facets[wide(&of_facets, D)].as_chunks().0.to_vec(),

@@ -11,6 +11,7 @@ use crate::{
         GlobalMesh,
         partition::Partition,
         piece::{Cutter, Piece},
+        shape::edges_of_cell,
     },
     parallel::agreement::Agreed,
 };
@@ -56,6 +57,7 @@ fn write_sealed<const D: usize>(
         nodes: mesh.nodes.len(),
         cells: mesh.cell_count(),
         facets: mesh.facets.len(),
+        curved: !mesh.curved.is_empty(),
         boundary_facets: mesh.boundaries.iter().map(|boundary| boundary.facets.len()).collect(),
         edge_cut: partition.edge_cut,
         imbalance: partition.imbalance,
@@ -86,6 +88,10 @@ fn write_tables<const D: usize>(file: &ParallelFile, header: &Header, pieces: &[
         piece.cell_regions.iter().map(|&region| u32::from(region)).collect()
     })?;
     table(file, "cells/nodes", D + 1, pieces, |piece| piece.cells.as_slice().into())?;
+    if header.curved {
+        let width = edges_of_cell::<D>().len() * D;
+        table(file, "cells/edges", width, pieces, |piece| piece.curved.as_flattened().into())?;
+    }
     table(file, "facets/id", 1, pieces, |piece| piece.facet_ids.as_slice().into())?;
     table(file, "facets/cell", 1, pieces, |piece| piece.facet_cells.as_slice().into())?;
     table(file, "facets/nodes", D, pieces, |piece| piece.facets.as_flattened().into())?;

@@ -5,10 +5,32 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
-/// The mesh: a generated rectangle or box, or a file.
+/// The mesh of the body: a generated rectangle or box, or a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Mesh {
+    /// Order of the shape functions of displacement and velocity. 1: linear, with constant strain in a cell. 2: quadratic, with a node
+    /// on each edge and 3 (triangle) or 4 (tetrahedron) stress points in a cell; such cells do not lock for nearly incompressible
+    /// bodies and volume-preserving flow, and one costs as much as about 4 (triangle) or 8 (tetrahedron) linear ones.
+    #[serde(default = "linear", skip_serializing_if = "is_linear")]
+    #[schemars(range(min = 1, max = 2))]
+    pub order: u8,
+    /// Where the cells come from.
+    #[serde(flatten)]
+    pub source: MeshSource,
+}
+
+fn linear() -> u8 {
+    1
+}
+
+fn is_linear(order: &u8) -> bool {
+    *order == linear()
+}
+
+/// Where the cells come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Mesh {
+pub enum MeshSource {
     /// A rectangle whose lower left corner is the origin, divided into triangles. Its boundaries are left, right, bottom and top.
     Rectangle(Rectangle),
     /// A box whose corner with the smallest coordinates is the origin, divided into tetrahedra. Its boundaries are left and right

@@ -17,7 +17,7 @@ pub use crate::laws::{
 };
 pub use boundary::{Axis, BodyForce, Fix, FixedDirections, Initial, Support, Traction};
 pub use material::Region;
-pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, Partition, Rectangle, RectangleGrading};
+pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
 pub use time::{Accept, Adaptive, FactorPrecision, FrictionIteration, Method, Preconditioner, Solver, Time};
 

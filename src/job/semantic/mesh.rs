@@ -77,11 +77,16 @@ fn check_count(findings: &mut Findings<'_>) {
     for path in ["mesh.rectangle", "mesh.box"] {
         let key = format!("{path}.cells");
         let Some(cells) = findings.root.read::<Vec<u32>>(&key) else { continue };
-        let product = |more: u64| {
-            cells.iter().try_fold(cells.len() as u64, |all, &count| all.checked_mul(u64::from(count) + more))
-        };
         let crossed = findings.root.read(&format!("{path}.diagonal")) == Some(Diagonal::Crossed);
-        let centres = if crossed { product(0) } else { Some(0) };
+        let is_quadratic = findings.root.read("mesh.order") == Some(2);
+        // Quadratic cells have the nodes of a grid of twice as many lines, and four more in each crossed rectangle.
+        let [per_cell, of_centres] = if is_quadratic { [2, 4] } else { [1, 1] };
+        let product = |more: u64| {
+            let along = |count: u32| per_cell * u64::from(count) + more;
+            cells.iter().try_fold(cells.len() as u64, |all, &count| all.checked_mul(along(count)))
+        };
+        let inside = |bricks: u64| (bricks / per_cell.pow(cells.len() as u32)).checked_mul(of_centres);
+        let centres = if crossed { product(0).and_then(inside) } else { Some(0) };
         let unknowns = product(1).zip(centres).and_then(|(corners, centres)| corners.checked_add(centres));
         let most = most_unknowns(cells.len() as u64);
         if unknowns.is_none_or(|unknowns| unknowns > most) {

@@ -2,14 +2,19 @@
 
 use super::document::{Block, Document};
 use crate::error::{Error, Result};
-use crate::linear_algebra::tensor::Vector;
+use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
+use crate::mesh::shape::edges_of_cell;
 use crate::mesh::surface::{Topology, sorted};
 use crate::mesh::tags::{Tags, place};
-use crate::mesh::{Boundary, GlobalMesh, check, shape};
+use crate::mesh::{Boundary, GlobalMesh, check, midpoint, shape};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Marker, in place of an id, of a node without a cell.
 const UNUSED: u32 = u32::MAX;
+
+/// An edge is straight if the distance of its node from its midpoint is below this multiple of its length.
+const STRAIGHT: f64 = 1e-9;
 
 /// Largest number of physical groups of an entity; each copies the facets of the entity in memory.
 const MOST_GROUPS: usize = 64;
@@ -20,15 +25,25 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
     let mut mesh = GlobalMesh::<D>::default();
     let mut tags = Tags::default();
     let mut ids = vec![UNUSED; document.points.len()];
+    let mut midsides = Vec::new();
     for block in blocks(document, D + 1) {
         for (element, nodes) in block.elements() {
-            for &tag in nodes {
+            for &tag in &nodes[..=D] {
                 let position = positions.find(tag, element)?;
                 mesh.cells.push(position);
                 ids[position as usize] = 0;
             }
+            for &tag in &nodes[D + 1..] {
+                midsides.push(positions.find(tag, element)?);
+            }
         }
         tags.cells.extend(&block.tags);
+    }
+    mesh.is_second_order = !midsides.is_empty();
+    if mesh.is_second_order && midsides.len() != mesh.cell_count() * edges_of_cell::<D>().len() {
+        return Err(Error::Refused(
+            "the file has cells of first and of second order: mesh the whole body with the same Mesh.ElementOrder".into(),
+        ));
     }
     for (position, id) in ids.iter_mut().enumerate().filter(|(_, id)| **id != UNUSED) {
         *id = mesh.nodes.len() as u32;
@@ -36,14 +51,17 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
         tags.nodes.push(document.node_tags[position]);
     }
     if D == 2 {
-        let used = |(position, _): &(usize, &[f64; 3])| ids[*position] != UNUSED;
-        let points = document.points.iter().enumerate().filter(used);
-        flat(points.map(|(position, point)| (document.node_tags[position], point)))?;
+        let corners = (0..ids.len()).filter(|&position| ids[position] != UNUSED);
+        let used = corners.chain(midsides.iter().map(|&position| position as usize));
+        flat(used.map(|position| (document.node_tags[position], &document.points[position])))?;
     }
     mesh.cells.iter_mut().for_each(|node| *node = ids[*node as usize]);
     name_regions(&mut mesh, document)?;
-    reorient(&mut mesh, document);
+    let reversed = reorient(&mut mesh, document);
     check::cells(&mesh, &tags)?;
+    if mesh.is_second_order {
+        curve(&mut mesh, document, midsides, &reversed, &tags)?;
+    }
     let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &tags)?;
     (mesh.facets, mesh.facet_cells) = topology.outer_facets(&mesh.cells);
     drop(topology);
@@ -52,8 +70,63 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
     Ok(mesh)
 }
 
-fn blocks(document: &Document, nodes_per_element: usize) -> impl Iterator<Item = &Block> {
-    document.blocks.iter().filter(move |block| block.nodes_per_element == nodes_per_element)
+/// Keeps the nodes on edges, given by their positions in the file, cell by cell in Gmsh's order, if edges are curved. `reversed` are the
+/// cells whose last two corners were swapped. Refuses cells that are folded or that have different nodes on an edge.
+fn curve<const D: usize>(
+    mesh: &mut GlobalMesh<D>,
+    document: &Document,
+    mut midsides: Vec<u32>,
+    reversed: &[Range<usize>],
+    tags: &Tags,
+) -> Result<()> {
+    let edges = edges_of_cell::<D>();
+    for nodes in midsides.chunks_exact_mut(edges.len()).filter(|_| D == 3) {
+        // Gmsh: edges 01, 12, 20, 03, 23, 13.
+        nodes.swap(4, 5);
+    }
+    for cell in reversed.iter().cloned().flatten() {
+        let nodes = &mut midsides[cell * edges.len()..(cell + 1) * edges.len()];
+        // Triangles: corners 1 and 2 and thus edges 01 and 20; tetrahedra: corners 2 and 3, edges 12 and 13, 20 and 03.
+        let swaps: &[(usize, usize)] = if D == 2 { &[(0, 2)] } else { &[(1, 4), (2, 3)] };
+        swaps.iter().for_each(|&(a, b)| nodes.swap(a, b));
+    }
+    let mut of_edges: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(midsides.len());
+    let mut is_curved = false;
+    mesh.curved.reserve_exact(midsides.len());
+    for (cell, nodes) in midsides.chunks_exact(edges.len()).enumerate() {
+        for (&[a, b], &node) in edges.iter().zip(nodes) {
+            let [a, b] = [a, b].map(|corner| mesh.cell(cell)[corner]);
+            of_edges.push(([a.min(b), a.max(b)], node, cell as u32));
+            let [a, b] = [a, b].map(|corner| &mesh.nodes[corner as usize]);
+            let (at, straight) = (&document.points[node as usize], midpoint(a, b));
+            let at: Vector<D> = std::array::from_fn(|i| at[i]);
+            let size = straight.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+            let allowed = STRAIGHT * norm(&add_scaled(b, -1.0, a)) + 8.0 * f64::EPSILON * size;
+            let is_straight = norm(&add_scaled(&at, -1.0, &straight)) <= allowed;
+            is_curved |= !is_straight;
+            mesh.curved.push(if is_straight { straight } else { at });
+        }
+    }
+    of_edges.sort_unstable();
+    let differ = |pair: &&[([u32; 2], u32, u32)]| pair[0].0 == pair[1].0 && pair[0].1 != pair[1].1;
+    if let Some(pair) = of_edges.windows(2).find(differ) {
+        let cells = [pair[0].2, pair[1].2];
+        return Err(Error::Refused(format!(
+            "{} and {} share an edge but have different nodes on it: make the elements of second order together \
+             (Gmsh: Mesh.ElementOrder = 2, or Set order 2)",
+            tags.cell(cells[0].min(cells[1]) as usize),
+            tags.cell(cells[0].max(cells[1]) as usize)
+        )));
+    }
+    if !is_curved {
+        mesh.curved = Vec::new();
+        return Ok(());
+    }
+    check::curved_cells(mesh, tags)
+}
+
+fn blocks(document: &Document, corners: usize) -> impl Iterator<Item = &Block> {
+    document.blocks.iter().filter(move |block| block.corners == corners)
 }
 
 impl Block {
@@ -211,9 +284,9 @@ fn name_regions<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -
 }
 
 /// Reverses the orientation of the cells of an entity if all of them are negatively oriented, because its normal points in the
-/// opposite direction.
-fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) {
-    let mut first = 0;
+/// opposite direction. Gives the cells whose last two corners were swapped.
+fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) -> Vec<Range<usize>> {
+    let (mut first, mut reversed) = (0, Vec::new());
     for block in blocks(document, D + 1) {
         let cells = first..first + block.tags.len();
         first = cells.end;
@@ -221,8 +294,10 @@ fn reorient<const D: usize>(mesh: &mut GlobalMesh<D>, document: &Document) {
             mesh.cells[cells.start * (D + 1)..cells.end * (D + 1)]
                 .chunks_exact_mut(D + 1)
                 .for_each(|cell| cell.swap(D - 1, D));
+            reversed.push(cells);
         }
     }
+    reversed
 }
 
 /// Finds the facets of each physical group of dimension `D - 1` on the surface. `id` is a node's id by its tag.

@@ -19,7 +19,9 @@ pub(super) struct Document {
 /// The elements of one kind on one entity.
 #[derive(Debug)]
 pub(super) struct Block {
-    /// Number of nodes an element has, one more than its dimension.
+    /// Number of corners of an element, one more than its dimension.
+    pub(super) corners: usize,
+    /// Number of nodes of an element: its corners and, if it is of second order, a node on each edge.
     pub(super) nodes_per_element: usize,
     pub(super) entity: i32,
     pub(super) tags: Vec<u64>,
@@ -211,14 +213,17 @@ impl Document {
             let dimension = dimension(cursor)?;
             let entity = cursor.int("an entity's tag")?;
             let kind = cursor.int("an element type")?;
-            let nodes_per_element = match kind {
-                15 => 1,
-                1 => 2,
-                2 => 3,
-                4 => 4,
+            let (corners, nodes_per_element) = match kind {
+                15 => (1, 1),
+                1 => (2, 2),
+                2 => (3, 3),
+                4 => (4, 4),
+                8 => (2, 3),
+                9 => (3, 6),
+                11 => (4, 10),
                 other => return Err(cursor.refuse(unknown_element(other))),
             };
-            if nodes_per_element != dimension + 1 {
+            if corners != dimension + 1 {
                 return Err(cursor.refuse(format_args!(
                     "element type {kind} does not belong on an entity of dimension {dimension}"
                 )));
@@ -227,6 +232,7 @@ impl Document {
             let count = cursor.count("the number of elements of this block", each)?;
             held += count;
             let mut block = Block {
+                corners,
                 nodes_per_element,
                 entity,
                 tags: Vec::with_capacity(count),
@@ -297,10 +303,7 @@ fn unknown_element(kind: i32) -> String {
         5 => "8-node hexahedra",
         6 => "6-node prisms",
         7 => "5-node pyramids",
-        8 => "3-node (second-order) lines",
-        9 => "6-node (second-order) triangles",
         10 | 16 => "second-order quadrilaterals",
-        11 => "10-node (second-order) tetrahedra",
         12 | 17 => "second-order hexahedra",
         13 | 18 => "second-order prisms",
         14 | 19 => "second-order pyramids",
@@ -311,10 +314,10 @@ fn unknown_element(kind: i32) -> String {
     };
     let advice = match kind {
         3 | 5 | 6 | 7 => "Mesh without recombination",
-        _ => "Mesh with Mesh.ElementOrder = 1",
+        _ => "Mesh with Mesh.ElementOrder = 1 or 2",
     };
     format!(
-        "element type {kind}, {name}: only linear points, lines, triangles and tetrahedra (15, 1, 2, 4) are read. \
-         {advice}"
+        "element type {kind}, {name}: only points, lines, triangles and tetrahedra of order 1 (15, 1, 2, 4) or 2 (8, 9, 11) \
+         are read. {advice}"
     )
 }

@@ -1,4 +1,4 @@
-//! Gmsh MSH 4.1 files, ASCII and binary: linear triangles in the plane or tetrahedra in space.
+//! Gmsh MSH 4.1 files, ASCII and binary: triangles in the plane or tetrahedra in space, of order 1 or 2.
 //!
 //! Physical groups of the dimension of the cells name regions, those one dimension below name boundaries. The only crate for this
 //! format, mshio, omits the names of physical groups and can panic on damaged files. This reader uses no count in a file before it
@@ -27,7 +27,7 @@ pub enum AnyMesh {
 /// Reads and validates a mesh; messages begin with the file's path.
 ///
 /// Tetrahedra give a mesh in space, otherwise triangles give a mesh in the plane. Entities whose cells are all negatively oriented
-/// are reoriented; nodes without a cell are dropped.
+/// are reoriented; nodes without a cell are dropped. Of cells of second order the nodes on edges are kept if edges are curved.
 pub fn read(path: &Path) -> Result<AnyMesh> {
     let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
     if !facts.is_file() && !facts.is_dir() {
@@ -40,9 +40,8 @@ pub fn read(path: &Path) -> Result<AnyMesh> {
 /// Reads and validates a mesh from the bytes of an MSH 4.1 file, as [`read`] does.
 pub fn parse(bytes: &[u8]) -> Result<AnyMesh> {
     let document = Document::parse(bytes)?;
-    let has = |nodes| {
-        document.blocks.iter().any(|block| block.nodes_per_element == nodes && !block.tags.is_empty())
-    };
+    let has =
+        |corners| document.blocks.iter().any(|block| block.corners == corners && !block.tags.is_empty());
     if has(4) {
         assemble::assemble(&document).map(AnyMesh::Three)
     } else if has(3) {

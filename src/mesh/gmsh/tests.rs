@@ -3,3 +3,4 @@ use super::*;
 mod files;
 mod refusals;
 mod samples;
+mod second_order;

@@ -90,7 +90,9 @@ impl<'a> Body<'a> {
             Shading::Linear => self.field(look, linear(extent(values.iter().copied())), of_face)?,
             Shading::Errors => {
                 let mut drawn = self.field(look, of_errors(values), of_face)?;
-                drawn.caption += &format!(" Of all cells together: {} {unit}.", number(length(values)));
+                // Each part of a divided cell has the error of the cell.
+                let total = length(values) / (self.snapshot.parts.max(1) as f64).sqrt();
+                drawn.caption += &format!(" Of all cells together: {} {unit}.", number(total));
                 drawn
             }
         };
@@ -106,7 +108,8 @@ impl<'a> Body<'a> {
     pub fn errors(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let largest = extent(values.iter().copied()).map_or(1.0, |range| range.1);
         let shown = values.iter().map(|value| value.max(DECADES * largest));
-        self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize])
+        let parts = self.snapshot.parts.max(1);
+        self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize / parts])
     }
 
     /// A description of the magnification of the displacement.
@@ -210,7 +213,8 @@ impl<'a> Body<'a> {
             let projected = corners.map(|corner| self.view.project(corner));
             let depth = projected.iter().map(|p| p[2]).sum::<f64>();
             let corners = projected.map(|p| frame.place([p[0], p[1]]));
-            seen.push((depth, Triangle { corners, colour: dimmed(colour(face), light) }));
+            let colour = dimmed(colour(face), light);
+            seen.push((depth, Triangle { corners, colour, is_inside: face.is_inside }));
         }
         match self.view {
             View::Plane => seen.sort_by_key(|(_, triangle)| triangle.colour),

@@ -24,6 +24,8 @@ pub(super) struct Triangle {
     pub corners: [[f64; 2]; 3],
     /// Its fill colour.
     pub colour: Colour,
+    /// Edges, from a corner to the next, that are not drawn above the triangles.
+    pub is_inside: [bool; 3],
 }
 
 /// Drawing of edges, for a small number of triangles.
@@ -60,10 +62,25 @@ fn polygons(triangles: &[Triangle], edges: Edges) -> String {
         let _ = writeln!(
             out,
             "<path fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.3\" d=\"{}\"/>",
-            outlines(triangles)
+            drawn_edges(triangles)
         );
     }
     out + "</g>\n"
+}
+
+fn drawn_edges(triangles: &[Triangle]) -> String {
+    let mut path = String::new();
+    for triangle in triangles {
+        if triangle.is_inside == [false; 3] {
+            path += &outlines(std::slice::from_ref(triangle));
+            continue;
+        }
+        for at in (0..3).filter(|&at| !triangle.is_inside[at]) {
+            let [a, b] = [at, (at + 1) % 3].map(|at| triangle.corners[at]);
+            let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a[0], a[1], b[0], b[1]);
+        }
+    }
+    path
 }
 
 fn outlines(triangles: &[Triangle]) -> String {
@@ -134,9 +151,10 @@ mod tests {
 
     /// Half of the drawing, and many very small triangles in its corner.
     fn half(colour: Colour, count: usize) -> Vec<Triangle> {
-        let speck = Triangle { corners: [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]], colour };
+        let speck = Triangle { corners: [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]], colour, is_inside: [false; 3] };
         let mut all = vec![speck; count];
-        all[0] = Triangle { corners: [[0.0, 0.0], [560.0, 0.0], [0.0, 100.0]], colour };
+        all[0] =
+            Triangle { corners: [[0.0, 0.0], [560.0, 0.0], [0.0, 100.0]], colour, is_inside: [false; 3] };
         all
     }
 

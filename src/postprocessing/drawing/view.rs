@@ -15,13 +15,26 @@ pub struct Face {
     pub nodes: [u32; 3],
     /// Its cell.
     pub cell: u32,
+    /// Whether each of its edges, from a node to the next, lies inside a cell of the file, which the drawing has divided.
+    pub is_inside: [bool; 3],
 }
 
 /// The faces of a body: its cells in 2D, its surface in 3D.
 pub fn faces(snapshot: &Snapshot) -> Vec<Face> {
     if snapshot.dimension() == 2 {
-        let cells = snapshot.cells().enumerate();
-        return cells.map(|(cell, n)| Face { nodes: [n[0], n[1], n[2]], cell: cell as u32 }).collect();
+        let of_part = |cell: usize| match (snapshot.parts, cell % 4) {
+            (4, 0) => [false, true, false],
+            (4, 1) => [false, false, true],
+            (4, 2) => [true, false, false],
+            (4, _) => [true; 3],
+            _ => [false; 3],
+        };
+        let face = |(cell, n): (usize, &[u32])| Face {
+            nodes: [n[0], n[1], n[2]],
+            cell: cell as u32,
+            is_inside: of_part(cell),
+        };
+        return snapshot.cells().enumerate().map(face).collect();
     }
     let mut sides: Vec<([u32; 3], u32, u8)> = Vec::with_capacity(snapshot.cells.len());
     for (cell, nodes) in snapshot.cells().enumerate() {
@@ -112,7 +125,7 @@ fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> F
     let inside = at(snapshot.cells[cell as usize * 4 + opposite as usize]);
     let normal = cross(minus(b, a), minus(c, a));
     let nodes = if dot(normal, minus(inside, a)) > 0.0 { [key[0], key[2], key[1]] } else { key };
-    Face { nodes, cell }
+    Face { nodes, cell, is_inside: [false; 3] }
 }
 
 /// The axis along which the faces between these points have the largest projection: the largest component of their summed area

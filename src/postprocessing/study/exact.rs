@@ -3,7 +3,7 @@
 //! Four Gauss-Legendre points in each direction of the cell, collapsed toward a corner, are exact for polynomials of degree 6 in
 //! the plane and 5 in space. Strains of the solution are fourth-order central differences over a thousandth of the cell size.
 
-use super::squares::{Squares, minus, mix, symmetric, tensor_square};
+use super::squares::{Squares, minus, symmetric, tensor_square};
 use super::{
     document::{Exact, Quantity, Space},
     stored::{FieldAt, Values},
@@ -70,20 +70,19 @@ impl ExactFields {
         };
         for cell in cells {
             let mut sum = Squares::default();
-            let corners = mesh.corners(cell);
-            let volume = mesh.geometry[cell].volume;
-            let size = volume.powf(1.0 / D as f64);
+            let size = mesh.geometry[cell].volume.powf(1.0 / D as f64);
             for (shares, weight) in rule::<D>() {
-                let point = mix(&corners, &shares);
+                let point = mesh.value(&mesh.nodes, cell, &shares);
+                let volume = mesh.tangent(cell, &shares).volume;
                 let (error, norm) = match (space, values) {
                     (Space::H, Values::Nodal(nodal)) => {
-                        let (exact, here) = (vector(&point), mix(&mesh.of_corners(nodal, cell), &shares));
+                        let (exact, here) = (vector(&point), mesh.value(nodal, cell, &shares));
                         let error: f64 = (0..D).map(|i| (here[i] - exact[i]).powi(2)).sum();
                         (error, exact.iter().map(|value| value * value).sum())
                     }
                     (Space::V, Values::Nodal(nodal)) => {
                         let exact = symmetric(&gradient(&vector, &point, NEARBY * size));
-                        let here = mesh.geometry[cell].field_gradient(&mesh.of_corners(nodal, cell)[..=D]);
+                        let here = mesh.gradient(nodal, cell, &shares);
                         (tensor_square(&minus(&symmetric(&here), &exact)), tensor_square(&exact))
                     }
                     (Space::Q, Values::Cells(stress)) => {
@@ -116,7 +115,7 @@ impl ExactFields {
 }
 
 /// Shares of the corners and weights that sum to 1.
-fn rule<const D: usize>() -> Vec<([f64; 4], f64)> {
+pub(super) fn rule<const D: usize>() -> Vec<([f64; 4], f64)> {
     let mut points = Vec::new();
     for (u, first) in LINE {
         for (v, second) in LINE {
@@ -161,7 +160,11 @@ mod tests {
     use super::*;
     use crate::job::Expression;
     use crate::{
-        mesh::generate::{Diagonal, box_mesh, rectangle},
+        mesh::{
+            generate::{Diagonal, box_mesh, rectangle},
+            midpoint,
+            shape::edges_of_cell,
+        },
         postprocessing::study::stored::StoredMesh,
     };
 
@@ -231,6 +234,44 @@ mod tests {
             assert!(sum.error < 1e-15 && sum.size > 0.1, "{sum:?}");
         }
         assert_eq!(exact.stress_at::<3>(0.0, &[0.0; 3]), [1.0, 6.0, 5.0, 2.0, 4.0, 3.0]);
+    }
+
+    #[test]
+    fn quadratic_fields_on_straight_and_curved_cells_are_met_by_their_interpolants() {
+        let exact = ExactFields {
+            displacement: expressions(&["x^2 - x*y", "y^2 + 3*x*y"]),
+            velocity: Vec::new(),
+            stress: Vec::new(),
+        };
+        let field = |p: &Vector<2>| [p[0] * p[0] - p[0] * p[1], p[1] * p[1] + 3.0 * p[0] * p[1]];
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let middles: Vec<Vector<2>> =
+            edges_of_cell::<2>().iter().map(|&[a, b]| midpoint(&corners[a], &corners[b])).collect();
+        let nodes: Vec<Vector<2>> = corners.iter().chain(&middles).copied().collect();
+        let squares_of = |nodes: Vec<Vector<2>>, space, field: &dyn Fn(&Vector<2>) -> Vector<2>| {
+            let mesh = StoredMesh::quadratic(nodes, &[0, 1, 2, 3, 4, 5]);
+            let nodal = Values::Nodal(mesh.nodes.iter().map(field).collect());
+            let field = FieldAt { of: Quantity::Displacement, time: 0.5, mesh: &mesh, values: &nodal };
+            (mesh.is_curved, squares(&exact, space, field).expect("sum"))
+        };
+        for space in [Space::H, Space::V] {
+            let (is_curved, sum) = squares_of(nodes.clone(), space, &field);
+            assert!(!is_curved && sum.error < 1e-18 && sum.size > 0.01, "{sum:?}");
+        }
+        // A bulge of a tenth along an edge of length 1 adds 2/3 of it to the area; the norm of (1, 0) is the area.
+        let exact = ExactFields { displacement: expressions(&["0", "0"]), ..exact.clone() };
+        let mut bulging = nodes;
+        bulging[3][1] = -0.1;
+        let mesh = StoredMesh::quadratic(bulging, &[0, 1, 2, 3, 4, 5]);
+        let nodal = Values::Nodal(vec![[1.0, 0.0]; 6]);
+        let field = FieldAt { of: Quantity::Displacement, time: 0.0, mesh: &mesh, values: &nodal };
+        let sum = squares(&exact, Space::H, field).expect("sum");
+        assert!((sum.error - (0.5 + 0.2 / 3.0)).abs() < 1e-15, "{sum:?}");
+        let linear = Values::Nodal(mesh.nodes.iter().map(|p| [p[0] + 2.0 * p[1], 0.0]).collect());
+        let field = FieldAt { values: &linear, ..field };
+        let sum = squares(&exact, Space::V, field).expect("sum");
+        // Strain xx = 1, xy = 1.
+        assert!((sum.error - 3.0 * (0.5 + 0.2 / 3.0)).abs() < 1e-14, "{sum:?}");
     }
 
     #[test]

@@ -93,6 +93,13 @@ pub(super) fn errors<const D: usize>(
     };
     let pair = Pair::new(session, &run, against);
     let mut found = Errors { notes: covered(pair.uncovered)?, ..Errors::default() };
+    let is_quadratic =
+        [Some(&run), reference.as_ref()].into_iter().flatten().any(|fields| fields.mesh.order() == 2);
+    if is_quadratic && norms.iter().any(|norm| norm.of == Quantity::Stress) {
+        let words = "of quadratic cells the mean stress is compared, which varies less than the stress at their points: its error \
+                     is larger and falls by one order less";
+        found.notes.push(words.into());
+    }
     let mut known: Vec<(Kind, (Vec<Squares>, Place))> = Vec::new();
     for norm in norms {
         let kind = Kind { of: norm.of, space: norm.space, at_end: norm.over == Over::End };

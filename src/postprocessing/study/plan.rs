@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    job::{Document, Every, Job, Loaded, Mesh, Scheme, normal, read},
+    job::{Document, Every, Job, Loaded, MeshSource, Scheme, normal, read},
 };
 use std::path::{Path, PathBuf};
 
@@ -197,7 +197,7 @@ impl Source<'_> {
     ) -> Result<Planned> {
         let mut overrides = self.set.to_vec();
         if let Some(cells) = &run.cells {
-            let kind = if matches!(self.base.mesh, Mesh::Box(_)) { "box" } else { "rectangle" };
+            let kind = if matches!(self.base.mesh.source, MeshSource::Box(_)) { "box" } else { "rectangle" };
             overrides.push(format!("mesh.{kind}.cells={cells:?}"));
         }
         overrides.extend(run.step.map(|step| format!("time.step={step:?}")));
@@ -209,10 +209,10 @@ impl Source<'_> {
             Error::Refused(format!("the job of run {} is refused:\n{error}", called(run, fixed_name)))
         })?;
         let job = &mut loaded.job;
-        let cells = match &job.mesh {
-            Mesh::Rectangle(mesh) => mesh.cells.to_vec(),
-            Mesh::Box(mesh) => mesh.cells.to_vec(),
-            Mesh::File(_) => Vec::new(),
+        let cells = match &job.mesh.source {
+            MeshSource::Rectangle(mesh) => mesh.cells.to_vec(),
+            MeshSource::Box(mesh) => mesh.cells.to_vec(),
+            MeshSource::File(_) => Vec::new(),
         };
         let mut name = match (fixed_name, &run.name) {
             (Some(fixed), _) => fixed.to_owned(),

@@ -5,7 +5,11 @@ use crate::{
     fem::space::Simplex,
     io::output::fields::Place,
     linear_algebra::tensor::Vector,
-    postprocessing::study::document::Quantity,
+    mesh::{
+        midpoint,
+        shape::{edges_of_cell, quadratic_values, tangent_corners},
+    },
+    postprocessing::study::{document::Quantity, squares::mix},
 };
 use std::path::{Path, PathBuf};
 
@@ -17,9 +21,13 @@ const SAME_TIME: f64 = 1e-9;
 pub struct StoredMesh<const D: usize> {
     /// Coordinates in m of the nodes.
     pub nodes: Vec<Vector<D>>,
-    /// Nodes, `D + 1` per cell.
+    /// Corners, `D + 1` per cell.
     pub cells: Vec<u32>,
-    /// Volumes and gradients.
+    /// Nodes on the edges of quadratic cells, in the order of [`edges_of_cell`]; empty for linear cells.
+    pub midsides: Vec<u32>,
+    /// Whether such nodes are not the midpoints of their edges.
+    pub is_curved: bool,
+    /// Volumes and gradients between the corners.
     pub geometry: Vec<Simplex<D>>,
 }
 
@@ -32,7 +40,69 @@ impl<const D: usize> StoredMesh<D> {
             Simplex::new(&points[..=D])
         };
         let geometry = cells.chunks_exact(D + 1).map(of).collect();
-        Self { nodes, cells, geometry }
+        Self { nodes, cells, midsides: Vec::new(), is_curved: false, geometry }
+    }
+
+    /// The same of quadratic cells, each with its corners and the nodes on its edges.
+    pub fn quadratic(nodes: Vec<Vector<D>>, cells: &[u32]) -> Self {
+        let edges = edges_of_cell::<D>();
+        let rows = || cells.chunks_exact(D + 1 + edges.len());
+        let of_corners = rows().flat_map(|row| &row[..=D]).copied().collect();
+        let mut mesh = Self::new(nodes, of_corners);
+        mesh.midsides = rows().flat_map(|row| &row[D + 1..]).copied().collect();
+        let at = |node: u32| &mesh.nodes[node as usize];
+        let is_bent = |row: &[u32]| {
+            let bent = |(&[a, b], &node): (&[usize; 2], &u32)| *at(node) != midpoint(at(row[a]), at(row[b]));
+            edges.iter().zip(&row[D + 1..]).any(bent)
+        };
+        mesh.is_curved = rows().any(is_bent);
+        mesh
+    }
+
+    /// 1 for linear cells, 2 for quadratic ones.
+    pub fn order(&self) -> usize {
+        if self.midsides.is_empty() { 1 } else { 2 }
+    }
+
+    /// Values at the nodes of a quadratic cell, of which those that it has are used.
+    fn of_nodes(&self, nodal: &[Vector<D>], cell: usize) -> [Vector<D>; 10] {
+        let edges = edges_of_cell::<D>().len();
+        let corners = &self.cells[cell * (D + 1)..][..=D];
+        let nodes = corners.iter().chain(&self.midsides[cell * edges..][..edges]);
+        let mut out = [[0.0; D]; 10];
+        out.iter_mut().zip(nodes).for_each(|(value, &node)| *value = nodal[node as usize]);
+        out
+    }
+
+    /// The value of a nodal field in a cell at a point with these barycentric coordinates.
+    pub fn value(&self, nodal: &[Vector<D>], cell: usize, shares: &[f64; 4]) -> Vector<D> {
+        if self.order() == 1 {
+            return mix(&self.of_corners(nodal, cell), shares);
+        }
+        let (values, shares) = (self.of_nodes(nodal, cell), quadratic_values::<D>(shares));
+        std::array::from_fn(|i| values.iter().zip(&shares).map(|(value, share)| share * value[i]).sum())
+    }
+
+    /// The linear cell that has the Jacobian of a cell at such a point.
+    pub fn tangent(&self, cell: usize, shares: &[f64; 4]) -> Simplex<D> {
+        if !self.is_curved {
+            return self.geometry[cell];
+        }
+        Simplex::new(&self.tangent_values(&self.nodes, cell, shares)[..=D])
+    }
+
+    /// The gradient of a nodal field in a cell at such a point.
+    pub fn gradient(&self, nodal: &[Vector<D>], cell: usize, shares: &[f64; 4]) -> [[f64; D]; D] {
+        self.tangent(cell, shares).field_gradient(&self.tangent_values(nodal, cell, shares)[..=D])
+    }
+
+    /// The values at the corners of the linear field with the gradient of a nodal field at such a point.
+    fn tangent_values(&self, nodal: &[Vector<D>], cell: usize, shares: &[f64; 4]) -> [Vector<D>; 4] {
+        if self.order() == 1 {
+            return self.of_corners(nodal, cell);
+        }
+        let nodes = D + 1 + edges_of_cell::<D>().len();
+        tangent_corners(&self.of_nodes(nodal, cell)[..nodes], shares)
     }
 
     /// Number of cells.
@@ -110,20 +180,25 @@ impl<const D: usize> StoredFields<D> {
         let file = hdf5::File::open(&path).map_err(unreadable)?;
         let numbers = |name: &str| file.dataset(name).and_then(|set| set.read_raw::<f64>());
         let points = numbers("VTKHDF/Points").map_err(unreadable)?;
-        let corners = file.dataset("Mesh/cells").and_then(|set| set.read_raw::<i64>()).map_err(unreadable)?;
+        let table = file.dataset("Mesh/cells").map_err(unreadable)?;
+        let width = table.shape().get(1).copied().unwrap_or(0);
+        let nodes_of_cells = table.read_raw::<i64>().map_err(unreadable)?;
         let mut times = numbers("VTKHDF/Steps/Values").map_err(unreadable)?;
         let steps = file.group("VTKHDF/Steps").and_then(|group| group.attr("NSteps"));
         let steps: i64 = steps.and_then(|attribute| attribute.read_scalar()).map_err(unreadable)?;
         times.truncate(usize::try_from(steps).unwrap_or(0));
         let nodes: Vec<Vector<D>> = points.chunks_exact(3).map(|p| std::array::from_fn(|i| p[i])).collect();
-        let cells: Vec<u32> = corners.iter().map(|&node| node as u32).collect();
+        let cells: Vec<u32> = nodes_of_cells.iter().map(|&node| node as u32).collect();
+        let is_quadratic = width == D + 1 + edges_of_cell::<D>().len();
         if cells.is_empty()
-            || !cells.len().is_multiple_of(D + 1)
+            || !(width == D + 1 || is_quadratic)
             || cells.iter().any(|&n| n as usize >= nodes.len())
         {
             return Err(Error::Failed(format!("{}: its mesh is damaged; remove the folder", path.display())));
         }
-        Ok(Self { mesh: StoredMesh::new(nodes, cells), file, times, path })
+        let mesh =
+            if is_quadratic { StoredMesh::quadratic(nodes, &cells) } else { StoredMesh::new(nodes, cells) };
+        Ok(Self { mesh, file, times, path })
     }
 
     /// The values of a quantity at step `step` of the file.

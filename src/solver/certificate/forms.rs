@@ -2,10 +2,10 @@
 
 use crate::{
     error::Result,
-    fem::{body::Body, effect::Contact},
+    fem::{body::Body, effect::Contact, space::facet_points},
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{dot, norm},
+        tensor::{add_scaled, dot, norm},
     },
     mesh::{Mesh, shape::facet_normal},
 };
@@ -19,16 +19,32 @@ pub(super) fn add_trace<const D: usize>(
     x: &[f64],
     forces: &mut [f64],
 ) {
+    let trace = |value: [f64; D], normal_at: &[f64; D]| -> [f64; D] {
+        let along = dot(&value, normal_at);
+        std::array::from_fn(|i| tangential * value[i] + (normal - tangential) * along * normal_at[i])
+    };
+    let value = |n: u32| -> [f64; D] { std::array::from_fn(|i| x[n as usize * D + i]) };
     for &facet in contact.facets() {
+        if mesh.order() > 1 {
+            let (nodes, points) = facet_points(mesh, facet);
+            for point in points {
+                let at_point = nodes.clone().zip(point.shares);
+                let mean =
+                    at_point.clone().fold([0.0; D], |sum, (n, share)| add_scaled(&sum, share, &value(n)));
+                let force = trace(mean, &point.normal);
+                for (n, share) in at_point {
+                    for i in 0..D {
+                        forces[n as usize * D + i] += point.weight * share * force[i];
+                    }
+                }
+            }
+            continue;
+        }
         let nodes = mesh.facets[facet as usize];
         let square = facet_normal(&mesh.facet_corners(facet));
         let measure = norm(&square);
         let unit = square.map(|c| c / measure);
-        let weighted = nodes.map(|n| {
-            let value: [f64; D] = std::array::from_fn(|i| x[n as usize * D + i]);
-            let along = dot(&value, &unit);
-            std::array::from_fn(|i| tangential * value[i] + (normal - tangential) * along * unit[i])
-        });
+        let weighted = nodes.map(|n| trace(value(n), &unit));
         let total: [f64; D] = std::array::from_fn(|i| weighted.iter().map(|w: &[f64; D]| w[i]).sum());
         for (a, node) in nodes.iter().enumerate() {
             for i in 0..D {

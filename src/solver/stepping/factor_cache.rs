@@ -144,6 +144,7 @@ mod tests {
             let precision = FactorPrecision::Auto;
             let problem = ProblemSize {
                 dimension: 3,
+                order: 1,
                 unknowns,
                 ranks,
                 steps: 2,

@@ -16,6 +16,8 @@ pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner}
 pub struct ProblemSize {
     /// Dimension of the space.
     pub dimension: usize,
+    /// Order of the shape functions.
+    pub order: usize,
     /// Velocity components over all ranks.
     pub unknowns: usize,
     /// Processes.
@@ -163,6 +165,7 @@ mod tests {
         };
         ProblemSize {
             dimension,
+            order: 1,
             unknowns,
             ranks,
             interface,

@@ -3,10 +3,10 @@
 //! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
 use crate::{
-    fem::space::facet_rule,
+    fem::space::facet_points,
     laws::contact::{NodeContext, NormalResponse, Resolved},
     linear_algebra::tensor::{Vector, norm},
-    mesh::{Mesh, shape::facet_normal},
+    mesh::Mesh,
 };
 
 /// The unknown along the normal at a point.
@@ -29,6 +29,15 @@ pub(super) enum Vectors {
     Newton,
 }
 
+/// A node of a point beside its first ones.
+#[derive(Debug, Clone, Copy)]
+struct OtherNode<const D: usize> {
+    /// As those of the [`Point`].
+    numbers: [u32; 2],
+    share: f64,
+    force: Vector<D>,
+}
+
 /// A point at which the law is evaluated: its velocity is a mean of nodal ones, and its pressure acts on the same nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Point<const D: usize> {
@@ -42,6 +51,8 @@ pub(super) struct Point<const D: usize> {
     pub weight: f64,
     /// Force on each node per pressure, without prescribed components, in m^(D-1).
     force: [Vector<D>; D],
+    /// The nodes on the edges of a quadratic facet.
+    others: Box<[OtherNode<D>]>,
     /// At nodal points: the normal without prescribed components, scaled to length 1.
     pub direction: Vector<D>,
     /// Length of the normal without prescribed components before scaling.
@@ -71,11 +82,12 @@ impl<const D: usize> Point<D> {
     pub(super) fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
         let mut point = Self {
             numbers: [[0; D]; 2],
-            count: nodes.len(),
+            count: nodes.len().min(D),
             shares: [0.0; D],
             normal,
             weight,
             force: [[0.0; D]; D],
+            others: Box::default(),
             direction: [0.0; D],
             free_length: 0.0,
             unknown: Unknown::Velocity,
@@ -89,15 +101,19 @@ impl<const D: usize> Point<D> {
             slope: 0.0,
             change: 0.0,
         };
-        for (a, (&node, &share)) in nodes.iter().zip(shares).enumerate() {
+        let force =
+            |node: u32, share: f64| -> Vector<D> {
+                std::array::from_fn(|i| {
+                    if fixed[node as usize * D + i] { 0.0 } else { weight * share * normal[i] }
+                })
+            };
+        for (a, (&node, &share)) in nodes.iter().zip(shares).enumerate().take(D) {
             point.numbers.iter_mut().for_each(|numbers| numbers[a] = node);
             point.shares[a] = share;
-            for i in 0..D {
-                if !fixed[node as usize * D + i] {
-                    point.force[a][i] = weight * share * normal[i];
-                }
-            }
+            point.force[a] = force(node, share);
         }
+        let other = |(&node, &share)| OtherNode { numbers: [node; 2], share, force: force(node, share) };
+        point.others = nodes.iter().zip(shares).skip(D).map(other).collect();
         point
     }
 
@@ -133,6 +149,9 @@ impl<const D: usize> Point<D> {
     pub(super) fn number_unknowns(&mut self, number: impl Fn(usize) -> usize) {
         self.numbers[Vectors::Newton as usize] =
             self.numbers[Vectors::Body as usize].map(|node| number(node as usize) as u32);
+        for OtherNode { numbers: [body, newton], .. } in &mut self.others {
+            *newton = number(*body as usize) as u32;
+        }
     }
 
     /// Local numbers of the nodes and their weights.
@@ -142,7 +161,10 @@ impl<const D: usize> Point<D> {
 
     /// Numbers of the nodes in these vectors, and their weights.
     fn places(&self, vectors: Vectors) -> impl Iterator<Item = (usize, f64)> {
-        self.numbers[vectors as usize][..self.count].iter().map(|&node| node as usize).zip(self.shares)
+        let others =
+            self.others.iter().map(move |other| (other.numbers[vectors as usize] as usize, other.share));
+        let first = self.numbers[vectors as usize][..self.count].iter();
+        first.map(|&node| node as usize).zip(self.shares).chain(others)
     }
 
     /// The normal component of the mean of nodal values.
@@ -154,6 +176,12 @@ impl<const D: usize> Point<D> {
             let value = &nodal[numbers[a] as usize * D..][..D];
             for i in 0..D {
                 sum += self.shares[a] * self.normal[i] * value[i];
+            }
+        }
+        for other in &self.others {
+            let value = &nodal[other.numbers[vectors as usize] as usize * D..][..D];
+            for i in 0..D {
+                sum += other.share * self.normal[i] * value[i];
             }
         }
         sum
@@ -194,6 +222,12 @@ impl<const D: usize> Point<D> {
             let target = &mut forces[numbers[a] as usize * D..][..D];
             for i in 0..D {
                 target[i] += pressure * self.force[a][i];
+            }
+        }
+        for other in &self.others {
+            let target = &mut forces[other.numbers[vectors as usize] as usize * D..][..D];
+            for i in 0..D {
+                target[i] += pressure * other.force[i];
             }
         }
     }
@@ -237,11 +271,13 @@ impl<const D: usize> Point<D> {
     /// The unbalanced normal force per area at this point, from a residual, a vector of Newton's method.
     pub(super) fn open_pressure(&self, residual: &[f64]) -> f64 {
         let mut largest = 0.0f64;
-        for a in 0..self.count {
-            let at = self.numbers[Vectors::Newton as usize][a] as usize * D;
+        let first = self.numbers[Vectors::Newton as usize][..self.count].iter().zip(&self.force);
+        let others = self.others.iter().map(|other| (&other.numbers[Vectors::Newton as usize], &other.force));
+        for (&number, force) in first.chain(others) {
+            let at = number as usize * D;
             let Some(value) = residual.get(at..at + D) else { continue };
-            let share: f64 = (0..D).map(|i| self.force[a][i] * self.force[a][i]).sum::<f64>().sqrt();
-            let along: f64 = (0..D).map(|i| self.force[a][i] * value[i]).sum();
+            let share: f64 = (0..D).map(|i| force[i] * force[i]).sum::<f64>().sqrt();
+            let along: f64 = (0..D).map(|i| force[i] * value[i]).sum();
             if share > 0.0 && (along / (share * share)).abs() > largest.abs() {
                 largest = along / (share * share);
             }
@@ -252,10 +288,7 @@ impl<const D: usize> Point<D> {
 
 /// The Gauss points of a facet.
 pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
-    let nodes = mesh.facets[facet as usize];
-    let normal = facet_normal(&mesh.facet_corners(facet));
-    let measure = norm(&normal);
-    let unit = normal.map(|x| x / measure);
-    let rule = facet_rule::<D>().iter();
-    rule.map(|(place, weight)| Point::new(&nodes, &place[..D], unit, measure * weight, fixed)).collect()
+    let (nodes, points) = facet_points(mesh, facet);
+    let nodes: Vec<u32> = nodes.collect();
+    points.map(|p| Point::new(&nodes, &p.shares[..nodes.len()], p.normal, p.weight, fixed)).collect()
 }

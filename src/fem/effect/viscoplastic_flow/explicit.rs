@@ -138,7 +138,7 @@ mod tests {
         let geometry = Geometry::with_materials(&mesh, material);
         let materials = 1 + geometry.runs.iter().map(|run| run.material).max().expect("cells");
         let laws = ByMaterial::new(vec![Some(law); materials]).expect("a law");
-        let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry.runs);
+        let mut effect = ViscoplasticFlow::<S>::new(laws, &geometry);
         let values = |shift: usize| -> Vec<f64> {
             (0..mesh.nodes.len() * D).map(|i| 0.1 * number(i + shift) * number(1 + i / 20).powi(4)).collect()
         };

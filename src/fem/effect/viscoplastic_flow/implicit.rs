@@ -62,7 +62,7 @@ impl<const S: usize> ViscoplasticFlow<S> {
             add_to(&mut batch.elastic_stress, lane, -1.0, &release);
             outcome.has_flowed = true;
             if let Some(tangents) = &mut outcome.tangents {
-                tangents.push(batch.first + lane, &tangent_change(law, &tangent, length), symmetric);
+                tangents.push(batch.first_point + lane, &tangent_change(law, &tangent, length), symmetric);
             }
         }
     }

@@ -6,7 +6,7 @@ use super::{
     Phases, Role, Step, StressError, Term, cell_history::CellHistory, isotropic,
 };
 use crate::{
-    fem::space::{Batch, CellRun, Integrity, Needs},
+    fem::space::{Batch, Geometry, Integrity, Needs},
     laws::material::{ByMaterial, Flow, FlowLaw},
 };
 
@@ -24,14 +24,17 @@ pub struct ViscoplasticFlow<const S: usize> {
 }
 
 impl<const S: usize> ViscoplasticFlow<S> {
-    /// No history yet, for the cells of these runs whose material has a law.
-    pub fn new(laws: ByMaterial<FlowLaw>, runs: &[CellRun]) -> Self {
+    /// No history yet, for the cells whose material has a law.
+    pub fn new<const D: usize>(laws: ByMaterial<FlowLaw>, geometry: &Geometry<D>) -> Self {
         let flows = |material: usize| laws.get(material).is_some();
         let hardens = |material: usize| laws.get(material).is_some_and(FlowLaw::hardens);
-        let stress = CellHistory::new(["viscoplastic_history", "previous_viscoplastic_history"], runs, flows);
+        let stress =
+            CellHistory::new(["viscoplastic_history", "previous_viscoplastic_history"], geometry, flows);
         let names = ["equivalent_viscoplastic_strain", "previous_equivalent_viscoplastic_strain"];
-        let accumulated =
-            laws.laws().any(FlowLaw::hardens).then(|| CellHistory::new(names, runs, hardens).without_error());
+        let accumulated = laws
+            .laws()
+            .any(FlowLaw::hardens)
+            .then(|| CellHistory::new(names, geometry, hardens).without_error());
         let properties = FlowProperties {
             step_bound: laws.laws().map(|law| 2.0 / law.fastest_rate::<S>(1.0)).fold(f64::INFINITY, f64::min),
             has_power_law: laws.laws().any(FlowLaw::is_power_law),

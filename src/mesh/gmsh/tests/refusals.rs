@@ -91,8 +91,8 @@ fn other_elements_are_refused_by_name() {
         &["section $Elements", "type 3, 4-node quadrilaterals"],
     );
     refused(
-        &SQUARE.text().replace("2 1 2 2", "2 1 9 2"),
-        &["6-node (second-order) triangles", "ElementOrder = 1"],
+        &SQUARE.text().replace("2 1 2 2", "2 1 21 2"),
+        &["type 21, triangles of order 3 to 5", "ElementOrder = 1 or 2"],
     );
     refused(&SQUARE.text().replace("2 1 2 2", "2 1 99 2"), &["type 99"]);
     refused(
