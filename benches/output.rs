@@ -215,6 +215,7 @@ fn with_fields(
     let mesh = FieldMesh::<2> {
         points: &part.points,
         point_ids: &part.point_ids,
+        nodes_per_cell: 3,
         cells: &part.cells,
         cell_ids: &part.cell_ids,
     };

@@ -284,6 +284,8 @@ fn every_key_is_described() {
         "youngs_modulus: a number; above 0; unit Pa; required",
         "example: poisson_ratio = 0.4",
         "default 1e-10",
+        "pressure: a number or an expression in t, x, y, z; unit Pa",
+        "value: a list of items, each a number or an expression in t, x, y, z; unit Pa",
         "\"bdf2\": Second order in time.",
     ] {
         assert!(text.contains(part), "{part} is not in {text}");

@@ -10,18 +10,18 @@ use crate::{
     error::Result,
     fem::{
         effect::{
-            Contact, Curvature, Effect, Energy, Evaluation, FlowProperties, Form, History, HistoryStore,
-            Load, Outcome, PeakSquares, Peaks, Phases, STORED_IN_CONTACT, Step, StressError, SurfaceEffect,
-            SurfaceForce, Term,
+            Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
+            HistoryStore, Load, Outcome, PeakSquares, Peaks, Phases, STORED_IN_CONTACT, Step, StressError,
+            SupportMotion, SurfaceEffect, SurfaceForce, Term,
         },
-        space::{Batch, Geometry, Needs, Nodal, assemble},
+        space::{Batch, Geometry, Held, Needs, Nodal, assemble},
         state::State,
     },
     laws::material::Isotropic,
     linear_algebra::{
         petsc::{BlockRows, DistributedVector},
         simd::Pack,
-        tensor::{Mandel, add_scaled, larger},
+        tensor::{Mandel, Vector, add_scaled, larger},
     },
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
@@ -42,8 +42,12 @@ pub struct Body<const D: usize, const S: usize> {
     pub surface_effects: Vec<Box<dyn SurfaceEffect<D>>>,
     /// Tractions and body forces.
     pub load: Load,
-    /// One flag a local component: held by a support.
-    pub fixed: Vec<bool>,
+    /// What supports hold.
+    pub held: Held<D>,
+    /// Springs and dashpots of supports.
+    pub elastic_support: ElasticSupport<D>,
+    /// The motion of supports, if some move.
+    pub support_motion: Option<SupportMotion<D>>,
     /// The state at which laws are evaluated, converged or at the end of the step being taken.
     evaluation: Evaluation,
     /// The step being taken, if laws are evaluated at its end.
@@ -58,12 +62,12 @@ pub struct Body<const D: usize, const S: usize> {
 
 impl<const D: usize, const S: usize> Body<D, S> {
     /// A body with these effects, without contact and loads, whose laws are evaluated at the converged state or at the end of steps;
-    /// `fixed` has one flag a local component.
+    /// `held` is what supports hold.
     pub fn new(
         mesh: Mesh<D>,
         geometry: Geometry<D>,
         effects: Vec<Box<dyn Effect<D, S>>>,
-        fixed: Vec<bool>,
+        held: Held<D>,
         evaluation: Evaluation,
     ) -> Self {
         Self {
@@ -73,7 +77,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
             contacts: Vec::new(),
             surface_effects: Vec::new(),
             load: Load::default(),
-            fixed,
+            held,
+            elastic_support: ElasticSupport::default(),
+            support_motion: None,
             evaluation,
             step: Step::default(),
             evaluated: Vec::new(),
@@ -83,7 +89,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// Whether laws are evaluated at the converged state.
-    fn is_explicit(&self) -> bool {
+    pub fn is_explicit(&self) -> bool {
         self.evaluation == Evaluation::Converged
     }
 
@@ -94,11 +100,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
             .filter(|term| !(self.is_explicit() && term.form() == Some(Form::Elasticity)))
             .collect();
         let mut runs = self.geometry.runs.iter().copied().peekable();
-        assemble(session, &self.mesh, &self.geometry, &self.fixed, |cell, geometry, matrix| {
-            while runs.next_if(|run| run.first + run.count <= cell).is_some() {}
-            let Some(material) = runs.peek().map(|run| run.material) else { return };
-            terms.iter().for_each(|term| term.add_matrix(material, geometry, length, matrix));
-        })
+        let mut rows =
+            assemble(session, &self.mesh, &self.geometry, &self.held, |cell, geometry, matrix| {
+                while runs.next_if(|run| run.first + run.count <= cell).is_some() {}
+                let Some(material) = runs.peek().map(|run| run.material) else { return };
+                terms.iter().for_each(|term| term.add_matrix(material, geometry, length, matrix));
+            })?;
+        let length = (!self.is_explicit()).then_some(length);
+        self.elastic_support.add_to_rows(&self.mesh, &self.held, length, &mut rows);
+        Ok(rows)
     }
 
     /// Adds the forces of the converged state at the start of a step to `forces` (with ghosts), and gives the energies that are known
@@ -124,7 +134,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
             (self.evaluation, self.step) = (Evaluation::End(blend), step);
         }
         self.evaluated.clear();
-        let (mut outcome, mut squares) = (Outcome::default(), 0.0);
+        let mut outcome = Outcome::default();
+        let mut squares = self.elastic_support.add_start_forces(nodal.displacement, forces);
         for effect in &mut self.surface_effects {
             effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);
         }
@@ -157,6 +168,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         with_nodal(state, |nodal| {
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
             energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
+            self.elastic_support.add_energy(self.evaluation, step, nodal, &mut energy);
             let effects = self.surface_effects.iter();
             effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
             let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
@@ -191,7 +203,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Whether an effect has this form.
     pub fn has_form(&self, form: Form) -> bool {
         let on_the_surface = form == Form::Elasticity && !self.surface_effects.is_empty();
-        on_the_surface || self.terms().any(|term| term.form() == Some(form))
+        on_the_surface || self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form))
     }
 
     /// Whether an effect has this form in every material of the body.
@@ -214,11 +226,32 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// Adds `F x` with the matrix `F` of a form to `forces`; both have ghosts, and held components are not yet zero.
     pub fn add_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
-        let needs =
-            Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
         if form == Form::Elasticity {
             self.surface_effects.iter().for_each(|e| e.add_stiffness(x, forces));
         }
+        self.add_linear_form(form, x, forces);
+    }
+
+    /// Adds `K x` to `forces`, with the matrix of [`Body::matrix`] before components are held; both with ghosts. `scaled` is work
+    /// space.
+    pub fn add_matrix_product(&self, length: f64, x: &[f64], scaled: &mut Vec<f64>, forces: &mut [f64]) {
+        let forms = [(Form::Mass, 1.0 / length), (Form::Viscosity, 1.0), (Form::Elasticity, length)];
+        let is_in_matrix = |form: Form| {
+            !(self.is_explicit() && form == Form::Elasticity)
+                && (self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form)))
+        };
+        for (form, factor) in forms.into_iter().filter(|(form, _)| is_in_matrix(*form)) {
+            scaled.clear();
+            scaled.extend(x.iter().map(|x| factor * x));
+            self.add_linear_form(form, scaled, forces);
+        }
+    }
+
+    /// Adds `F x` with the part of the matrix `F` of a form that is in the matrix of a step.
+    fn add_linear_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
+        self.elastic_support.add_form(form, x, forces);
+        let needs =
+            Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
         let called = Called::filter(&self.effects, |effect| effect.term().form() == Some(form));
         Batch::for_all(&self.mesh, &self.geometry, Nodal::all(x), needs, |batch: &mut Batch<D, S>| {
             if form == Form::Strain {
@@ -274,6 +307,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// make in it, of this rank, given the displacement at the end.
     pub fn stress_error(&self, curvature: Curvature, displacement: &[f64]) -> StressError {
         let mut error = StressError::default();
+        self.elastic_support.add_error(displacement, &mut error);
         self.surface_effects.iter().for_each(|effect| effect.add_error(curvature, displacement, &mut error));
         let Some(needs) = self.needs(|p| p.error) else { return error };
         // Those that weaken before the others.
@@ -433,9 +467,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.visit_histories(&mut |history| history.restore(name, values));
     }
 
+    /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.
+    pub fn support_directions(&self) -> impl Iterator<Item = (usize, Vector<D>)> {
+        self.held.slanted_directions().chain(self.elastic_support.directions(!self.is_explicit()))
+    }
+
     /// Velocity components that no support holds, over all ranks. Collective.
     pub fn unknowns(&self, session: &Session) -> usize {
-        session.total(self.fixed[..self.mesh.owned * D].iter().filter(|fixed| !**fixed).count())
+        session.total((0..self.mesh.owned).map(|node| self.held.free_count(node)).sum())
     }
 
     /// Names of all effects, loads and contact.
@@ -446,6 +485,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         if !self.load.body_forces.is_empty() {
             names.push("body_force");
+        }
+        if self.load.gravity.is_some() {
+            names.push("gravity");
+        }
+        if self.elastic_support.has_stiffness || self.elastic_support.has_damping {
+            names.push("elastic_support");
+        }
+        if self.support_motion.is_some() {
+            names.push("moving_support");
         }
         if !self.contacts.is_empty() {
             names.push("contact");

@@ -2,7 +2,8 @@
 
 use super::{
     body::Body,
-    effect::{ContactAreas, Form, SurfaceForce, fixed_components},
+    effect::{ContactAreas, Form, Supports, SurfaceForce},
+    space::Held,
     state::State,
 };
 use crate::{
@@ -41,7 +42,7 @@ pub enum Source {
     Contact(usize),
     /// A traction, by its position in the job.
     Traction(usize),
-    /// All body forces.
+    /// All body forces and the weight.
     BodyForce,
     /// Not a force: the rate of momentum and of angular momentum, the sum of all others.
     Momentum,
@@ -62,6 +63,8 @@ pub struct Resultants<const D: usize> {
     sources: Vec<Source>,
     /// Local components that supports hold, in order, each with the first support that holds it.
     held: Vec<(u32, u32)>,
+    /// Local nodes that supports hold in directions other than axes, ascending, each with the first support that holds it.
+    slanted: Vec<(u32, u32)>,
     /// For each local node its share of the mass and of the first moments of mass of this rank's cells; empty without inertia.
     masses: Vec<(f64, Vector<D>)>,
     /// Resultants of the loads of this rank, once they are known and if they are the same at all times.
@@ -82,16 +85,31 @@ impl<const D: usize> Resultants<D> {
         supports: &[Support],
     ) -> Result<Self, Agreed> {
         let mesh = &body.mesh;
-        let mut first = vec![None; mesh.nodes.len() * D];
+        let (mut first, mut holder) = (vec![None; mesh.nodes.len() * D], vec![None; mesh.nodes.len()]);
         for (at, support) in supports.iter().enumerate() {
-            let holds =
-                session.agree(fixed_components(mesh, std::slice::from_ref(support), &state.velocity))?;
-            let components = first.iter_mut().zip(holds).filter(|(_, holds)| *holds);
+            let Supports { held, .. } = session.agree(Supports::new(
+                session,
+                mesh,
+                std::slice::from_ref(support),
+                &state.velocity,
+            ))?;
+            let components = first.iter_mut().zip(held.flags()).filter(|(_, holds)| **holds);
             components.for_each(|(first, _)| *first = first.or(Some(at as u32)));
+            let holds = |node: &usize| held.free_count(*node) < D;
+            for node in (0..mesh.nodes.len()).filter(holds) {
+                holder[node] = holder[node].or(Some(at as u32));
+            }
         }
-        let held: Vec<(u32, u32)> =
-            first.iter().enumerate().filter_map(|(at, support)| Some((at as u32, (*support)?))).collect();
-        let has_held = |node: &u32| first[*node as usize * D..][..D].iter().any(Option::is_some);
+        let is_held_alone = |(component, _): &(usize, &Option<u32>)| body.held.flags()[*component];
+        let held: Vec<(u32, u32)> = first
+            .iter()
+            .enumerate()
+            .filter(is_held_alone)
+            .filter_map(|(at, support)| Some((at as u32, support.or(holder[at / D])?)))
+            .collect();
+        let slanted: Vec<(u32, u32)> =
+            body.held.slanted().iter().filter_map(|at| Some((at.node, holder[at.node as usize]?))).collect();
+        let has_held = |node: &u32| holder[*node as usize].is_some();
         let cell_has_held = |cell: usize| mesh.cell_nodes(cell).any(|node| has_held(&node));
         let runs = body.geometry.runs.iter();
         body.request_support_forces(
@@ -100,14 +118,15 @@ impl<const D: usize> Resultants<D> {
         let mut sources: Vec<Source> = (0..supports.len()).map(Source::Support).collect();
         sources.extend((0..body.contacts.len()).map(Source::Contact));
         sources.extend((0..body.load.tractions.len()).map(Source::Traction));
-        if !body.load.body_forces.is_empty() {
+        if body.load.has_body_forces() {
             sources.push(Source::BodyForce);
         }
         let mut masses = Vec::new();
+        let components = mesh.nodes.len() * D;
         if body.has_form(Form::Mass) {
             sources.push(Source::Momentum);
-            let [mut mass, mut moment] = [vec![0.0; first.len()], vec![0.0; first.len()]];
-            body.add_form(Form::Mass, &vec![1.0; first.len()], &mut mass);
+            let [mut mass, mut moment] = [vec![0.0; components], vec![0.0; components]];
+            body.add_form(Form::Mass, &vec![1.0; components], &mut mass);
             body.add_form(Form::Mass, mesh.nodes.as_flattened(), &mut moment);
             let shares = mass.chunks_exact(D).zip(moment.chunks_exact(D));
             masses.extend(shares.map(|(mass, moment)| (mass[0], std::array::from_fn(|i| moment[i]))));
@@ -116,6 +135,7 @@ impl<const D: usize> Resultants<D> {
         Ok(Self {
             sources,
             held,
+            slanted,
             masses,
             steady: None,
             surface: Vec::new(),
@@ -173,11 +193,11 @@ impl<const D: usize> Resultants<D> {
         change: VelocityChange<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<()> {
-        let Self { sources, held, masses, steady, surface, sums, largest } = self;
+        let Self { sources, held, slanted, masses, steady, surface, sums, largest } = self;
         let mesh = &body.mesh;
         let (resultants, areas) = sums[0].split_at_mut(sources.len() * Resultant::<D>::WIDTH);
         resultants.fill(0.0);
-        let mut sums = Sums { sources, held, fixed: &body.fixed, mesh, values: resultants };
+        let mut sums = Sums { sources, held, slanted, directions: &body.held, mesh, values: resultants };
         let velocity = state.velocity.local()?;
         let before = change.before.local()?;
         if let Some(load) = load {
@@ -190,16 +210,17 @@ impl<const D: usize> Resultants<D> {
                     *steady = Some(sums.values.to_vec());
                 }
             }
-            held.iter().take_while(|(component, _)| (*component as usize) < load.len()).for_each(
-                |&(component, support)| sums.react(component as usize, support, load[component as usize]),
-            );
+            sums.react_to_all(&load);
         }
-        if !held.is_empty() {
-            body.with_support_forces(state, (&before, change.length), |forces| {
-                held.iter().for_each(|&(component, support)| {
-                    sums.react(component as usize, support, forces[component as usize]);
-                });
-            })?;
+        if !(held.is_empty() && slanted.is_empty()) {
+            body.with_support_forces(state, (&before, change.length), |forces| sums.react_to_all(forces))?;
+        }
+        if !body.elastic_support.points.is_empty() {
+            let displacement = state.displacement.local()?;
+            let lag = if body.is_explicit() { change.length } else { 0.0 };
+            body.elastic_support.forces(&displacement, &velocity, lag, |support, node, force| {
+                sums.add_and_react(Source::Support(support), node, &force);
+            });
         }
         for (at, contact) in body.contacts.iter().enumerate() {
             contact.forces(&velocity, |node, force| sums.add_and_react(Source::Contact(at), node, &force));
@@ -240,7 +261,8 @@ const AREAS: usize = 5;
 struct Sums<'a, const D: usize> {
     sources: &'a [Source],
     held: &'a [(u32, u32)],
-    fixed: &'a [bool],
+    slanted: &'a [(u32, u32)],
+    directions: &'a Held<D>,
     mesh: &'a Mesh<D>,
     values: &'a mut [f64],
 }
@@ -264,12 +286,32 @@ impl<const D: usize> Sums<'_, D> {
         self.add(source, node, force);
         for i in 0..D {
             let component = node as usize * D + i;
-            if self.fixed[component]
+            if self.directions.flags()[component]
                 && let Ok(at) = self.held.binary_search_by_key(&(component as u32), |held| held.0)
             {
                 self.react(component, self.held[at].1, force[i]);
             }
         }
+        if let Ok(at) = self.slanted.binary_search_by_key(&node, |slanted| slanted.0) {
+            self.react_along_held(self.slanted[at], force);
+        }
+    }
+
+    /// Adds the reactions of all supports to nodal forces, of all local nodes or of the owned ones.
+    fn react_to_all(&mut self, forces: &[f64]) {
+        let (held, slanted) = (self.held, self.slanted);
+        for &(component, support) in held.iter().take_while(|(at, _)| (*at as usize) < forces.len()) {
+            self.react(component as usize, support, forces[component as usize]);
+        }
+        for &at in slanted.iter().take_while(|(node, _)| (*node as usize) * D < forces.len()) {
+            self.react_along_held(at, &std::array::from_fn(|i| forces[at.0 as usize * D + i]));
+        }
+    }
+
+    /// Adds the reaction of a support to the part of a force along the directions in which it holds a node.
+    fn react_along_held(&mut self, (node, support): (u32, u32), force: &Vector<D>) {
+        let free = self.directions.free_part(node as usize, force);
+        self.add(Source::Support(support as usize), node, &std::array::from_fn(|i| free[i] - force[i]));
     }
 
     /// Adds the reaction of a support to a force at a component that it holds.
@@ -281,7 +323,7 @@ impl<const D: usize> Sums<'_, D> {
 
     /// Adds the tractions, and as body forces the rest of the nodal loads at owned nodes.
     fn add_loads<const S: usize>(&mut self, body: &Body<D, S>, time: f64, load: &[f64]) -> Result<()> {
-        let has_body_forces = !body.load.body_forces.is_empty();
+        let has_body_forces = body.load.has_body_forces();
         for (at, traction) in body.load.tractions.iter().enumerate() {
             traction.forces(self.mesh, time, |node, force| {
                 self.add(Source::Traction(at), node, &force);

@@ -118,7 +118,7 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
     }
     for (key, inner, required) in properties {
         let branch = tagged.iter().find(|(name, _)| *name == key).map(|(_, branch)| *branch);
-        if inner.accepts("object") && inner.get("additionalProperties").is_boolean()
+        if is_table(inner) && inner.get("additionalProperties").is_boolean()
             || is_tables(inner)
             || !inner.tagged().is_empty()
         {
@@ -137,8 +137,13 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
     all.insert(at, Table { path: path.to_owned(), several, keys, meaning });
 }
 
+/// Whether it is a table of keys; an expression, in place of which a table over time may stand, is a value.
+fn is_table(schema: Schema) -> bool {
+    schema.accepts("object") && schema.text("format") != Some("expression")
+}
+
 fn is_tables(schema: Schema) -> bool {
-    schema.accepts("array") && schema.items().is_some_and(|items| items.accepts("object"))
+    schema.accepts("array") && schema.items().is_some_and(is_table)
 }
 
 impl Table {

@@ -10,7 +10,7 @@ use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
 use super::source::{Node, parse};
-use super::{Job, MeshSource, set, validate};
+use super::{Job, MeshSource, set, tables, validate};
 use crate::error::{Error, Result};
 
 /// Largest size of a file in bytes.
@@ -57,11 +57,11 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Parses `text`, applies `overrides` and checks every key against the schema.
+    /// Parses `text`, applies `overrides`, reads tables relative to `folder` and checks every key against the schema.
     pub(crate) fn new(
         kind: Kind,
         text: &str,
-        name: &str,
+        (name, folder): (&str, &Path),
         overrides: &[String],
         colour: bool,
     ) -> Result<Self> {
@@ -72,6 +72,7 @@ impl Document {
         for (index, text) in overrides.iter().enumerate() {
             faults.extend(set::apply(&mut root, text, index + 1).err());
         }
+        tables::insert(&mut root, folder, &mut faults);
         faults.extend(validate::faults(kind, &root, text));
         Ok(Self { root, texts, faults })
     }
@@ -96,7 +97,7 @@ impl Document {
 
 impl Loaded {
     fn new(text: &str, name: &str, folder: &Path, overrides: &[String], colour: bool) -> Result<Self> {
-        let mut document = Document::new(Kind::job(), text, name, overrides, colour)?;
+        let mut document = Document::new(Kind::job(), text, (name, folder), overrides, colour)?;
         let findings = semantic::check(&document.root);
         document.faults.extend(findings.faults);
         let warnings = findings.warnings;

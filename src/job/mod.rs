@@ -13,6 +13,7 @@ mod schema;
 mod semantic;
 mod set;
 mod source;
+mod tables;
 mod validate;
 
 pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};

@@ -5,19 +5,23 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, Load, Traction, choose_unknowns, effects, fixed_components,
-            surface_effects,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, Resistances,
+            SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
         },
-        space::{Geometry, facets},
+        space::{Geometry, Held, SurfacePoint, facets, surface_points},
         state::State,
     },
-    job::{self, Job, Material},
-    laws::contact::{Gap, NormalResponse},
-    linear_algebra::tensor::Vector,
+    job::{self, Job, Material, Scalar},
+    laws::{
+        contact::{Gap, NormalResponse, Quadrature},
+        material::{ByMaterial, Hypothesis},
+    },
+    linear_algebra::tensor::{Mandel, Vector, component, norm},
     mesh::Mesh,
-    parallel::session::Session,
+    parallel::{agreement::Agreed, session::Session},
     solver::stepping::evaluation,
 };
+use std::collections::BTreeSet;
 
 /// Builds the body of a job on this rank's mesh. Collective.
 pub(super) fn body<const D: usize, const S: usize>(
@@ -28,26 +32,36 @@ pub(super) fn body<const D: usize, const S: usize>(
     let (materials, of_region) = materials(session, job, &mesh);
     let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
-    let fixed = session.agree(fixed_components(&mesh, &job.support, &state.velocity))?;
-    let effects = session.agree(effects(&materials, &geometry))?;
-    let load = load(job, &mesh);
+    let Supports { held, motion } = Supports::new(session, &mesh, &job.support, &state.velocity)?;
+    let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh))?;
+    let effects = session.agree(effects(&materials, &geometry, &initial_stress))?;
+    let load = load(job, &mesh, &materials);
+    let elastic_support = elastic_support::<D, S>(session, job, &mesh, (&materials, &of_region))?;
     let mut contacts = Vec::new();
+    let mut taken = BTreeSet::new();
+    let mut parts = Vec::new();
     for contact in &job.contact {
-        let facets = facets(&mesh, &contact.on);
+        let facets = part_of(session, &mesh, ("contact", &contact.on), contact.part.as_ref())?;
+        session.agree(take_facets(contact, &mesh, &facets, &mut taken))?;
+        parts.push(facets.clone());
+        if let Some(motion) = &motion {
+            let points = surface_points(session, &mesh, &facets)?;
+            session.agree(refuse_moving_contact(contact, &mesh, &points, (&held, motion)))?;
+        }
         let (law, gap) = session.agree(normal_law(contact))?;
         let mut laws = Contact::new(
             session,
             &mesh,
             &facets,
             ContactConditions { quadrature: contact.quadrature, law, gap },
-            &fixed,
+            &held,
         )?;
         if let Some(friction) = contact.friction {
-            session.agree(laws.add_friction(friction, &mesh, &fixed))?;
+            session.agree(laws.add_friction(friction, &mesh, &held))?;
         }
         contacts.push(laws);
     }
-    let surface_effects = surface_effects(session, &job.contact, &mesh)?;
+    let surface_effects = surface_effects(session, &job.contact, &mesh, &parts)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
@@ -55,13 +69,25 @@ pub(super) fn body<const D: usize, const S: usize>(
     if job.time.scheme.is_two_step() {
         state.previous_displacement = Some(state.displacement.like()?);
     }
-    session.agree(initial(job, &mesh, &fixed, &mut state))?;
+    session.agree(initial(job, &mesh, &held, &mut state))?;
+    if let Some(motion) = &motion {
+        let State { displacement, velocity, .. } = &mut state;
+        let started = motion.start_displacement(&mut displacement.owned_mut()?);
+        session.agree(started.and(motion.start_velocity(job.time.step, &mut velocity.owned_mut()?)))?;
+    }
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
-    let mut body = Body::new(mesh, geometry, effects, fixed, evaluation(job.time.scheme));
+    let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
+    (body.support_motion, body.elastic_support) = (motion, elastic_support);
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
         body.keep_earlier();
+    }
+    if !initial_stress.is_empty() {
+        let points = body.geometry.points();
+        let of_points: Vec<Mandel<S>> =
+            initial_stress.iter().flat_map(|stress| std::iter::repeat_n(*stress, points)).collect();
+        body.restore_history("viscoplastic_history", of_points.as_flattened());
     }
     Ok((body, state))
 }
@@ -93,13 +119,195 @@ pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     Ok((law, contact.obstacle.clone().unwrap_or_else(distance)))
 }
 
-fn load<const D: usize>(job: &Job, mesh: &Mesh<D>) -> Load {
-    let traction = |t: &job::Traction| Traction { facets: facets(mesh, &t.on), value: t.value.clone() };
-    Load { tractions: job.traction.iter().map(traction).collect(), body_forces: job.body_force.clone() }
+/// The initial stress of each cell of this rank; empty if there is none.
+fn initial_stress<const D: usize, const S: usize>(job: &Job, mesh: &Mesh<D>) -> Result<Vec<Mandel<S>>> {
+    let Some(stress) = job.initial.as_ref().and_then(|initial| initial.stress.as_ref()) else {
+        return Ok(Vec::new());
+    };
+    let job::InitialStress { xx, yy, zz, xy, yz, xz } = stress;
+    let components = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let of_cell = |cell: usize| {
+        let corners = &mesh.corners(cell)[..=D];
+        let centre: Vector<D> =
+            std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / (D + 1) as f64);
+        let mut out = [0.0; S];
+        for (c, value) in out.iter_mut().enumerate() {
+            let (i, j, factor) = component::<S>(c);
+            let number = components[i][j].evaluate(0.0, &centre);
+            if !number.is_finite() {
+                return Err(Error::Refused(format!(
+                    "initial.stress: a component is {number} at {centre:?} m; correct the expression"
+                )));
+            }
+            *value = factor * number;
+        }
+        Ok(out)
+    };
+    (0..mesh.cell_count()).map(of_cell).collect()
+}
+
+/// The springs and dashpots of the supports that give way. Collective.
+fn elastic_support<const D: usize, const S: usize>(
+    session: &Session,
+    job: &Job,
+    mesh: &Mesh<D>,
+    (materials, of_region): (&[&Material], &[usize]),
+) -> Result<ElasticSupport<D>> {
+    let mut all = ElasticSupport::default();
+    let resistances = |given: Option<job::Resistance>| {
+        let job::Resistance { normal, tangential } = given.unwrap_or_default();
+        Resistances { normal, tangential }
+    };
+    for (number, support) in job.support.iter().enumerate() {
+        if support.fix.is_some() {
+            continue;
+        }
+        let facets = part_of(session, mesh, ("support", &support.on), support.part.as_ref())?;
+        let (stiffness, damping) = (resistances(support.stiffness), resistances(support.damping));
+        if support.stiffness.is_some() || support.damping.is_some() {
+            let points = surface_points(session, mesh, &facets)?;
+            all.points.extend(points.into_iter().map(|point| ElasticPoint {
+                support: number,
+                point,
+                stiffness,
+                damping,
+            }));
+            all.has_stiffness |= support.stiffness.is_some();
+            all.has_damping |= support.damping.is_some();
+        }
+        if !support.absorbing {
+            continue;
+        }
+        all.has_damping = true;
+        for (at, material) in materials.iter().enumerate() {
+            let is_behind = |facet: &&u32| {
+                let cell = mesh.facet_cells[**facet as usize] as usize;
+                of_region[usize::from(mesh.cell_regions[cell])] == at
+            };
+            let facets: Vec<u32> = facets.iter().filter(is_behind).copied().collect();
+            if session.total(facets.len()) == 0 {
+                continue;
+            }
+            let (Some(density), Some(elasticity)) = (material.density, material.elasticity) else {
+                return Err(Error::Refused(format!(
+                    "support.{number}.absorbing: waves need a density and elasticity, and the material behind the boundaries {} \
+                     lacks one of them; give [material] density and [material.elasticity], or use `damping`",
+                    support.on.join(", ")
+                )));
+            };
+            let law = elasticity.tensor(Hypothesis::of(S));
+            let impedance = |modulus: f64| (density * modulus).sqrt();
+            let damping = Resistances {
+                normal: impedance(law.volumetric + law.shear),
+                tangential: impedance(0.5 * law.shear),
+            };
+            let points = surface_points(session, mesh, &facets)?;
+            let stiffness = Resistances::default();
+            all.points.extend(points.into_iter().map(|point| ElasticPoint {
+                support: number,
+                point,
+                stiffness,
+                damping,
+            }));
+        }
+    }
+    Ok(all)
+}
+
+/// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
+fn part_of<const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    (table, on): (&str, &[String]),
+    part: Option<&Scalar>,
+) -> Result<Vec<u32>, Agreed> {
+    let mut facets = facets(mesh, on);
+    let Some(part) = part else { return Ok(facets) };
+    let refused = |words: String| {
+        let on = on.join(", ");
+        Err(Error::Refused(format!("{table} on {on}: `where` {words}; correct the expression")))
+    };
+    let value = |facet: u32| part.evaluate(0.0, &centre_of(mesh, facet));
+    let wrong = facets.iter().find(|facet| value(**facet).is_nan());
+    let words = |facet: &u32| refused(format!("is not a number at {:?} m", centre_of(mesh, *facet)));
+    session.agree(wrong.map_or(Ok(()), words))?;
+    facets.retain(|&facet| value(facet) != 0.0);
+    let is_empty = session.total(facets.len()) == 0;
+    session.agree(if is_empty { refused("holds at no facet of these boundaries".into()) } else { Ok(()) })?;
+    Ok(facets)
+}
+
+fn centre_of<const D: usize>(mesh: &Mesh<D>, facet: u32) -> Vector<D> {
+    let corners = mesh.facet_corners(facet);
+    std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / D as f64)
+}
+
+/// Refuses facets of a part of a boundary that are among the `taken` ones of other parts, which they join.
+fn take_facets<const D: usize>(
+    contact: &job::Contact,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+    taken: &mut BTreeSet<u32>,
+) -> Result<()> {
+    let twice = contact.part.as_ref().and_then(|_| facets.iter().find(|facet| !taken.insert(**facet)));
+    match twice {
+        None => Ok(()),
+        Some(&facet) => Err(Error::Refused(format!(
+            "contact: the facet at {:?} m belongs to two contacts; make the `where` of one of them exclude it",
+            centre_of(mesh, facet)
+        ))),
+    }
+}
+
+/// Refuses supports that move a component on which a contact law depends together with free ones.
+fn refuse_moving_contact<const D: usize>(
+    contact: &job::Contact,
+    mesh: &Mesh<D>,
+    points: &[SurfacePoint<D>],
+    (held, motion): (&Held<D>, &SupportMotion<D>),
+) -> Result<()> {
+    for point in points {
+        let (node, place) = (point.node as usize, mesh.nodes[point.node as usize]);
+        let free = norm(&held.free_part(node, &point.normal)) > 1e-9;
+        let is_nodal = contact.quadrature == Quadrature::Nodal;
+        if motion.moves(node, &point.normal) && (free || !is_nodal) {
+            let remedy =
+                if is_nodal { "hold all components there, or none" } else { "use quadrature = \"nodal\"" };
+            return Err(Error::Refused(format!(
+                "contact at {place:?} m: a support moves a component there that is not along the boundary; {remedy}"
+            )));
+        }
+        let (frame, count) = held.frame(node);
+        let slides = frame[count..].iter().any(|direction| motion.moves(node, direction));
+        if contact.friction.is_some() && slides && count > usize::from(free) {
+            return Err(Error::Refused(format!(
+                "friction at {place:?} m: a support moves one tangential component there and leaves another free, and friction \
+                 depends on both; hold all components there, or none"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[&Material]) -> Load {
+    let traction = |t: &job::Traction| Traction {
+        facets: facets(mesh, &t.on),
+        value: t.value.clone(),
+        pressure: t.pressure.clone(),
+    };
+    let gravity = job.gravity.as_ref().and_then(|gravity| {
+        let density = ByMaterial::new(materials.iter().map(|m| m.density).collect())?;
+        Some(Gravity { acceleration: gravity.acceleration.clone(), density })
+    });
+    Load {
+        tractions: job.traction.iter().map(traction).collect(),
+        body_forces: job.body_force.clone(),
+        gravity,
+    }
 }
 
 /// Sets the initial values at owned nodes; held components keep the displacement and have no velocity.
-fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mut State) -> Result<()> {
+fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, held: &Held<D>, state: &mut State) -> Result<()> {
     let Some(initial) = &job.initial else { return Ok(()) };
     let fields = [
         (&initial.displacement, &mut state.displacement, "initial.displacement"),
@@ -122,7 +330,6 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, fixed: &[bool], state: &mu
             }
         }
     }
-    let mut velocity = state.velocity.owned_mut()?;
-    velocity.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = 0.0);
+    held.clear(&mut state.velocity.owned_mut()?);
     Ok(())
 }

@@ -69,7 +69,7 @@ pub(super) fn restore<const D: usize, const S: usize>(
 }
 
 /// Reads the state that a job starts from, if it names one, into body and state; returns a line for the log. Components that supports
-/// hold keep the displacement and have no velocity. Collective.
+/// hold keep the displacement and have the velocity of the supports. Collective.
 pub(super) fn transfer<const D: usize, const S: usize>(
     session: &Session,
     loaded: &Loaded,
@@ -95,11 +95,13 @@ pub(super) fn transfer<const D: usize, const S: usize>(
     };
     let found = checkpoint::transfer(session, &file, body, state)?;
     for field in [&mut state.velocity, &mut state.previous_velocity] {
-        let held = |values: &mut [f64]| {
-            values.iter_mut().zip(&body.fixed).filter(|(_, held)| **held).for_each(|(v, _)| *v = 0.0);
-        };
-        held(&mut field.owned_mut()?);
+        body.held.clear(&mut field.owned_mut()?);
         field.update_ghosts()?;
+    }
+    if let Some(motion) = &body.support_motion {
+        let step = loaded.job.time.step;
+        session.agree(motion.start_velocity(step, &mut state.velocity.owned_mut()?))?;
+        state.velocity.update_ghosts()?;
     }
     let mut words = format!("starting from {} (step {}, t = {} s)", file.display(), found.step, found.time);
     for (what, names) in [("dropped", &found.dropped), ("at rest", &found.at_rest)] {

@@ -36,8 +36,11 @@ fn refuse_conflicts<const D: usize>(
     mesh: &Mesh<D>,
     loaded: &Loaded,
 ) -> Result<(), Agreed> {
-    let supports: Vec<&str> = loaded.job.support.iter().flat_map(|s| &s.on).map(String::as_str).collect();
-    let contacts: Vec<&str> = loaded.job.contact.iter().flat_map(|c| &c.on).map(String::as_str).collect();
+    // Parts of boundaries may meet without a conflict, and springs may act beside contact.
+    let whole_supports = loaded.job.support.iter().filter(|s| s.part.is_none() && s.fix.is_some());
+    let whole_contacts = loaded.job.contact.iter().filter(|c| c.part.is_none());
+    let supports: Vec<&str> = whole_supports.flat_map(|s| &s.on).map(String::as_str).collect();
+    let contacts: Vec<&str> = whole_contacts.flat_map(|c| &c.on).map(String::as_str).collect();
     let conflicts = mesh.conflicts(&supports, &contacts);
     let more = session.total(conflicts.count).saturating_sub(1);
     let more = if more > 0 { format!(" and at {more} more facets") } else { String::new() };
@@ -59,14 +62,15 @@ pub(super) fn refuse_free_bodies<const D: usize, const S: usize>(
     if has_mass.iter().all(|&has| has) {
         return Ok(());
     }
-    let mut held: Vec<[bool; D]> = body.fixed.as_chunks().0.to_vec();
+    let mut held: Vec<[bool; D]> = body.held.flags().as_chunks().0.to_vec();
     // Inertia determines the motion of cells with mass.
     for (cell, &region) in mesh.cell_regions.iter().enumerate() {
         if has_mass[usize::from(region)] {
             mesh.cell(cell).iter().for_each(|&node| held[node as usize] = [true; D]);
         }
     }
-    let touched: Vec<_> = body.contacts.iter().flat_map(Contact::holding_directions).collect();
+    let touches = body.contacts.iter().flat_map(Contact::holding_directions);
+    let touched: Vec<_> = touches.chain(body.support_directions()).collect();
     let free = free_motions(session, mesh, &held, &touched)?;
     if free.is_empty() {
         return Ok(());

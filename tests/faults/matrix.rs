@@ -23,7 +23,7 @@ const SCHEMES: [&str; 3] = ["lagged_euler", "implicit_euler", "bdf2"];
 /// The name of an effect, the keys that add it to the paper's job, and whether it needs the explicit scheme.
 type Choice = (&'static str, &'static [(&'static str, &'static str)], bool);
 
-const EFFECTS: [Choice; 14] = [
+const EFFECTS: [Choice; 18] = [
     ("the paper's", &[], false),
     ("hardening", &[("material.viscoplasticity.perzyna.hardening_modulus", "300.0")], false),
     ("maxwell", &[("material.viscoplasticity", "{ maxwell = { relaxation_time = 0.5 } }")], false),
@@ -37,6 +37,32 @@ const EFFECTS: [Choice; 14] = [
                 "{ drucker_prager = { relaxation = 100.0, friction_coefficient = 0.3, cohesion = 3.0 } }",
             ),
         ],
+        false,
+    ),
+    (
+        "moving support",
+        &[("support", "[{ on = ['left'], fix = 'all', displacement = ['0.01*sin(5*t)', 0] }]")],
+        false,
+    ),
+    ("initial stress", &[("initial", "{ stress = { xx = 5, xy = '2*x' } }")], false),
+    (
+        "elastic initial stress",
+        &[
+            ("initial", "{ stress = { xx = 5, xy = '2*x' } }"),
+            (
+                "material",
+                "{ hypothesis = 'plane_stress', density = 1.0, elasticity = { youngs_modulus = 1000.0, poisson_ratio = 0.4 }, viscosity = { volumetric = 25.0, shear = 50.0 } }",
+            ),
+        ],
+        false,
+    ),
+    (
+        "springs",
+        &[(
+            "support",
+            "[{ on = ['left'], stiffness = { normal = 1000, tangential = 500 }, damping = { normal = 5 } }, \
+             { on = ['right'], absorbing = true }]",
+        )],
         false,
     ),
     ("body force", &[("body_force", "[{ value = [0, '-5*t'] }]")], false),

@@ -149,7 +149,7 @@ fn gathered<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>
 fn held_components<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> Vec<bool> {
     let mut flags = vec![0.0; body.mesh.total_nodes * D];
     for at in 0..body.mesh.owned * D {
-        flags[body.mesh.node_ids[at / D] as usize * D + at % D] = f64::from(u8::from(body.fixed[at]));
+        flags[body.mesh.node_ids[at / D] as usize * D + at % D] = f64::from(u8::from(body.held.flags()[at]));
     }
     sum(session, &flags).iter().map(|&flag| flag > 0.0).collect()
 }

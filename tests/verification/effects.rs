@@ -118,7 +118,7 @@ fn matrix<const D: usize, const S: usize>(
     at: Evaluation,
 ) -> Vec<f64> {
     let (plain, _) = body::<D, S>(session, whole, &[], Vec::new());
-    let body = Body::new(plain.mesh, plain.geometry, effects, plain.fixed, at);
+    let body = Body::new(plain.mesh, plain.geometry, effects, plain.held, at);
     body.matrix(session, 0.1).expect("matrix").values
 }
 

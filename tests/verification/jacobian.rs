@@ -97,7 +97,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                     &body.mesh,
                     facets,
                     ContactConditions { quadrature, law, gap },
-                    &body.fixed,
+                    &body.held,
                 )
                 .expect("contact")
             };
@@ -110,7 +110,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             assert!(session.total(contacts[0].point_count()) > 0);
             contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant() + 30.0);
             if let Some(friction) = friction {
-                contacts[0].add_friction(friction, &body.mesh, &body.fixed).expect("friction");
+                contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");
                 assert!(session.total(contacts[0].friction_point_count()) > 0);
                 contacts[0].set_friction(250.0, follows);
             }
@@ -141,7 +141,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
             set_nodal(&body.mesh, &mut other, random(3));
             for field in [&mut point, &mut direction, &mut other] {
                 let mut values = field.owned_mut().expect("values");
-                values.iter_mut().zip(&body.fixed).filter(|(_, f)| **f).for_each(|(v, _)| *v = 0.0);
+                values.iter_mut().zip(body.held.flags()).filter(|(_, f)| **f).for_each(|(v, _)| *v = 0.0);
             }
             let mut equations = ContactEquations {
                 matrix: &matrix,

@@ -42,6 +42,7 @@ mod scenes;
 mod schemes;
 mod softening;
 mod subspace;
+mod supports;
 mod rejected_steps;
 mod resultants;
 mod tolerance;
@@ -101,6 +102,7 @@ fn scenario() {
         "bounds" => obstacles::bounds(&session),
         "several_laws" => obstacles::several(&session, &folder),
         "random_laws" => random_laws::solve(&session),
+        "supports" => supports::all(&session),
         "subspace" => subspace::solve(&session),
         "orders_plane" => orders::plane(&session),
         "rejected_steps" => rejected_steps::in_the_plane(&session),

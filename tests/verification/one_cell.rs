@@ -3,7 +3,10 @@
 use crate::run_on;
 use crate::scenes::{any_mesh, part};
 use clarke::{
-    fem::effect::{Contact, ContactConditions, Quadrature, choose_unknowns},
+    fem::{
+        effect::{Contact, ContactConditions, Quadrature, choose_unknowns},
+        space::Held,
+    },
     job::Job,
     laws::contact::{Gap, NormalResponse, Polyline},
     linear_algebra::tensor::{Vector, larger},
@@ -52,7 +55,8 @@ fn forces<const D: usize>(
 ) -> Vec<f64> {
     let mesh = part(session, mesh);
     let facets = mesh.boundary("bottom").expect("a boundary").facets.clone();
-    let (law, gap, fixed) = (NormalResponse::Graph(law.clone()), Gap::default(), vec![false; (D + 1) * D]);
+    let (law, gap, fixed) =
+        (NormalResponse::Graph(law.clone()), Gap::default(), Held::from(vec![false; (D + 1) * D]));
     let contact = Contact::new(session, &mesh, &facets, ContactConditions { quadrature, law, gap }, &fixed)
         .expect("contact");
     let mut contacts = [contact];
@@ -166,7 +170,7 @@ fn pushed_hard(session: &Session) {
         &mesh,
         &facets,
         ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
-        &[false; 6],
+        &Held::from(vec![false; 6]),
     );
     let mut contacts = [contact.expect("contact")];
     choose_unknowns(&mut contacts, &mesh).expect("one normal");

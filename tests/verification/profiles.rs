@@ -132,7 +132,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
         &body.mesh,
         &facets,
         ContactConditions { quadrature: Quadrature::Nodal, law, gap: Gap::default() },
-        &body.fixed,
+        &body.held,
     );
     body.contacts.push(contact.expect("a contact"));
     let mut traction = state.velocity.like().expect("a vector");

@@ -4,7 +4,7 @@ use crate::mpirun::scramble;
 use clarke::{
     fem::{
         body::Body,
-        effect::{Effect, Evaluation, fixed_components},
+        effect::{Effect, Evaluation, Supports},
         space::Geometry,
         state::State,
     },
@@ -71,12 +71,12 @@ pub fn body<const D: usize, const S: usize>(
     let state = State::at_rest(&mesh).expect("state");
     let support = |(name, fix): &(&str, Fix)| {
         mesh.boundary(name).expect("a boundary");
-        Support { on: vec![(*name).to_owned()], fix: fix.clone() }
+        Support { on: vec![(*name).to_owned()], fix: Some(fix.clone()), ..Support::default() }
     };
     let supports: Vec<Support> = fixed.iter().map(support).collect();
-    let fixed = fixed_components(&mesh, &supports, &state.velocity).expect("flags");
+    let held = Supports::new(session, &mesh, &supports, &state.velocity).expect("supports").held;
     let geometry = Geometry::new(&mesh);
-    let body = Body::new(mesh, geometry, effects, fixed, Evaluation::Converged);
+    let body = Body::new(mesh, geometry, effects, held, Evaluation::Converged);
     (body, state)
 }
 

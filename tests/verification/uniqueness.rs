@@ -99,7 +99,7 @@ fn dense<const D: usize, const S: usize>(
         crate::scenes::sum(session, &mine)
     };
     let free: Vec<f64> =
-        body.fixed[..body.mesh.owned * D].iter().map(|fixed| f64::from(u8::from(!fixed))).collect();
+        body.held.flags()[..body.mesh.owned * D].iter().map(|fixed| f64::from(u8::from(!fixed))).collect();
     let free: Vec<usize> =
         gather(&free).iter().enumerate().filter(|(_, free)| **free > 0.0).map(|(at, _)| at).collect();
     let (mut x, mut y) = (vector(), vector());
@@ -228,7 +228,7 @@ fn compare<const D: usize, const S: usize>(
             &run.body.mesh,
             facets,
             ContactConditions { quadrature: Quadrature::Gauss, law, gap: Gap::default() },
-            &run.body.fixed,
+            &run.body.held,
         )
         .expect("contact")
     };

@@ -4,7 +4,7 @@ use super::{Body, Called};
 use crate::{
     fem::{
         effect::{Contact, Effect, Energy, Evaluation, Outcome, Phases, Step, SurfaceEffect, Tangents, Term},
-        space::{Batch, Geometry, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces},
+        space::{Batch, Geometry, Held, MOST_NODES, Needs, Nodal, cell_rule, linear_at, nodal_forces},
     },
     linear_algebra::{
         simd::Pack,
@@ -19,8 +19,8 @@ pub struct Cells<'a, const D: usize, const S: usize> {
     geometry: &'a Geometry<D>,
     effects: &'a mut [Box<dyn Effect<D, S>>],
     surface_effects: &'a mut [Box<dyn SurfaceEffect<D>>],
-    /// One flag a local component: held by a support.
-    pub fixed: &'a [bool],
+    /// What supports hold.
+    pub held: &'a Held<D>,
     evaluation: Evaluation,
     step: Step,
     evaluated: &'a mut Vec<f64>,
@@ -29,9 +29,9 @@ pub struct Cells<'a, const D: usize, const S: usize> {
 impl<const D: usize, const S: usize> Body<D, S> {
     /// Cells and contacts, borrowed at the same time.
     pub fn cells_and_contacts(&mut self) -> (Cells<'_, D, S>, &mut [Contact<D>]) {
-        let Self { mesh, geometry, effects, surface_effects, fixed, contacts, evaluated, .. } = self;
+        let Self { mesh, geometry, effects, surface_effects, held, contacts, evaluated, .. } = self;
         let (evaluation, step) = (self.evaluation, self.step);
-        (Cells { mesh, geometry, effects, surface_effects, fixed, evaluation, step, evaluated }, contacts)
+        (Cells { mesh, geometry, effects, surface_effects, held, evaluation, step, evaluated }, contacts)
     }
 
     /// Whether implicit steps are nonlinear without contact: cells flow or are damaged, or there are effects at the surface.
@@ -54,6 +54,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Energies of a solved step that is not yet committed; writes trial histories, unless they are those of this displacement.
     pub fn add_implicit_energy(&mut self, nodal: Nodal<'_>, step: Step, energy: &mut Energy) {
         let evaluation = self.evaluation;
+        self.elastic_support.add_step_energy(step, nodal, energy);
         for effect in &mut self.surface_effects {
             effect.add_step_energy(evaluation, step, nodal, energy);
         }
@@ -218,7 +219,8 @@ mod tests {
         let count = mesh.nodes.len() * D;
         let length = 0.25;
         let (blend, step) = (Blend::euler(length), Step { time: length, length, previous_length: 0.0 });
-        let mut body = Body::<D, S>::new(mesh, geometry, effects, vec![false; count], Evaluation::Converged);
+        let mut body =
+            Body::<D, S>::new(mesh, geometry, effects, vec![false; count].into(), Evaluation::Converged);
         let rest = vec![0.0; count];
         body.add_start_forces(Evaluation::Start(blend), Nodal::all(&rest), step, &mut vec![0.0; count]);
         let u: Vec<f64> = (0..count).map(|i| 0.1 * number(i)).collect();

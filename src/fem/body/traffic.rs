@@ -95,7 +95,7 @@ mod tests {
 
     /// Two triangles on four nodes.
     fn passes(effects: Vec<Box<dyn Effect<2, 3>>>, geometry: Geometry<2>, mesh: Mesh<2>) -> PassBytes {
-        PassBytes::of(&Body::new(mesh, geometry, effects, vec![false; 8], Evaluation::Converged))
+        PassBytes::of(&Body::new(mesh, geometry, effects, vec![false; 8].into(), Evaluation::Converged))
     }
 
     fn square() -> (Geometry<2>, Mesh<2>) {

@@ -5,7 +5,8 @@ use crate::{
     error::{Error, Result},
     fem::space::{CellShape, Geometry, cell_rule, facet_points, fine_cell_rule, values},
     job::{BodyForce, Scalar},
-    linear_algebra::tensor::Vector,
+    laws::material::ByMaterial,
+    linear_algebra::tensor::{Vector, add_scaled},
     mesh::Mesh,
 };
 
@@ -17,8 +18,19 @@ pub const WORK: EnergyKind = EnergyKind::new(5, Role::Work, "external_work");
 pub struct Traction {
     /// Local facets.
     pub facets: Vec<u32>,
-    /// One component an axis, in Pa.
+    /// One component an axis, in Pa; empty: zero.
     pub value: Vec<Scalar>,
+    /// A pressure in Pa against the outward normal.
+    pub pressure: Option<Scalar>,
+}
+
+/// The weight of the body.
+#[derive(Debug)]
+pub struct Gravity {
+    /// One component an axis, in m/s^2.
+    pub acceleration: Vec<Scalar>,
+    /// Density in kg/m^d.
+    pub density: ByMaterial<f64>,
 }
 
 impl Traction {
@@ -32,7 +44,11 @@ impl Traction {
         for &facet in &self.facets {
             let (nodes, points) = facet_points(mesh, facet);
             for point in points {
-                let value = evaluate(&self.value, time, &point.place, "traction")?;
+                let mut value = evaluate(&self.value, time, &point.place, "traction")?;
+                if let Some(pressure) = &self.pressure {
+                    let pressure = finite(pressure, time, &point.place, || "traction: the pressure".into())?;
+                    value = add_scaled(&value, -pressure, &point.normal);
+                }
                 for (node, share) in nodes.clone().zip(point.shares) {
                     visit(node, value.map(|value| point.weight * share * value));
                 }
@@ -49,18 +65,35 @@ pub struct Load {
     pub tractions: Vec<Traction>,
     /// Forces in the interior.
     pub body_forces: Vec<BodyForce>,
+    /// Weight.
+    pub gravity: Option<Gravity>,
 }
 
 impl Load {
     /// Whether there is any load.
     pub fn is_empty(&self) -> bool {
-        self.tractions.is_empty() && self.body_forces.is_empty()
+        self.tractions.is_empty() && self.body_forces.is_empty() && self.gravity.is_none()
+    }
+
+    /// Whether forces act in the interior.
+    pub fn has_body_forces(&self) -> bool {
+        !self.body_forces.is_empty() || self.gravity.is_some()
     }
 
     /// Whether the nodal forces are the same at all times.
     pub fn is_steady(&self) -> bool {
-        let values = self.tractions.iter().map(|t| &t.value).chain(self.body_forces.iter().map(|b| &b.value));
-        !values.flatten().any(Scalar::depends_on_time)
+        !self.expressions().any(|(_, value)| value.depends_on_time())
+    }
+
+    /// The expressions, each with the words for its load.
+    pub fn expressions(&self) -> impl Iterator<Item = (&'static str, &Scalar)> {
+        let tractions = self.tractions.iter().flat_map(|t| t.value.iter().chain(&t.pressure));
+        let body_forces = self.body_forces.iter().flat_map(|b| &b.value);
+        let gravity = self.gravity.iter().flat_map(|g| &g.acceleration);
+        let tractions = tractions.map(|value| ("a traction", value));
+        tractions
+            .chain(body_forces.map(|value| ("a body force", value)))
+            .chain(gravity.map(|value| ("gravity", value)))
     }
 
     /// Adds the nodal forces at `time` to `forces` (`D` a local node, ghosts to be added to their owners), by
@@ -75,33 +108,59 @@ impl Load {
         for traction in &self.tractions {
             traction.forces(mesh, time, |node, force| add_at(forces, node, &force))?;
         }
-        for body_force in &self.body_forces {
-            for (number, cell) in geometry.cells().enumerate() {
-                let (volume, corners) = (cell.whole().volume, mesh.corners(number));
-                if let CellShape::Linear = cell.shape() {
-                    let nodes = mesh.cell(number).iter().copied();
-                    for (place, weight) in cell_rule::<D>() {
-                        let at = point(corners[..=D].iter().copied(), place);
-                        let value = evaluate(&body_force.value, time, &at, "body_force")?;
-                        scatter(forces, nodes.clone(), place, volume * weight, &value);
-                    }
-                    continue;
-                }
-                for (k, (place, weight)) in fine_cell_rule::<D>().iter().enumerate() {
-                    let shares = values(D + 1, place);
-                    let coordinates = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]);
-                    let at = point(coordinates, &shares);
-                    let value = evaluate(&body_force.value, time, &at, "body_force")?;
-                    let weight = match cell.shape() {
-                        CellShape::Curved(weights) => weights[k][cell.lane()],
-                        _ => volume * weight,
-                    };
-                    scatter(forces, mesh.cell_nodes(number), &shares, weight, &value);
-                }
-            }
+        for BodyForce { value } in &self.body_forces {
+            let of_place = |at: &Vector<D>| evaluate(value, time, at, "body_force");
+            add_in_cells(mesh, geometry, |_| 1.0, of_place, forces)?;
+        }
+        if let Some(Gravity { acceleration, density }) = &self.gravity {
+            let of_place = |at: &Vector<D>| evaluate(acceleration, time, at, "gravity");
+            add_in_cells(
+                mesh,
+                geometry,
+                |material| density.get(material).copied().unwrap_or(0.0),
+                of_place,
+                forces,
+            )?;
         }
         Ok(())
     }
+}
+
+/// Adds the nodal forces of a force per volume: a factor for each material times the value at a place.
+fn add_in_cells<const D: usize>(
+    mesh: &Mesh<D>,
+    geometry: &Geometry<D>,
+    factor: impl Fn(usize) -> f64,
+    of_place: impl Fn(&Vector<D>) -> Result<Vector<D>>,
+    forces: &mut [f64],
+) -> Result<()> {
+    let materials = geometry.runs.iter().flat_map(|run| std::iter::repeat_n(run.material, run.count));
+    for (number, (material, cell)) in materials.zip(geometry.cells()).enumerate() {
+        let factor = factor(material);
+        if factor == 0.0 {
+            continue;
+        }
+        let (volume, corners) = (factor * cell.whole().volume, mesh.corners(number));
+        if let CellShape::Linear = cell.shape() {
+            let nodes = mesh.cell(number).iter().copied();
+            for (place, weight) in cell_rule::<D>() {
+                let value = of_place(&point(corners[..=D].iter().copied(), place))?;
+                scatter(forces, nodes.clone(), place, volume * weight, &value);
+            }
+            continue;
+        }
+        for (k, (place, weight)) in fine_cell_rule::<D>().iter().enumerate() {
+            let shares = values(D + 1, place);
+            let coordinates = mesh.cell_nodes(number).map(|node| mesh.nodes[node as usize]);
+            let value = of_place(&point(coordinates, &shares))?;
+            let weight = match cell.shape() {
+                CellShape::Curved(weights) => factor * weights[k][cell.lane()],
+                _ => volume * weight,
+            };
+            scatter(forces, mesh.cell_nodes(number), &shares, weight, &value);
+        }
+    }
+    Ok(())
 }
 
 fn point<const D: usize>(coordinates: impl Iterator<Item = Vector<D>>, shares: &[f64]) -> Vector<D> {
@@ -141,16 +200,26 @@ pub(super) fn evaluate<const D: usize>(
 ) -> Result<Vector<D>> {
     let mut out = [0.0; D];
     for (i, component) in value.iter().enumerate().take(D) {
-        out[i] = component.evaluate(time, at);
-        if !out[i].is_finite() {
-            return Err(Error::Failed(format!(
-                "{what}: component {} is {} at t = {time} s, position {at:?} m; correct the expression in the job",
-                ["x", "y", "z"][i],
-                out[i]
-            )));
-        }
+        out[i] = finite(component, time, at, || format!("{what}: component {}", ["x", "y", "z"][i]))?;
     }
     Ok(out)
+}
+
+/// The value at a time and point; refused where it is not finite. `what` is what the message says of it.
+pub(super) fn finite<const D: usize>(
+    value: &Scalar,
+    time: f64,
+    at: &Vector<D>,
+    what: impl Fn() -> String,
+) -> Result<f64> {
+    let number = value.evaluate(time, at);
+    if number.is_finite() {
+        return Ok(number);
+    }
+    let what = what();
+    Err(Error::Failed(format!(
+        "{what} is {number} at t = {time} s, position {at:?} m; correct the expression in the job"
+    )))
 }
 
 #[cfg(test)]
@@ -162,8 +231,9 @@ mod tests {
     fn loads_are_steady_where_neither_tractions_nor_body_forces_depend_on_time() {
         let of = |text: &str| vec![Scalar::Expression(Expression::parse(text).expect("an expression"))];
         let load = |traction: &str, force: &str| Load {
-            tractions: vec![Traction { facets: Vec::new(), value: of(traction) }],
+            tractions: vec![Traction { facets: Vec::new(), value: of(traction), pressure: None }],
             body_forces: vec![BodyForce { value: of(force) }],
+            gravity: None,
         };
         assert!(load("x", "3*y").is_steady() && Load::default().is_steady());
         assert!(!load("t", "3*y").is_steady() && !load("x", "3*t").is_steady());

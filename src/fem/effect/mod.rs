@@ -10,11 +10,13 @@ mod cell_history;
 mod contact;
 mod contact_memory;
 mod damage;
+mod elastic_support;
 mod elasticity;
 mod energy;
 mod evolution;
 mod history;
 mod inertia;
+mod initial_stress;
 mod interior;
 mod isotropic;
 mod load;
@@ -32,9 +34,10 @@ mod viscous_stress;
 
 use crate::{
     error::{Error, Result},
-    fem::space::{Geometry, facets, surface_points},
+    fem::space::{CellRun, Geometry, surface_points},
     job::{self, Material},
     laws::material::{ByMaterial, FlowLaw, Hypothesis, Viscoplasticity},
+    linear_algebra::{simd::Pack, tensor::Mandel},
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -47,16 +50,18 @@ pub use contact::{
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};
+pub use elastic_support::{ElasticPoint, ElasticSupport, Resistances};
 pub use elasticity::{ELASTIC, Elasticity};
 pub use energy::{Energy, EnergyKind, NUMERICAL, Role};
 pub use history::{History, HistoryStore};
 pub use inertia::{Inertia, KINETIC};
+pub use initial_stress::InitialStress;
 pub use interior::{Effect, Phases};
-pub use load::{Load, Traction, WORK};
+pub use load::{Gravity, Load, Traction, WORK};
 pub use outcome::Outcome;
 pub use peaks::{PeakSquares, Peaks};
 pub use step_error::{Curvature, StressError};
-pub use support::fixed_components;
+pub use support::{SupportMotion, Supports};
 pub use surface::{SurfaceEffect, SurfaceForce};
 pub use tangents::Tangents;
 pub use term::{ElasticLaw, FlowProperties, Form, Term};
@@ -80,10 +85,12 @@ pub const ENERGIES: &[EnergyKind] = &[
 
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");
 
-/// The effects in the interior of bodies of these materials. A table that is absent creates none.
+/// The effects in the interior of bodies of these materials, with the initial stress of each cell, if there is any. A table that is
+/// absent creates none.
 pub fn effects<const D: usize, const S: usize>(
     materials: &[&Material],
     geometry: &Geometry<D>,
+    initial_stress: &[Mandel<S>],
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
     let mut effects: Vec<Box<dyn Effect<D, S>>> = Vec::new();
     if let Some(density) = by_material(materials, |m| m.density) {
@@ -99,6 +106,19 @@ pub fn effects<const D: usize, const S: usize>(
     if let Some(laws) = ByMaterial::new(flow) {
         effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, geometry)));
     }
+    let elastic = |m: &Material| match m.viscoplasticity {
+        None => Some(m.elasticity?.tensor(Hypothesis::of(S))),
+        Some(_) => None,
+    };
+    if let Some(laws) = by_material(materials, elastic).filter(|_| !initial_stress.is_empty()) {
+        let pack = |run: &CellRun| {
+            let value = |lane| initial_stress.get(run.first + lane).filter(|_| lane < run.count);
+            laws.get(run.material).map(|_| Pack::from_lanes(|lane| value(lane).copied().unwrap_or([0.0; S])))
+        };
+        let points = |run: &CellRun| std::iter::repeat_n(pack(run), geometry.points());
+        let stress = geometry.runs.iter().flat_map(points).collect();
+        effects.push(Box::new(InitialStress::new(laws, stress)));
+    }
     let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
         effects.push(Box::new(Damage::new(laws, geometry)));
@@ -106,16 +126,17 @@ pub fn effects<const D: usize, const S: usize>(
     Ok(effects)
 }
 
-/// The effects at nodes of contact boundaries in addition to contact. Collective.
+/// The effects at nodes of contact boundaries in addition to contact, given the facets of each contact on this rank. Collective.
 pub fn surface_effects<const D: usize>(
     session: &Session,
     contacts: &[job::Contact],
     mesh: &Mesh<D>,
+    facets: &[Vec<u32>],
 ) -> Result<Vec<Box<dyn SurfaceEffect<D>>>> {
     let mut effects: Vec<Box<dyn SurfaceEffect<D>>> = Vec::new();
     let (mut bonded, mut foundations) = (Vec::new(), Vec::new());
-    for (at, contact) in contacts.iter().enumerate() {
-        let points = || surface_points(session, mesh, &facets(mesh, &contact.on));
+    for (at, (contact, facets)) in contacts.iter().zip(facets).enumerate() {
+        let points = || surface_points(session, mesh, facets);
         if let Some(law) = contact.memory {
             foundations.push((at, law, points()?));
         }

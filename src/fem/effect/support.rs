@@ -1,69 +1,369 @@
-//! Supports: components of the displacement that are fixed.
+//! Supports: components of the displacement that are held or moved.
 
+use super::load::finite;
 use crate::{
     error::{Error, Result},
-    job::{Fix, FixedDirections, Support},
-    linear_algebra::{petsc::DistributedVector, tensor::norm},
-    mesh::{Mesh, shape::facet_normal},
+    fem::space::{Held, SurfacePoint, facets, surface_points},
+    job::{Fix, FixedDirections, Scalar, Support},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, add_scaled, dot, norm},
+    },
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
 };
+use std::collections::BTreeMap;
 
-/// Which components are fixed on a facet of the boundary of this name.
-fn fixed_axes<const D: usize>(fix: &Fix, mesh: &Mesh<D>, boundary: &str, facet: u32) -> Result<[bool; D]> {
-    let mut out = [false; D];
-    match fix {
-        Fix::Keyword(FixedDirections::All) => out = [true; D],
-        Fix::Axes(axes) => axes.iter().for_each(|axis| out[axis.index()] = true),
-        Fix::Keyword(FixedDirections::Normal) => {
-            for nodes in mesh.sub_facets(facet) {
-                let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
-                let size = norm(&normal);
-                let along = (0..D).find(|&i| normal[i].abs() > (1.0 - 1e-10) * size);
-                let Some(axis) = along else {
-                    return Err(Error::Refused(format!(
-                        "support on \"{boundary}\": fix = \"normal\" on a boundary that is not perpendicular to an axis is not \
-                         available yet (a facet there has the normal {:?}); fix components instead",
-                        normal.map(|x| x / size)
-                    )));
-                };
-                out[axis] = true;
-            }
+/// A unit direction with a smaller part outside of the span of others depends on them.
+const INDEPENDENT: f64 = 1e-9;
+/// Share of the first step over which the initial velocity of moving supports is found.
+const START_SHARE: f64 = 1e-4;
+
+/// What supports do at the nodes of a rank.
+#[derive(Debug)]
+pub struct Supports<const D: usize> {
+    /// The directions that they hold.
+    pub held: Held<D>,
+    /// The motion of those that move; `None` on all ranks where none does.
+    pub motion: Option<SupportMotion<D>>,
+}
+
+/// Directions at the nodes of a support.
+struct Constraints<'a, const D: usize> {
+    support: &'a Support,
+    /// Owned nodes, ascending, each with its directions.
+    nodes: Vec<(u32, Vec<Vector<D>>)>,
+}
+
+/// The motion of supports.
+#[derive(Debug)]
+pub struct SupportMotion<const D: usize> {
+    values: Vec<Prescribed>,
+    nodes: Vec<MovedNode<D>>,
+}
+
+/// What a support prescribes along a direction.
+#[derive(Debug, Clone, PartialEq)]
+struct Prescribed {
+    value: Scalar,
+    is_displacement: bool,
+}
+
+/// An owned node that supports move.
+#[derive(Debug)]
+struct MovedNode<const D: usize> {
+    node: u32,
+    place: Vector<D>,
+    /// The prescribed values along independent unit directions, each with its part of the motion: the vector whose component along
+    /// this direction is 1, and 0 along the others.
+    parts: Vec<Part<D>>,
+}
+
+#[derive(Debug)]
+struct Part<const D: usize> {
+    /// Position in the values of the motion; `None` where the support does not move.
+    value: Option<usize>,
+    direction: Vector<D>,
+    dual: Vector<D>,
+}
+
+impl<const D: usize> Supports<D> {
+    /// The supports of a job; `layout` is a vector with ghosts. Refuses motions that contradict each other. Collective.
+    pub fn new(
+        session: &Session,
+        mesh: &Mesh<D>,
+        supports: &[Support],
+        layout: &DistributedVector,
+    ) -> Result<Self> {
+        let constraints = constraints(session, mesh, supports)?;
+        let mut of_node: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+        for (node, directions) in constraints.iter().flat_map(|constraints| &constraints.nodes) {
+            of_node.entry(*node).or_default().extend(directions);
         }
+        let mut held = Held::from(vec![false; mesh.nodes.len() * D]);
+        of_node.into_iter().for_each(|(node, directions)| held.hold(node, directions.into_iter()));
+        hold_ghosts(session, mesh, &mut held, layout)?;
+        let moves = |support: &Support| support.displacement.is_some() || support.velocity.is_some();
+        let motion = if supports.iter().any(moves) {
+            Some(session.agree(SupportMotion::new(mesh, &constraints))?)
+        } else {
+            None
+        };
+        Ok(Self { held, motion })
+    }
+}
+
+/// The directions that each support with `fix` determines. Collective.
+fn constraints<'a, const D: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    supports: &'a [Support],
+) -> Result<Vec<Constraints<'a, D>>, Agreed> {
+    let mut out = Vec::new();
+    // Boundaries that are held along their normals and do not move have one normal where they meet.
+    let is_plain_normal = |support: &Support| {
+        support.fix == Some(Fix::Keyword(FixedDirections::Normal))
+            && support.displacement.is_none()
+            && support.velocity.is_none()
+            && support.part.is_none()
+    };
+    let mut normal_is_done = false;
+    for support in supports {
+        let Some(fix) = &support.fix else { continue };
+        let mut names: Vec<&String> = support.on.iter().collect();
+        if is_plain_normal(support) {
+            if std::mem::replace(&mut normal_is_done, true) {
+                continue;
+            }
+            names =
+                supports.iter().filter(|other| is_plain_normal(other)).flat_map(|other| &other.on).collect();
+        }
+        let points = surface_points(session, mesh, &facets(mesh, names))?;
+        let around = points.chunk_by(|a: &SurfacePoint<D>, b| a.node == b.node);
+        let share = |points: &[SurfacePoint<D>]| {
+            let part = support.part.as_ref();
+            part.map_or(1.0, |part| part.evaluate(0.0, &mesh.nodes[points[0].node as usize]))
+        };
+        let wrong = around.clone().find(|points| share(points).is_nan());
+        session.agree(wrong.map_or(Ok(()), |points| {
+            Err(Error::Refused(format!(
+                "support on {}: `where` is not a number at {:?} m; correct the expression",
+                support.on.join(", "),
+                mesh.nodes[points[0].node as usize]
+            )))
+        }))?;
+        let nodes: Vec<(u32, Vec<Vector<D>>)> = around
+            .filter(|points| share(points) != 0.0)
+            .map(|points| {
+                let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+                let directions = match fix {
+                    Fix::Keyword(FixedDirections::All) => (0..D).map(axis).collect(),
+                    Fix::Axes(axes) => axes.iter().map(|a| axis(a.index())).collect(),
+                    Fix::Keyword(FixedDirections::Normal) => {
+                        points.iter().map(|point| point.normal).collect()
+                    }
+                };
+                (points[0].node, directions)
+            })
+            .collect();
+        if support.part.is_some() && session.total(nodes.len()) == 0 {
+            return session.agree(Err(Error::Refused(format!(
+                "support on {}: `where` holds at no node of these boundaries; correct the expression",
+                support.on.join(", ")
+            ))));
+        }
+        out.push(Constraints { support, nodes });
     }
     Ok(out)
 }
 
-/// One flag for each component of each local node, ghosts included: whether a support fixes it, on whichever rank the facet is.
-/// Collective, also where a rank refuses.
-pub fn fixed_components<const D: usize>(
+/// Copies what is held at owned nodes to the ghosts of other ranks. Collective.
+fn hold_ghosts<const D: usize>(
+    session: &Session,
     mesh: &Mesh<D>,
-    supports: &[Support],
+    held: &mut Held<D>,
     layout: &DistributedVector,
-) -> Result<Vec<bool>> {
-    let mut flags = layout.like()?;
-    flags.update_ghosts()?;
-    let mut refused = Ok(());
+) -> Result<()> {
+    let mut directions: BTreeMap<u32, Vec<Vector<D>>> = BTreeMap::new();
+    let mut vector = layout.like()?;
     {
-        let mut values = flags.local_mut()?;
-        for Support { on, fix } in supports {
-            for boundary in on.iter().filter_map(|name| mesh.boundary(name)) {
-                for &facet in &boundary.facets {
-                    match fixed_axes(fix, mesh, &boundary.name, facet) {
-                        Ok(axes) => {
-                            for node in mesh.sub_facets(facet).flatten() {
-                                for axis in (0..D).filter(|&axis| axes[axis]) {
-                                    values[node as usize * D + axis] = 1.0;
-                                }
-                            }
-                        }
-                        Err(error) => refused = Err(error),
+        let mut values = vector.owned_mut()?;
+        values.iter_mut().zip(held.flags()).for_each(|(value, &held)| *value = f64::from(u8::from(held)));
+    }
+    vector.update_ghosts()?;
+    for (at, &flag) in
+        vector.local()?.iter().enumerate().skip(mesh.owned * D).filter(|(_, flag)| **flag > 0.0)
+    {
+        let direction = std::array::from_fn(|i| if i == at % D { flag } else { 0.0 });
+        directions.entry((at / D) as u32).or_default().push(direction);
+    }
+    if session.total(held.slanted().len()) > 0 {
+        for number in 0..D {
+            {
+                let mut values = vector.owned_mut()?;
+                values.fill(0.0);
+                for slanted in held.slanted() {
+                    if let Some(direction) = slanted.held().get(number) {
+                        values[slanted.node as usize * D..][..D].copy_from_slice(direction);
                     }
+                }
+            }
+            vector.update_ghosts()?;
+            for (node, value) in vector.local()?.chunks_exact(D).enumerate().skip(mesh.owned) {
+                if value.iter().any(|v| *v != 0.0) {
+                    let direction = std::array::from_fn(|i| value[i]);
+                    directions.entry(node as u32).or_default().push(direction);
                 }
             }
         }
     }
-    flags.add_ghosts_to_owners()?;
-    flags.update_ghosts()?;
-    refused?;
-    let values = flags.local()?;
-    Ok(values.iter().map(|&count| count > 0.0).collect())
+    directions.into_iter().for_each(|(node, directions)| held.hold(node, directions.into_iter()));
+    Ok(())
+}
+
+impl<const D: usize> SupportMotion<D> {
+    fn new(mesh: &Mesh<D>, constraints: &[Constraints<'_, D>]) -> Result<Self> {
+        let mut values: Vec<Prescribed> = Vec::new();
+        let mut moved: BTreeMap<u32, Vec<(Vector<D>, Option<usize>)>> = BTreeMap::new();
+        for Constraints { support, nodes } in constraints {
+            let motion = match (&support.displacement, &support.velocity) {
+                (Some(displacement), _) => Some((displacement, true)),
+                (None, Some(velocity)) => Some((velocity, false)),
+                _ => None,
+            };
+            let numbers: Vec<usize> = motion
+                .iter()
+                .flat_map(|(list, is_displacement)| {
+                    list.iter()
+                        .map(|value| Prescribed { value: value.clone(), is_displacement: *is_displacement })
+                })
+                .map(|value| {
+                    values.iter().position(|known| *known == value).unwrap_or_else(|| {
+                        values.push(value);
+                        values.len() - 1
+                    })
+                })
+                .collect();
+            for (node, directions) in nodes {
+                // A support along the normal has one value for all normals of a node.
+                let number = |at: usize| numbers.get(at).or(numbers.first()).copied();
+                let all = directions.iter().enumerate().map(|(at, direction)| (*direction, number(at)));
+                moved.entry(*node).or_default().extend(all);
+            }
+        }
+        let moved = moved.into_iter().filter(|(_, all)| all.iter().any(|(_, value)| value.is_some()));
+        let nodes = moved.map(|(node, all)| MovedNode::new(mesh, node, &all)).collect::<Result<_>>()?;
+        Ok(Self { values, nodes })
+    }
+
+    /// The expressions of the values.
+    pub fn expressions(&self) -> impl Iterator<Item = &Scalar> {
+        self.values.iter().map(|prescribed| &prescribed.value)
+    }
+
+    /// Whether supports hold this node of this rank and move it along this direction.
+    pub fn moves(&self, node: usize, direction: &Vector<D>) -> bool {
+        let found = self.nodes.binary_search_by_key(&(node as u32), |moved| moved.node);
+        found.is_ok_and(|at| {
+            let parts = self.nodes[at].parts.iter().filter(|part| part.value.is_some());
+            parts.into_iter().any(|part| dot(&part.dual, direction).abs() > INDEPENDENT)
+        })
+    }
+
+    /// Writes to owned nodes the velocity of supports at the end of a step, 0 elsewhere: for prescribed displacements that with which
+    /// the displacement `start` at owned nodes changes in `length` in s.
+    pub fn write_velocity(&self, time: f64, start: &[f64], length: f64, velocity: &mut [f64]) -> Result<()> {
+        velocity.fill(0.0);
+        for moved in &self.nodes {
+            let along = |direction: &Vector<D>| {
+                (0..D).map(|i| direction[i] * start[moved.node as usize * D + i]).sum::<f64>()
+            };
+            moved.add(velocity, |part, number| {
+                let Prescribed { value, is_displacement } = &self.values[number];
+                let value = finite(value, time, &moved.place, what)?;
+                Ok(if *is_displacement { (value - along(&part.direction)) / length } else { value })
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Sets displacements of owned nodes at time 0 to those of the supports.
+    pub fn start_displacement(&self, displacement: &mut [f64]) -> Result<()> {
+        for moved in &self.nodes {
+            let at = moved.node as usize * D;
+            let before: Vector<D> = std::array::from_fn(|i| displacement[at + i]);
+            moved.add(displacement, |part, number| {
+                let Prescribed { value, is_displacement } = &self.values[number];
+                if !is_displacement {
+                    return Ok(0.0);
+                }
+                Ok(finite(value, 0.0, &moved.place, what)? - dot(&part.direction, &before))
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Adds to velocities of owned nodes, 0 at held components, those of the supports at time 0; `step` in s is the first step.
+    pub fn start_velocity(&self, step: f64, velocity: &mut [f64]) -> Result<()> {
+        let span = START_SHARE * step;
+        for moved in &self.nodes {
+            moved.add(velocity, |_, number| {
+                let Prescribed { value, is_displacement } = &self.values[number];
+                let value = |time: f64| finite(value, time, &moved.place, what);
+                let start = value(0.0)?;
+                if !is_displacement {
+                    return Ok(start);
+                }
+                // Exact for parabolas.
+                Ok((4.0 * value(span)? - 3.0 * start - value(2.0 * span)?) / (2.0 * span))
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn what() -> String {
+    "support: a displacement or velocity".into()
+}
+
+impl<const D: usize> MovedNode<D> {
+    fn new(mesh: &Mesh<D>, node: u32, all: &[(Vector<D>, Option<usize>)]) -> Result<Self> {
+        let place = mesh.nodes[node as usize];
+        let mut independent: Vec<(Vector<D>, Option<usize>)> = Vec::new();
+        // An orthonormal basis of the same span.
+        let mut basis: Vec<Vector<D>> = Vec::new();
+        for (direction, value) in all {
+            let out = |rest: Vector<D>, known: &Vector<D>| add_scaled(&rest, -dot(known, &rest), known);
+            let rest = basis.iter().chain(&basis).fold(*direction, out);
+            let size = norm(&rest);
+            if size > INDEPENDENT {
+                basis.push(rest.map(|x| x / size));
+                independent.push((*direction, *value));
+                continue;
+            }
+            let same = |(other, known): &(Vector<D>, Option<usize>)| {
+                known == value && dot(other, direction) > 1.0 - INDEPENDENT
+            };
+            let rests = value.is_none() && independent.iter().all(|(_, known)| known.is_none());
+            if !rests && !independent.iter().any(same) {
+                return Err(Error::Refused(format!(
+                    "support at {place:?} m: two supports determine the same component of the displacement there and move \
+                     it differently; leave this component, or the boundary, out of one of them, or give both the same motion"
+                )));
+            }
+        }
+        let dual = |at: usize| {
+            // What is left of this direction without the span of the others, scaled to a component of 1 along it.
+            let mut others: Vec<Vector<D>> = Vec::new();
+            let out = |rest: Vector<D>, known: &Vector<D>| add_scaled(&rest, -dot(known, &rest), known);
+            for (_, (other, _)) in independent.iter().enumerate().filter(|(k, _)| *k != at) {
+                let rest = others.iter().chain(&others).fold(*other, out);
+                let size = norm(&rest);
+                others.push(rest.map(|x| x / size));
+            }
+            let direction = independent[at].0;
+            let rest = others.iter().chain(&others).fold(direction, out);
+            let along = dot(&rest, &direction);
+            rest.map(|x| x / along)
+        };
+        let parts = independent
+            .iter()
+            .enumerate()
+            .map(|(at, (direction, value))| Part { value: *value, direction: *direction, dual: dual(at) })
+            .collect();
+        Ok(Self { node, place, parts })
+    }
+
+    /// Adds to a nodal value the vector with these components along the directions that move.
+    fn add(&self, nodal: &mut [f64], value: impl Fn(&Part<D>, usize) -> Result<f64>) -> Result<()> {
+        let mut sum = [0.0; D];
+        for part in &self.parts {
+            if let Some(number) = part.value {
+                sum = add_scaled(&sum, value(part, number)?, &part.dual);
+            }
+        }
+        let target = &mut nodal[self.node as usize * D..][..D];
+        target.iter_mut().zip(sum).for_each(|(target, value)| *target += value);
+        Ok(())
+    }
 }

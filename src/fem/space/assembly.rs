@@ -1,7 +1,7 @@
 //! Assembly of the constant matrix from cell matrices into the rows each rank owns.
 
 use super::{
-    Cell, CellShape, Geometry, Simplex,
+    Cell, CellShape, Geometry, Held, Simplex,
     quadratic::{MOST_NODES, MassCoefficients, derivatives, node_count, values},
     quadrature::{CellRule, cell_rule, fine_cell_rule},
 };
@@ -177,17 +177,18 @@ fn add_products<const D: usize>(
     }
 }
 
-/// Sums cell matrices into the block rows owned here; fixed components keep their diagonal and are coupled to nothing.
+/// Sums cell matrices into the block rows owned here; held components keep their diagonal and are coupled to nothing.
 /// Collective.
 ///
-/// `fixed` holds one flag a local component. `fill` adds the matrix of a cell, given its local number and geometry.
+/// `fill` adds the matrix of a cell, given its local number and geometry.
 pub fn assemble<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     geometry: &Geometry<D>,
-    fixed: &[bool],
+    held: &Held<D>,
     mut fill: impl FnMut(usize, Cell<'_, D>, &mut CellMatrix<D>),
 ) -> Result<BlockRows, Agreed> {
+    let flags = held.flags();
     let mut rows = LocalRows::pattern(mesh);
     let mut matrix = CellMatrix::new(mesh);
     let mut nodes = Vec::with_capacity(matrix.nodes());
@@ -196,13 +197,14 @@ pub fn assemble<const D: usize>(
         fill(number, cell, &mut matrix);
         nodes.clear();
         nodes.extend(mesh.cell_nodes(number));
+        held.restrict(&nodes, &mut matrix.blocks);
         for (a, &row) in nodes.iter().enumerate() {
             for (b, &column) in nodes.iter().enumerate() {
                 let target = rows.block::<D>(row, column);
                 for i in 0..D {
                     for j in 0..D {
                         let (r, c) = (row as usize * D + i, column as usize * D + j);
-                        if r == c || !(fixed[r] || fixed[c]) {
+                        if r == c || !(flags[r] || flags[c]) {
                             target[i * D + j] += matrix.blocks[a][b][i][j];
                         }
                     }

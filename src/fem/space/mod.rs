@@ -3,6 +3,7 @@
 mod assembly;
 mod batch;
 mod geometry;
+mod held;
 mod kernels;
 mod quadratic;
 mod quadrature;
@@ -13,6 +14,7 @@ mod surface;
 pub use assembly::{CellMatrix, assemble};
 pub use batch::{Batch, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
+pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;
 pub use quadratic::{MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, values};
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};

@@ -11,15 +11,6 @@ use crate::{
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
 
-/// The facets of this rank on boundaries with these names, each once.
-pub fn facets<const D: usize>(mesh: &Mesh<D>, names: &[String]) -> Vec<u32> {
-    let mut all: Vec<u32> =
-        names.iter().filter_map(|name| mesh.boundary(name)).flat_map(|b| b.facets.iter().copied()).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
 /// A node of a boundary with the normal and the measure of the boundary that it stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint<const D: usize> {
@@ -27,7 +18,7 @@ pub struct SurfacePoint<const D: usize> {
     pub node: u32,
     /// Outward unit normal.
     pub normal: Vector<D>,
-    /// Weight of the trapezoidal rule in m^(D-1): the node's share of the facets around it.
+    /// Quadrature weight in m^(D-1): the node's share of the facets around it.
     pub weight: f64,
 }
 
@@ -49,27 +40,46 @@ impl<const D: usize> SurfacePoint<D> {
     }
 }
 
+/// The facets of this rank on the boundaries of these names, each once.
+pub fn facets<'a, const D: usize>(mesh: &Mesh<D>, names: impl IntoIterator<Item = &'a String>) -> Vec<u32> {
+    let boundaries = names.into_iter().filter_map(|name| mesh.boundary(name));
+    let mut all: Vec<u32> = boundaries.flat_map(|boundary| boundary.facets.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// Cosine of the angle beyond which facets around a node count as different faces of the body (40 degrees).
 const SAME_FACE: f64 = 0.766_044_443_118_978;
 
 /// The quadrature points of these boundaries at nodes owned here, ordered by node. Collective.
 ///
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
-/// point with their mean normal.
+/// point with their mean normal. The weights are those of the trapezoidal rule, for quadratic cells in the plane those of Simpson's
+/// rule: a constant pressure has the same nodal forces as by exact integration. For quadratic cells in space they are those of the
+/// linear facets between corners and midside nodes, because the exact ones vanish at corners.
 pub fn surface_points<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     facets: &[u32],
 ) -> Result<Vec<SurfacePoint<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    // Weights of linear facets are positive, those of quadratic ones vanish at corners.
-    for nodes in facets.iter().flat_map(|&facet| mesh.sub_facets(facet)) {
-        let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
-        for node in nodes {
-            let global = mesh.global_node(node);
-            let record = &mut outgoing[mesh.owner(global)];
-            record.push(f64::from(global));
-            record.extend(normal);
+    let has_simpson_weights = D == 2 && mesh.order() == 2;
+    for &facet in facets {
+        let corners = mesh.facets[facet as usize];
+        for nodes in mesh.sub_facets(facet) {
+            let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
+            for node in nodes {
+                let share = match has_simpson_weights {
+                    true if corners.contains(&node) => 2.0 / 3.0,
+                    true => 4.0 / 3.0,
+                    false => 1.0,
+                };
+                let global = mesh.global_node(node);
+                let record = &mut outgoing[mesh.owner(global)];
+                record.push(f64::from(global));
+                record.extend(normal.map(|n| share * n));
+            }
         }
     }
     let incoming = exchange_lists(session.world(), &outgoing)?;

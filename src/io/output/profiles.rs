@@ -9,7 +9,7 @@ use crate::{
         state::State,
     },
     laws::contact::NodeContext,
-    linear_algebra::tensor::{Mandel, Vector, add_scaled, apply, dot, norm},
+    linear_algebra::tensor::{Mandel, add_scaled, apply, dot, norm},
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
 };
@@ -190,10 +190,9 @@ fn free_component<const D: usize, const S: usize>(
     nodal: &[f64],
     point: &SurfacePoint<D>,
 ) -> f64 {
-    let at = point.node as usize * D;
-    let free: Vector<D> = std::array::from_fn(|i| if body.fixed[at + i] { 0.0 } else { point.normal[i] });
+    let free = body.held.free_part(point.node as usize, &point.normal);
     let size = norm(&free);
-    if size == 0.0 { 0.0 } else { (0..D).map(|i| free[i] * nodal[at + i]).sum::<f64>() / size }
+    if size < 1e-9 { 0.0 } else { dot(&free, &point.value(nodal)) / size }
 }
 
 fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {

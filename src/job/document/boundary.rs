@@ -7,16 +7,70 @@ use serde::{Deserialize, Serialize};
 
 use crate::job::Scalar;
 
-/// A support: boundaries on which components of the displacement keep their initial values.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A support: boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots. A support
+/// has `fix`, or one or more of `stiffness`, `damping` and `absorbing`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
-    /// The components of the displacement that keep their initial values: "all", "normal" or a list of axes.
+    /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not 0,
+    /// such as those of an edge or a single one; otherwise the facets at whose centre it is not 0. Absent: the whole boundaries.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
+    #[schemars(example = "x < 1", example = "hypot(x - 1, y) < 1e-6")]
+    pub part: Option<Scalar>,
+    /// The components of the displacement that the support determines: "all", "normal" or a list of axes. They keep their initial
+    /// values, unless `displacement` or `velocity` moves them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"all", example = ["x"])]
-    pub fix: Fix,
+    pub fix: Option<Fix>,
+    /// The displacement of the fixed components, one number or expression in t, x, y, z for each of them: in the order of the list
+    /// `fix`, along x, y, z for "all", one along the outward normal for "normal". It holds at time 0, too, in place of the initial
+    /// displacement; after `initial.from` the first step reaches it. The work of the support is part of `external_work`. Absent: the
+    /// components do not move.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m"), example = ["0.01*min(t/0.1, 1)"])]
+    pub displacement: Option<Vec<Scalar>>,
+    /// The velocity of the fixed components, in place of `displacement`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m/s"), example = [0.02])]
+    pub velocity: Option<Vec<Scalar>>,
+    /// Springs to the ground, per area: the traction on the body is minus the stiffness times the displacement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "Pa/m"))]
+    pub stiffness: Option<Resistance>,
+    /// Dashpots to the ground, per area: the traction on the body is minus the damping times the velocity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "Pa s/m"))]
+    pub damping: Option<Resistance>,
+    /// Whether waves leave the body through these boundaries. Adds the dashpots of Lysmer and Kuhlemeyer (1969): density times the
+    /// speed of pressure waves along the normal, density times the speed of shear waves along the boundary, of the elastic material
+    /// behind the boundary. Waves are absorbed completely where they arrive along the normal.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub absorbing: bool,
+}
+
+fn is_zero(value: &Scalar) -> bool {
+    *value == Scalar::default()
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// A stiffness or a damping per area, along the normal of a boundary and along the boundary.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Resistance {
+    /// Along the normal.
+    #[serde(default)]
+    #[schemars(range(min = 0), example = 1e8)]
+    pub normal: f64,
+    /// Along the boundary.
+    #[serde(default)]
+    #[schemars(range(min = 0), example = 1e7)]
+    pub tangential: f64,
 }
 
 /// The components of the displacement that a support holds.
@@ -35,7 +89,8 @@ pub enum Fix {
 pub enum FixedDirections {
     /// All components.
     All,
-    /// The normal component. The boundary must be flat and perpendicular to a coordinate axis.
+    /// The normal component. Where the boundary is curved, a node has the mean normal of the facets around it; where facets turn by more
+    /// than 40 degrees it is held along the normals of both.
     Normal,
 }
 
@@ -67,8 +122,22 @@ pub struct Traction {
     pub on: Vec<String>,
     /// The force per area on the body, one component per axis: numbers, or expressions in the time t and the undeformed coordinates
     /// x, y, z.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "Pa"), example = [0.0, -10.0], example = ["0", "-10*min(t/0.1, 1)"])]
     pub value: Vec<Scalar>,
+    /// A pressure on the undeformed boundary, against its outward normal, in place of `value`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "Pa"), example = 1e5, example = "1e5*pulse(t, 0, 0.01)")]
+    pub pressure: Option<Scalar>,
+}
+
+/// Gravity: a force per volume of the density of each material times this acceleration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Gravity {
+    /// The acceleration, one component per axis: numbers, or expressions in the time t and the undeformed coordinates x, y, z.
+    #[schemars(extend("unit" = "m/s^2"), example = [0.0, -9.81])]
+    pub acceleration: Vec<Scalar>,
 }
 
 /// A force per volume on the whole body. If there are several, they are added.
@@ -101,4 +170,38 @@ pub struct Initial {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,
+    /// The elastic stress at displacement zero of all materials with elasticity, constant in each cell: the values at its centre.
+    /// Viscoplastic flow relaxes it. Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<InitialStress>,
+}
+
+/// The components of the initial stress: numbers, or expressions in the undeformed coordinates x, y, z; positive in tension.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct InitialStress {
+    /// The component xx.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"), example = -1e5)]
+    pub xx: Scalar,
+    /// The component yy.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"), example = "-2e4*(10 - y)")]
+    pub yy: Scalar,
+    /// The component zz; not in plane stress.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"))]
+    pub zz: Scalar,
+    /// The component xy.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"))]
+    pub xy: Scalar,
+    /// The component yz; in 3D only.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"))]
+    pub yz: Scalar,
+    /// The component xz; in 3D only.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("unit" = "Pa"))]
+    pub xz: Scalar,
 }

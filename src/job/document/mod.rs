@@ -15,7 +15,9 @@ pub use crate::laws::{
     material::Material,
     schemes::Scheme,
 };
-pub use boundary::{Axis, BodyForce, Fix, FixedDirections, Initial, Support, Traction};
+pub use boundary::{
+    Axis, BodyForce, Fix, FixedDirections, Gravity, Initial, InitialStress, Resistance, Support, Traction,
+};
 pub use material::Region;
 pub use mesh::{Cuboid, CuboidGrading, Diagonal, Mesh, MeshSource, Partition, Rectangle, RectangleGrading};
 pub use output::{Checkpoint, Every, FurtherField, Output, Probe, Profile};
@@ -40,7 +42,7 @@ pub struct Job {
     /// Parts of the body with another material, named by the physical groups of the mesh.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub region: Vec<Region>,
-    /// Boundaries on which components of the displacement keep their initial values.
+    /// Boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub support: Vec<Support>,
     /// Tractions, which are forces per area, on boundaries. Tractions on the same boundary are added.
@@ -49,6 +51,9 @@ pub struct Job {
     /// Forces per volume on the whole body. Several body forces are added.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub body_force: Vec<BodyForce>,
+    /// Gravity on all materials with a density. Absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<Gravity>,
     /// Boundaries that may touch an obstacle, and their contact laws.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact: Vec<Contact>,

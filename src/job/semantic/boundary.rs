@@ -4,6 +4,7 @@ use super::findings::{Findings, MeshNames, items};
 use crate::job::document::{Axis, Fix, FixedDirections};
 use crate::job::source::{Node, Value};
 use crate::laws::expression::{Scalar, Variable};
+use crate::laws::material::Hypothesis;
 use crate::laws::nearest::nearest;
 
 /// Tables with a list `on`.
@@ -25,8 +26,47 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     }
     for support in items(root, "support") {
         check_repeats(findings, &format!("{support}.fix"), "axis");
+        check_kind(findings, &support);
     }
     check_claims(findings);
+    for traction in items(root, "traction") {
+        let has = |key: &str| root.find(&format!("{traction}.{key}")).is_some();
+        match (has("value"), has("pressure")) {
+            (true, true) => {
+                let path = format!("{traction}.pressure");
+                findings.fault_at_key(
+                    &path,
+                    "a traction has a value or a pressure, not both",
+                    "delete one, or write two tables",
+                );
+            }
+            (false, false) => {
+                let help = "add value = [..], or pressure = .. against the normal";
+                findings.fault(&traction, "this traction has neither `value` nor `pressure`", help);
+            }
+            _ => {}
+        }
+    }
+    if root.find("gravity").is_some() && !has_density(root) {
+        let help = "give [material] density; for a body without inertia, write the weight as [[body_force]]";
+        findings.fault_at_key(
+            "gravity",
+            "gravity acts on materials with a density, and there are none",
+            help,
+        );
+    }
+    for component in ["xx", "yy", "zz", "xy", "yz", "xz"] {
+        let path = format!("initial.stress.{component}");
+        if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
+            findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");
+        }
+    }
+    for entry in items(root, "contact").into_iter().chain(items(root, "support")) {
+        let path = format!("{entry}.where");
+        if root.read::<Scalar>(&path).is_some_and(|scalar| scalar.depends_on_time()) {
+            findings.fault(&path, "the part of a boundary can't depend on t", "use x, y and z only");
+        }
+    }
     for key in ["initial.displacement", "initial.velocity"] {
         if root.find("initial.from").is_some() && root.find(key).is_some() {
             let help = "delete this key, or `from`";
@@ -37,6 +77,72 @@ pub(super) fn check(findings: &mut Findings<'_>) {
                 findings.fault(&path, "the initial state can't depend on t", "use x, y and z only");
             }
         }
+    }
+}
+
+fn has_density(root: &Node) -> bool {
+    let regions = items(root, "region").into_iter().map(|region| format!("{region}.material.density"));
+    regions.chain(["material.density".into()]).any(|path| root.find(&path).is_some())
+}
+
+/// A support either determines components or gives way.
+fn check_kind(findings: &mut Findings<'_>, support: &str) {
+    let root = findings.root;
+    let has = |key: &str| root.find(&format!("{support}.{key}")).is_some();
+    let absorbs = root.read(&format!("{support}.absorbing")).unwrap_or_default();
+    let gives = ["stiffness", "damping", "absorbing"]
+        .into_iter()
+        .find(|key| has(key) && (*key != "absorbing" || absorbs));
+    match (has("fix"), gives) {
+        (true, Some(key)) => {
+            let message = format!("a support with `fix` can't have `{key}`");
+            findings.fault_at_key(
+                &format!("{support}.{key}"),
+                message,
+                "give springs and dashpots a [[support]] of their own",
+            );
+        }
+        (false, None) => {
+            let help = "add fix = \"all\", or stiffness, damping or absorbing for a support that gives way";
+            findings.fault(support, "this support has neither `fix` nor springs or dashpots", help);
+        }
+        _ => {}
+    }
+    for key in ["displacement", "velocity"].into_iter().filter(|key| has(key)) {
+        let path = format!("{support}.{key}");
+        if !has("fix") {
+            findings.fault_at_key(
+                &path,
+                format!("`{key}` moves the components of `fix`, which is absent"),
+                "add `fix`",
+            );
+        }
+    }
+    if has("displacement") && has("velocity") {
+        let path = format!("{support}.velocity");
+        findings.fault_at_key(&path, "a support has a displacement or a velocity, not both", "delete one");
+    }
+}
+
+/// A motion has one value for each component that the support determines.
+fn check_motion(findings: &mut Findings<'_>, support: &str, dimension: usize) {
+    let root = findings.root;
+    let fix: Option<Fix> = root.read(&format!("{support}.fix"));
+    let needed = match fix {
+        Some(Fix::Keyword(FixedDirections::All)) => dimension,
+        Some(Fix::Keyword(FixedDirections::Normal)) => 1,
+        Some(Fix::Axes(axes)) => axes.len(),
+        None => return,
+    };
+    for key in ["displacement", "velocity"] {
+        let path = format!("{support}.{key}");
+        let values = items(root, &path);
+        if root.find(&path).is_some() && values.len() != needed {
+            let message =
+                format!("`{path}` has {} value(s), but `fix` has {needed} component(s)", values.len());
+            findings.fault(&path, message, "give one value for each component, in the order of `fix`");
+        }
+        values.iter().for_each(|value| check_flat(findings, value, dimension));
     }
 }
 
@@ -59,7 +165,8 @@ fn check_claims(findings: &mut Findings<'_>) {
         .into_iter()
         .filter(|(path, _)| {
             let support = path.split('.').take(2).collect::<Vec<_>>().join(".");
-            holds_all(root.read(&format!("{support}.fix")), root)
+            root.find(&format!("{support}.where")).is_none()
+                && holds_all(root.read(&format!("{support}.fix")), root)
         })
         .collect();
     let mut contacts: Vec<(String, String)> = Vec::new();
@@ -70,9 +177,15 @@ fn check_claims(findings: &mut Findings<'_>) {
             findings.fault(&path, message, "remove it from one of the two tables");
         }
         let entry = |path: &str| path.split('.').nth(1).map(str::to_owned);
-        if contacts.iter().any(|(other, taken)| *taken == name && entry(other) != entry(&path)) {
+        let is_part =
+            |path: &str| root.find(&format!("contact.{}.where", entry(path).unwrap_or_default())).is_some();
+        let taken = |(other, taken): &(String, String)| {
+            *taken == name && entry(other) != entry(&path) && !(is_part(other) && is_part(&path))
+        };
+        if contacts.iter().any(taken) {
             let message = format!("the boundary \"{name}\" is in two [[contact]] tables");
-            findings.fault(&path, message, "a boundary has one contact law: remove it from one of them");
+            let help = "a boundary has one contact law: remove it from one of them, or give each its part by `where`";
+            findings.fault(&path, message, help);
         }
         contacts.push((path, name));
     }
@@ -116,8 +229,45 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
             check_vector(findings, &format!("{entry}.value"), mesh.dimension);
         }
     }
+    for support in items(root, "support") {
+        check_motion(findings, &support, mesh.dimension);
+    }
+    for traction in items(root, "traction") {
+        check_flat(findings, &format!("{traction}.pressure"), mesh.dimension);
+    }
+    for entry in items(root, "contact").into_iter().chain(items(root, "support")) {
+        check_flat(findings, &format!("{entry}.where"), mesh.dimension);
+    }
+    check_vector(findings, "gravity.acceleration", mesh.dimension);
+    check_initial_stress(findings, mesh.dimension);
     check_vector(findings, "initial.displacement", mesh.dimension);
     check_vector(findings, "initial.velocity", mesh.dimension);
+}
+
+/// The initial stress has the components of the dimension, and a material with elasticity.
+fn check_initial_stress(findings: &mut Findings<'_>, dimension: usize) {
+    let root = findings.root;
+    if root.find("initial.stress").is_none() {
+        return;
+    }
+    let hypothesis: Option<Hypothesis> = root.read("material.hypothesis");
+    let absent: &[&str] = match (dimension, hypothesis) {
+        (2, Some(Hypothesis::PlaneStress)) => &["zz", "yz", "xz"],
+        (2, _) => &["yz", "xz"],
+        _ => &[],
+    };
+    for component in ["xx", "yy", "zz", "xy", "yz", "xz"] {
+        let path = format!("initial.stress.{component}");
+        check_flat(findings, &path, dimension);
+        if absent.contains(&component) && root.find(&path).is_some() {
+            findings.fault_at_key(&path, format!("this body has no stress {component}"), "delete it");
+        }
+    }
+    let regions = items(root, "region").into_iter().map(|region| format!("{region}.material.elasticity"));
+    if !regions.chain(["material.elasticity".into()]).any(|path| root.find(&path).is_some()) {
+        let help = "add [material.elasticity]";
+        findings.fault_at_key("initial.stress", "an initial stress is elastic, and no material is", help);
+    }
 }
 
 /// `name` must be one of `known`.

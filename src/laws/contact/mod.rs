@@ -18,6 +18,8 @@ mod table;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::laws::expression::Scalar;
+
 pub use adhesion::Adhesion;
 pub use friction_law::{FrictionBound, Slip};
 pub use interface::Interface;
@@ -36,6 +38,11 @@ pub struct Contact {
     /// The names of the boundaries.
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
+    /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
+    /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two. Absent: the whole boundaries.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
+    #[schemars(example = "x < 1")]
+    pub part: Option<Scalar>,
     /// The points of a facet at which the contact laws are evaluated.
     #[serde(default)]
     pub quadrature: Quadrature,

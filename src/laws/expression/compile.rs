@@ -1,25 +1,39 @@
 //! Compiles an expression to the program of the stack machine, by recursive descent.
 //!
-//! `sum = product {(+|-) product}`, `product = signed {(*|/) signed}`, `signed = (+|-) signed | power`,
-//! `power = atom [^ signed]`, `atom = number | name | name(sum, ...) | (sum)`: so -x^2 is -(x^2), and
-//! 2^3^2 is 2^(3^2).
+//! `value = sum [(<|<=|>|>=) sum]`, which is 1 or 0, `sum = product {(+|-) product}`, `product = signed {(*|/) signed}`,
+//! `signed = (+|-) signed | power`, `power = atom [^ signed]`, `atom = number | name | name(value, ...) | (value)`: so -x^2 is
+//! -(x^2), and 2^3^2 is 2^(3^2).
 
 use std::ops::Range;
 
 use super::functions::{Meaning, meaning, names};
-use super::program::{Binary, Instruction, Unary};
+use super::program::{Binary, Instruction, Program, Table, Unary};
 use crate::laws::nearest::nearest;
 
-/// Longest permitted expression in bytes.
-const LONGEST: usize = 10_000;
+/// Longest permitted expression in bytes, without and with tables.
+const LONGEST: [usize; 2] = [10_000, 1 << 20];
 /// Deepest permitted nesting of parentheses, signs and powers.
 const DEEPEST: usize = 200;
+
+/// 1 where the comparison holds, else 0.
+macro_rules! comparison {
+    ($operator:tt) => {{
+        fn compare(a: f64, b: f64) -> f64 {
+            if a.is_nan() || b.is_nan() { f64::NAN } else { f64::from(u8::from(a $operator b)) }
+        }
+        Binary::of_pieces(compare, compare)
+    }};
+}
 
 const ADD: Binary = Binary::smooth(|a, b| a + b);
 const SUBTRACT: Binary = Binary::smooth(|a, b| a - b);
 const MULTIPLY: Binary = Binary::smooth(|a, b| a * b);
 const DIVIDE: Binary = Binary::smooth(|a, b| a / b);
 const POWER: Binary = Binary::smooth(f64::powf);
+const BELOW: Binary = comparison!(<);
+const AT_MOST: Binary = comparison!(<=);
+const ABOVE: Binary = comparison!(>);
+const AT_LEAST: Binary = comparison!(>=);
 const NEGATE: Unary = Unary::smooth(|a| -a);
 
 /// An error in an expression, and its position in the text.
@@ -40,23 +54,22 @@ impl Fault {
 }
 
 /// The program that evaluates `text`.
-pub(super) fn compile(text: &str) -> Result<Vec<Instruction>, Fault> {
-    if text.len() > LONGEST {
+pub(super) fn compile(text: &str) -> Result<Program, Fault> {
+    let longest = LONGEST[usize::from(text.contains("interpolate("))];
+    if text.len() > longest {
         let message = format!("this expression has {} characters", text.len());
-        return Err(Fault::new(0..text.len(), message, format!("at most {LONGEST} are allowed")));
+        return Err(Fault::new(0..text.len(), message, format!("at most {longest} are allowed")));
     }
-    let mut parser = Parser { text, at: 0, depth: 0, program: Vec::new() };
-    parser.sum()?;
+    let mut parser = Parser { text, at: 0, depth: 0, program: Vec::new(), tables: Vec::new() };
+    parser.value()?;
     match parser.peek() {
-        None => Ok(parser.program),
+        None => Ok(Program::new(parser.program, parser.tables)),
         Some(')') => Err(parser.here("this parenthesis closes no other", "delete it, or open one before it")),
         Some(',') => {
             Err(parser.here("a comma outside of a function", "numbers are written with a point: 0.5"))
         }
         Some('*') => Err(parser.here("an operator without a left side", "powers are written x^2")),
-        Some('<' | '>' | '=' | '!') => {
-            Err(parser.here("comparisons are not available", "use min, max, abs and sign instead"))
-        }
+        Some('<' | '>' | '=' | '!') => Err(parser.no_comparison()),
         Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => {
             Err(parser.here("an operator is missing here", "products are written with a star: 2*x"))
         }
@@ -69,9 +82,25 @@ struct Parser<'a> {
     at: usize,
     depth: usize,
     program: Vec<Instruction>,
+    tables: Vec<Table>,
 }
 
 impl Parser<'_> {
+    fn value(&mut self) -> Result<(), Fault> {
+        self.sum()?;
+        let operator = match self.peek() {
+            Some('<') => [BELOW, AT_MOST],
+            Some('>') => [ABOVE, AT_LEAST],
+            _ => return Ok(()),
+        };
+        self.at += 1;
+        let with_equality = self.text[self.at..].starts_with('=');
+        self.at += usize::from(with_equality);
+        self.sum()?;
+        self.program.push(Instruction::Binary(operator[usize::from(with_equality)]));
+        Ok(())
+    }
+
     fn sum(&mut self) -> Result<(), Fault> {
         self.depth += 1;
         if self.depth > DEEPEST {
@@ -152,7 +181,7 @@ impl Parser<'_> {
             Some('(') => {
                 let open = self.at;
                 self.at += 1;
-                self.sum()?;
+                self.value()?;
                 self.close(open)
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
@@ -218,6 +247,12 @@ impl Parser<'_> {
             Some(Meaning::Two(function)) => self.arguments(&span, 2, 2, |program| {
                 program.push(Instruction::Binary(function));
             }),
+            Some(Meaning::Three(function)) => {
+                self.arguments(&span, 3, 3, |_| {})?;
+                self.program.push(Instruction::Ternary(function));
+                Ok(())
+            }
+            Some(Meaning::Points) => self.points(&span),
             Some(Meaning::Many(function)) => self.arguments(&span, 2, usize::MAX, |program| {
                 program.push(Instruction::Binary(function));
             }),
@@ -234,11 +269,11 @@ impl Parser<'_> {
     ) -> Result<(), Fault> {
         let open = self.at;
         self.at += 1;
-        self.sum()?;
+        self.value()?;
         let mut count = 1;
         while self.peek() == Some(',') {
             self.at += 1;
-            self.sum()?;
+            self.value()?;
             then(&mut self.program);
             count += 1;
         }
@@ -255,6 +290,55 @@ impl Parser<'_> {
         ))
     }
 
+    /// The argument of `interpolate`, and its points.
+    fn points(&mut self, name: &Range<usize>) -> Result<(), Fault> {
+        let open = self.at;
+        self.at += 1;
+        self.value()?;
+        let mut numbers = Vec::new();
+        while self.peek() == Some(',') {
+            self.at += 1;
+            let (start, first) = (self.at, self.program.len());
+            self.signed()?;
+            let number = match self.program[first..] {
+                [Instruction::Number(number)] => number,
+                [Instruction::Number(number), Instruction::Unary(sign)] if sign == NEGATE => -number,
+                _ => {
+                    let message = "the points of a table are numbers";
+                    return Err(Fault::new(
+                        start..self.at,
+                        message,
+                        "write interpolate(t, t1, v1, t2, v2, ...)",
+                    ));
+                }
+            };
+            self.program.truncate(first);
+            numbers.push(number);
+        }
+        self.close(open)?;
+        let (points, rest) = numbers.as_chunks::<2>();
+        let span = name.start..self.at;
+        if points.is_empty() || !rest.is_empty() {
+            let message = format!("`interpolate` has {} numbers after the first argument", numbers.len());
+            return Err(Fault::new(span, message, "it takes pairs: interpolate(t, t1, v1, t2, v2, ...)"));
+        }
+        if let Some(pair) = points.windows(2).find(|pair| pair[0][0] >= pair[1][0]) {
+            let message =
+                format!("the points of a table must ascend: {} is not above {}", pair[1][0], pair[0][0]);
+            return Err(Fault::new(span, message, "for a jump, put two points close together"));
+        }
+        self.program.push(Instruction::Interpolate(self.tables.len()));
+        self.tables.push(points.into());
+        Ok(())
+    }
+
+    fn no_comparison(&self) -> Fault {
+        self.here(
+            "this comparison is not available",
+            "compare two values with <, <=, > or >=; a product of comparisons is an `and`",
+        )
+    }
+
     fn close(&mut self, open: usize) -> Result<(), Fault> {
         match self.peek() {
             Some(')') => {
@@ -265,9 +349,7 @@ impl Parser<'_> {
             Some(c) if c == '(' || c == '.' || c.is_alphanumeric() => {
                 Err(self.here("an operator is missing here", "products are written with a star: 2*x"))
             }
-            Some('<' | '>' | '=' | '!') => {
-                Err(self.here("comparisons are not available", "use min, max, abs and sign instead"))
-            }
+            Some('<' | '>' | '=' | '!') => Err(self.no_comparison()),
             Some(c) => Err(self.unexpected(c)),
         }
     }

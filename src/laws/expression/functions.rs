@@ -1,6 +1,6 @@
 //! The names that an expression may use.
 
-use super::program::{Binary, Instruction, Unary, Variable};
+use super::program::{Binary, Instruction, Ternary, Unary, Variable};
 
 /// Meaning of a name.
 #[derive(Clone, Copy)]
@@ -13,6 +13,10 @@ pub(super) enum Meaning {
     Two(Binary),
     /// A function of two or more arguments, applied from left to right.
     Many(Binary),
+    /// A function of three arguments.
+    Three(Ternary),
+    /// The first argument interpolated in the points that follow, as numbers.
+    Points,
 }
 
 const NAMES: &[(&str, Meaning)] = &[
@@ -31,6 +35,10 @@ const NAMES: &[(&str, Meaning)] = &[
     ("floor", Meaning::One(Unary::of_pieces(f64::floor, f64::floor))),
     ("ceil", Meaning::One(Unary::of_pieces(f64::ceil, f64::ceil))),
     ("round", Meaning::One(Unary::of_pieces(f64::round, f64::round))),
+    ("step", Meaning::One(Unary::of_pieces(step, step))),
+    ("if", Meaning::Three(Ternary::of_pieces(choose, |[condition, ..]| nonzero(condition)))),
+    ("pulse", Meaning::Three(Ternary::of_pieces(pulse, pulse))),
+    ("interpolate", Meaning::Points),
     ("sqrt", Meaning::One(Unary::smooth(f64::sqrt))),
     ("cbrt", Meaning::One(Unary::smooth(f64::cbrt))),
     ("exp", Meaning::One(Unary::smooth(f64::exp))),
@@ -60,6 +68,35 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
 /// -1, 0 or 1.
 fn sign(number: f64) -> f64 {
     if number == 0.0 { 0.0 } else { number.signum() }
+}
+
+/// 0 for negative numbers, else 1.
+fn step(number: f64) -> f64 {
+    if number.is_nan() { number } else { f64::from(u8::from(number >= 0.0)) }
+}
+
+fn nonzero(number: f64) -> f64 {
+    if number.is_nan() { number } else { f64::from(u8::from(number != 0.0)) }
+}
+
+/// The second value where the first is not 0, else the third.
+fn choose([condition, then, otherwise]: [f64; 3]) -> f64 {
+    if condition.is_nan() {
+        condition
+    } else if condition != 0.0 {
+        then
+    } else {
+        otherwise
+    }
+}
+
+/// 1 from the second number on, until the third is reached; else 0.
+fn pulse([number, start, end]: [f64; 3]) -> f64 {
+    if number.is_nan() || start.is_nan() || end.is_nan() {
+        f64::NAN
+    } else {
+        f64::from(u8::from(start <= number && number < end))
+    }
 }
 
 /// Whether a number is below zero.

@@ -82,7 +82,7 @@ pub struct Expression {
 impl Expression {
     /// Compiles `text`; an error contains its position in the text.
     pub fn parse(text: &str) -> Result<Self, Fault> {
-        Ok(Self { text: text.into(), program: Program::new(compile::compile(text)?) })
+        Ok(Self { text: text.into(), program: compile::compile(text)? })
     }
 
     /// The expression as written.
@@ -153,7 +153,16 @@ impl JsonSchema for Scalar {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": ["number", "string"], "format": "expression" })
+        json_schema!({
+            "type": ["number", "string", "object"],
+            "format": "expression",
+            "properties": {
+                "table": { "type": "string", "description": "A file with times and values." },
+                "column": { "type": "integer", "minimum": 2, "description": "The column of the values; 2 if absent." }
+            },
+            "required": ["table"],
+            "additionalProperties": false
+        })
     }
 }
 

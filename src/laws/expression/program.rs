@@ -23,13 +23,15 @@ pub enum Variable {
 #[derive(Debug, Clone)]
 pub(super) struct Program {
     instructions: Arc<[Instruction]>,
+    /// Points of the tables that the instructions interpolate.
+    tables: Arc<[Table]>,
     depth: usize,
 }
 
 impl Program {
-    pub(super) fn new(instructions: Vec<Instruction>) -> Self {
+    pub(super) fn new(instructions: Vec<Instruction>, tables: Vec<Table>) -> Self {
         let depth = stack_depth(&instructions);
-        Self { instructions: instructions.into(), depth }
+        Self { instructions: instructions.into(), tables: tables.into(), depth }
     }
 
     /// Whether it contains `variable`.
@@ -42,7 +44,8 @@ impl Program {
         self.instructions.iter().any(|instruction| match instruction {
             Instruction::Unary(function) => function.piece.is_some(),
             Instruction::Binary(function) => function.piece.is_some(),
-            _ => false,
+            Instruction::Ternary(_) | Instruction::Interpolate(_) => true,
+            Instruction::Number(_) | Instruction::Variable(_) => false,
         })
     }
 
@@ -92,6 +95,21 @@ impl Program {
                     }
                     stack[top - 1] = (function.value)(left, right);
                 }
+                Instruction::Ternary(function) => {
+                    top -= 2;
+                    let arguments = [stack[top - 1], stack[top], stack[top + 1]];
+                    if PIECES {
+                        note((function.piece)(arguments));
+                    }
+                    stack[top - 1] = (function.value)(arguments);
+                }
+                Instruction::Interpolate(table) => {
+                    let (value, piece) = interpolate(&self.tables[*table], stack[top - 1]);
+                    if PIECES {
+                        note(piece as f64);
+                    }
+                    stack[top - 1] = value;
+                }
             }
         }
         (stack[0], digest)
@@ -105,6 +123,41 @@ pub(super) enum Instruction {
     Variable(Variable),
     Unary(Unary),
     Binary(Binary),
+    Ternary(Ternary),
+    /// The value of the table of this number, linear between its points.
+    Interpolate(usize),
+}
+
+/// Points with ascending first coordinates, at least one.
+pub(super) type Table = Box<[[f64; 2]]>;
+
+/// The value of a table, constant before its first and after its last point, and the number of points before it.
+fn interpolate(table: &Table, at: f64) -> (f64, usize) {
+    if at.is_nan() {
+        return (at, 0);
+    }
+    let behind = table.partition_point(|point| point[0] <= at);
+    let value = match (behind.checked_sub(1).map(|k| table[k]), table.get(behind)) {
+        (None, Some(first)) => first[1],
+        (Some(last), None) => last[1],
+        (Some([t0, v0]), Some([t1, v1])) => v0 + (v1 - v0) * ((at - t0) / (t1 - t0)),
+        (None, None) => f64::NAN,
+    };
+    (value, behind)
+}
+
+/// A piecewise function of the three topmost values.
+#[derive(Clone, Copy)]
+pub(super) struct Ternary {
+    value: fn([f64; 3]) -> f64,
+    /// Records which piece is active.
+    piece: fn([f64; 3]) -> f64,
+}
+
+impl Ternary {
+    pub(super) const fn of_pieces(value: fn([f64; 3]) -> f64, piece: fn([f64; 3]) -> f64) -> Self {
+        Self { value, piece }
+    }
 }
 
 /// A function of the topmost value.
@@ -160,6 +213,18 @@ impl fmt::Debug for Binary {
     }
 }
 
+impl fmt::Debug for Ternary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Ternary")
+    }
+}
+
+impl PartialEq for Ternary {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::fn_addr_eq(self.value, other.value)
+    }
+}
+
 impl PartialEq for Unary {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::fn_addr_eq(self.value, other.value)
@@ -177,8 +242,9 @@ fn stack_depth(program: &[Instruction]) -> usize {
     for instruction in program {
         match instruction {
             Instruction::Number(_) | Instruction::Variable(_) => now += 1,
-            Instruction::Unary(_) => {}
+            Instruction::Unary(_) | Instruction::Interpolate(_) => {}
             Instruction::Binary(_) => now -= 1,
+            Instruction::Ternary(_) => now -= 2,
         }
         most = most.max(now);
     }

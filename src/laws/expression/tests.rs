@@ -32,6 +32,13 @@ fn operators_bind_as_in_mathematics() {
         ("cos(pi) + ln(e)", 0.0),
         ("sign(-2) + sign(0)", -1.0),
         ("\t x\n", 2.0),
+        ("(x >= 2)*(y <= 3) + 10*(x < 2) + 100*(y > 3)", 1.0),
+        ("1 + x > 2", 1.0),
+        ("if(x > 1, 3, 4) + 10*if(0, 3, 1 - 1)", 3.0),
+        ("step(t - 0.5) + 10*step(-1)", 1.0),
+        ("pulse(t, 0.5, 1) + 10*pulse(t, 0, 0.5)", 1.0),
+        ("2*interpolate(t, 0, -1, 1, 3)", 2.0),
+        ("interpolate(x, 0, 1, 1, 3) + interpolate(-x, 0, 10, 1, 3)", 13.0),
     ] {
         assert!((value(text) - expected).abs() < 1e-12, "{text} is {}, not {expected}", value(text));
     }
@@ -48,8 +55,12 @@ fn faults_point_into_the_text() {
         ("1)", 1..2, "closes no other", "delete"),
         ("0,5", 1..2, "comma", "0.5"),
         ("x**2", 2..3, "two stars", "x^2"),
-        ("x > 1", 2..3, "comparisons", "min"),
-        ("(x < 1)*2", 3..4, "comparisons", "min"),
+        ("x == 1", 2..3, "comparison", "<="),
+        ("(x < 1 < 2)*2", 7..8, "comparison", "<="),
+        ("if(x, 1)", 0..8, "has 2 arguments", "3"),
+        ("interpolate(t, 0, 1, 0.5)", 0..25, "3 numbers", "pairs"),
+        ("interpolate(t, 0, 1, 0, 2)", 0..26, "0 is not above 0", "jump"),
+        ("interpolate(t, 0, x)", 17..19, "numbers", "v1"),
         ("1 + T", 4..5, "unknown name `T`", "did you mean `t`?"),
         ("sine(x)", 0..4, "unknown name `sine`", "did you mean `sin`?"),
         ("temperature", 0..11, "unknown name", "known names: t, x, y, z"),
@@ -106,6 +117,10 @@ fn pieces_change_where_another_one_holds() {
         ("sign(t - 0.5)", 0.4, 0.6),
         ("floor(10*t)", 0.19, 0.21),
         ("ceil(10*t) + round(t)", 0.19, 0.21),
+        ("step(t - 0.5)", 0.4, 0.6),
+        ("pulse(t, 0.1, 0.5)", 0.4, 0.6),
+        ("if(t < 0.5, t, 1)", 0.4, 0.6),
+        ("interpolate(t, 0, 0, 0.25, 1, 1, 0)", 0.24, 0.26),
     ] {
         let scalar = scalar(text);
         let pieces = |time: f64| scalar.pieces(time, &[0.5]);

@@ -106,8 +106,16 @@ mod tests {
     fn against(normal: NormalLaw, obstacle: Option<Gap>) -> Law {
         let on = vec!["bottom".into()];
         let quadrature = Quadrature::Nodal;
-        let contact =
-            Contact { on, quadrature, normal, obstacle, friction: None, adhesion: None, memory: None };
+        let contact = Contact {
+            on,
+            part: None,
+            quadrature,
+            normal,
+            obstacle,
+            friction: None,
+            adhesion: None,
+            memory: None,
+        };
         Law::of(&contact).expect("law")
     }
 

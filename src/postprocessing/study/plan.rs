@@ -67,7 +67,8 @@ impl Plan {
     /// Reads the study in the file `path`, applies `overrides`, and loads the jobs of all runs.
     pub fn load(path: &Path, overrides: &[String], colour: bool) -> Result<Self> {
         let (text, folder) = read(kind(), path)?;
-        let document = Document::new(kind(), &text, &path.display().to_string(), overrides, colour)?;
+        let document =
+            Document::new(kind(), &text, (&path.display().to_string(), &folder), overrides, colour)?;
         let (study, root, texts) = document.fill::<Study>()?;
         let mut document = Document { root, texts, faults: Vec::new() };
         let base = Job::load_coloured(&normal(&folder.join(&study.base.job)), &study.base.set, colour)?;

@@ -77,7 +77,6 @@ pub(super) fn clear_fixed_components<const D: usize, const S: usize>(
     body: &Body<D, S>,
     y: &mut DistributedVector,
 ) -> Result<()> {
-    let mut y = y.owned_mut()?;
-    y.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+    body.held.clear(&mut y.owned_mut()?);
     Ok(())
 }

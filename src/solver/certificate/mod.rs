@@ -104,7 +104,8 @@ impl Certificates {
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
-            let is_large = body.unknowns(session) > SMALL;
+            // The bound from the cells alone does not know the springs of supports.
+            let is_large = body.unknowns(session) > SMALL && !body.elastic_support.has_stiffness;
             let least = cells::explicit_step_bound(session, body).filter(|waves| is_large && decides(waves));
             let waves = match least {
                 Some(waves) => waves,

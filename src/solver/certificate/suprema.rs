@@ -178,7 +178,7 @@ fn contact_load<const D: usize, const S: usize>(
         contact.add_normals(&mut values);
         contact.add_unit_sliding(&mut values);
     }
-    values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+    body.held.clear(&mut values);
     drop(values);
     Ok(out)
 }

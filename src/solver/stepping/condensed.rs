@@ -122,7 +122,7 @@ impl Condensed {
         settings: &SolverSettings,
         precision: Precision,
     ) -> Result<Self> {
-        let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.fixed);
+        let contact: Vec<ContactNode<D>> = contact_nodes(&body.contacts, &body.held);
         let nodes = ContactNodes::new(&contact);
         body.contacts.iter_mut().for_each(|contact| contact.number_unknowns(|node| nodes.number(node)));
         let like = DistributedVector::ghosted(D, contact.len(), &[])?;

@@ -50,7 +50,7 @@ const MAX_CONDENSED_MOTIONS: usize = 4_000;
 
 /// The number of motions on which the contacts of a body act, over all ranks. Collective.
 fn motion_count<const D: usize, const S: usize>(session: &Session, body: &Body<D, S>) -> usize {
-    session.total(contact_nodes(&body.contacts, &body.fixed).iter().map(|contact| contact.active).sum())
+    session.total(contact_nodes(&body.contacts, &body.held).iter().map(|contact| contact.active).sum())
 }
 
 /// Iterations of a step without contact, with contact, and with friction, which may fix nodes that are free in the preconditioner's

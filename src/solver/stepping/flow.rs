@@ -3,7 +3,7 @@
 use super::equations::CellForces;
 use crate::{
     error::Result,
-    fem::{body::Cells, effect::Tangents},
+    fem::{body::Cells, effect::Tangents, space::Held},
     linear_algebra::petsc::DistributedVector,
 };
 
@@ -63,12 +63,14 @@ impl Flow {
     }
 
     /// Adds the sum over all ranks to `out`, without prescribed components.
-    fn add_to_free_components(&mut self, fixed: &[bool], out: &mut DistributedVector) -> Result<()> {
+    fn add_to_free_components<const D: usize>(
+        &mut self,
+        held: &Held<D>,
+        out: &mut DistributedVector,
+    ) -> Result<()> {
         self.forces.add_ghosts_to_owners()?;
         let forces = self.forces.owned()?;
-        let mut targets = out.owned_mut()?;
-        let free = targets.iter_mut().zip(forces.iter()).zip(fixed).filter(|(_, fixed)| !**fixed);
-        free.for_each(|((target, force), _)| *target += force);
+        held.add_free_parts(&forces, &mut out.owned_mut()?);
         Ok(())
     }
 }
@@ -97,7 +99,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
             self.cells.add_flow(&values, None, &mut forces);
         }
         out.fill(0.0)?;
-        self.flow.add_to_free_components(self.cells.fixed, out)
+        self.flow.add_to_free_components(self.cells.held, out)
     }
 
     /// Evaluates the forces at a velocity with their derivatives.
@@ -116,7 +118,7 @@ impl<const D: usize, const S: usize> FlowForces<'_, D, S> {
 impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
     fn add_forces(&mut self, velocity: &DistributedVector, forces: &mut DistributedVector) -> Result<()> {
         self.evaluate(velocity)?;
-        self.flow.add_to_free_components(self.cells.fixed, forces)
+        self.flow.add_to_free_components(self.cells.held, forces)
     }
 
     fn linearise(&mut self, velocity: &DistributedVector) -> Result<()> {
@@ -142,6 +144,6 @@ impl<const D: usize, const S: usize> CellForces for FlowForces<'_, D, S> {
             forces.fill(0.0);
             self.cells.add_tangents(&flow.tangents, &values, &mut forces);
         }
-        self.flow.add_to_free_components(self.cells.fixed, forces)
+        self.flow.add_to_free_components(self.cells.held, forces)
     }
 }

@@ -29,6 +29,7 @@ mod step_error;
 mod step_length;
 mod step_solver;
 mod stepper;
+mod support_motion;
 mod substructuring;
 
 pub use adaptive::{Adaptive, StepLevel};

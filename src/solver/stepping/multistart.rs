@@ -63,8 +63,7 @@ fn write_start<const D: usize, const S: usize>(
         let scale = contact.largest_kink_velocity();
         contact.set_start_velocities(|node| scale * start_velocity(number, ids[node]), &mut nodal);
     }
-    let fixed = nodal.iter_mut().zip(&problem.body.fixed).filter(|(_, fixed)| **fixed);
-    fixed.for_each(|(value, _)| *value = 0.0);
+    problem.body.held.clear(&mut nodal);
     Ok(())
 }
 

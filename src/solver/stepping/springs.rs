@@ -65,7 +65,7 @@ impl Springs {
         mut rows: BlockRows,
     ) -> Result<RowsWithSprings> {
         // Points of Gauss quadrature may touch nodes of other ranks.
-        let nodes = contact_nodes(&body.contacts, &body.fixed);
+        let nodes = contact_nodes(&body.contacts, &body.held);
         let nodes = nodes.iter().filter(|contact| contact.node < body.mesh.owned);
         let motions: Vec<(usize, [f64; D])> =
             nodes.flat_map(|c| c.frame[..c.active].iter().map(|motion| (c.node, *motion))).collect();
@@ -88,7 +88,9 @@ impl Springs {
             return Ok(RowsWithSprings { rows, springs: None });
         }
         if self.free_motions.is_none() {
-            self.free_motions = Some(free_motions(session, &body.mesh, body.fixed.as_chunks().0, &[])?);
+            let along: Vec<_> = body.support_directions().collect();
+            self.free_motions =
+                Some(free_motions(session, &body.mesh, body.held.flags().as_chunks().0, &along)?);
         }
         if self.free_motions.as_ref().is_none_or(Vec::is_empty) {
             return Ok(RowsWithSprings { rows, springs: None });

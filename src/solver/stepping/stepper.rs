@@ -12,6 +12,7 @@ use super::{
     step_clock::{Stages, StepClock, StepTraffic},
     step_error::{ErrorWorkspace, SolvedStep, StepError},
     step_solver::{Lengths, StepSolver},
+    support_motion::MovingSupports,
 };
 use crate::{
     error::Result,
@@ -47,6 +48,7 @@ pub struct Stepper {
     load: Option<DistributedVector>,
     load_is_current: bool,
     right_hand_side: DistributedVector,
+    moving_supports: Option<MovingSupports>,
     trial: DistributedVector,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
     is_finished: bool,
@@ -102,6 +104,7 @@ impl Stepper {
             load: if body.load.is_empty() { None } else { Some(state.velocity.like()?) },
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
+            moving_supports: MovingSupports::new(body, state)?,
             trial: state.velocity.like()?,
             is_finished: false,
             workspace: ErrorWorkspace::default(),
@@ -236,6 +239,9 @@ impl Stepper {
         } else {
             solve_and_search(&mut self.solver, &mut problem, &mut self.trial, self.other_starts)
         };
+        if let Some(supports) = &self.moving_supports {
+            supports.set(body, &mut self.trial)?;
+        }
         drop(stage);
         self.clock.solve += solving.elapsed();
         self.traffic.add_solve(self.solver.traffic(session.ranks())?);
@@ -294,6 +300,10 @@ impl Stepper {
         let solving = Instant::now();
         let stage = self.stages.solve.enter()?;
         self.finish(body, state, step)?;
+        let mut work = 0.0;
+        if let Some(supports) = &mut self.moving_supports {
+            work = supports.work(session, body, step, &self.trial, self.integrator.flow_start())?;
+        }
         self.integrator.commit(state, &self.trial, step)?;
         commit_tractions(body, state)?;
         body.commit();
@@ -303,6 +313,7 @@ impl Stepper {
         let _stage = self.stages.balance.enter()?;
         (outcome.energy, outcome.peaks) = self.integrator.energy(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
+        outcome.energy[WORK] += work;
         if let Some(load) = &self.load {
             outcome.energy[WORK] += step.length * load.dot(&state.velocity)?;
             self.traffic.balance += 2 * vector_bytes(body);
@@ -334,8 +345,17 @@ impl Stepper {
         if let Some(load) = &self.load {
             self.right_hand_side.add_scaled(1.0, load)?;
         }
-        let mut values = self.right_hand_side.owned_mut()?;
-        values.iter_mut().zip(&body.fixed).filter(|(_, fixed)| **fixed).for_each(|(value, _)| *value = 0.0);
+        let forces = &mut self.right_hand_side;
+        if let Some(supports) = &mut self.moving_supports {
+            let start = self.integrator.flow_start();
+            let start = start.map_or((&state.displacement, step.length), |s| (s.displacement, s.length));
+            supports.impose(session, body, step, start, forces)?;
+        }
+        body.held.clear(&mut forces.owned_mut()?);
+        if let Some(supports) = &mut self.moving_supports {
+            self.solver.multiply(&supports.velocity, &mut supports.held)?;
+            forces.add_scaled(1.0, &supports.held)?;
+        }
         Ok(())
     }
 
@@ -348,6 +368,9 @@ impl Stepper {
         step: Step,
     ) -> Result<()> {
         self.extrapolate(state, step)?;
+        if let Some(supports) = &self.moving_supports {
+            supports.set(body, &mut self.trial)?;
+        }
         let prepared = prepare_contacts(body, state, step);
         Ok(session.agree(prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step)))?)
     }

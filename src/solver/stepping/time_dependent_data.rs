@@ -52,11 +52,11 @@ impl<const D: usize> TimeDependentData<D> {
                 expressions.push(expression);
             }
         };
-        for traction in &body.load.tractions {
-            add("a traction", &traction.value, true);
+        for (name, value) in body.load.expressions() {
+            add(name, std::slice::from_ref(value), true);
         }
-        for force in &body.load.body_forces {
-            add("a body force", &force.value, true);
+        for value in body.support_motion.iter().flat_map(|motion| motion.expressions()) {
+            add("a support", std::slice::from_ref(value), true);
         }
         for contact in &body.contacts {
             contact.gap.expressions().into_iter().for_each(|values| add("an obstacle", values, false));

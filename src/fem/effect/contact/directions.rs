@@ -5,7 +5,7 @@ use super::{
     point::{Point, Unknown},
     tangential_point::span_without,
 };
-use crate::linear_algebra::tensor::Vector;
+use crate::{fem::space::Held, linear_algebra::tensor::Vector};
 use std::collections::BTreeMap;
 
 /// A node of contact boundaries with the directions in which their laws act.
@@ -19,8 +19,8 @@ pub struct ContactNode<const D: usize> {
     pub active: usize,
 }
 
-/// The nodes of all contacts that act at nodes, ascending. `fixed` has one flag for each local component.
-pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) -> Vec<ContactNode<D>> {
+/// The nodes of all contacts that act at nodes, ascending. `held` is what supports hold.
+pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], held: &Held<D>) -> Vec<ContactNode<D>> {
     let mut nodes: BTreeMap<usize, Vec<Option<Vector<D>>>> = BTreeMap::new();
     for contact in contacts {
         for point in &contact.points {
@@ -46,10 +46,8 @@ pub fn contact_nodes<const D: usize>(contacts: &[Contact<D>], fixed: &[bool]) ->
             ContactNode { node, frame, active: 1 }
         }
         _ => {
-            let free = |i: &usize| !fixed[node * D + i];
-            let order: Vec<usize> = (0..D).filter(free).chain((0..D).filter(|i| !free(i))).collect();
-            let frame = std::array::from_fn(|i| axis(order[i]));
-            ContactNode { node, frame, active: (0..D).filter(free).count() }
+            let (frame, active) = held.frame(node);
+            ContactNode { node, frame, active }
         }
     };
     nodes.into_iter().map(frame).collect()

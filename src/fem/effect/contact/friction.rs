@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    fem::space::Held,
     laws::contact::FrictionLaw,
     linear_algebra::tensor::{Vector, add_scaled, dot, larger, norm},
     mesh::Mesh,
@@ -59,31 +60,29 @@ impl<const D: usize> Friction<D> {
         points: &[Point<D>],
         obstacle_moves: bool,
         mesh: &Mesh<D>,
-        fixed: &[bool],
+        held: &Held<D>,
     ) -> Result<Self> {
         let (mut out, mut held_tangents) = (Vec::new(), Vec::new());
         for (at, point) in points.iter().enumerate() {
             let node = point.node();
-            let axes = (0..D).filter(|i| !fixed[node * D + i]);
-            let free: Vec<Vector<D>> =
-                axes.map(|axis| std::array::from_fn(|i| f64::from(u8::from(i == axis)))).collect();
-            if free.is_empty() {
+            let (frame, free) = held.frame(node);
+            if free == 0 {
                 continue;
             }
-            let (held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
-            if held && law.follows_pressure() {
+            let (is_held, place) = (point.unknown == Unknown::Held, &mesh.nodes[node]);
+            if is_held && law.follows_pressure() {
                 return Err(Error::Refused(format!(
                     "friction at {place:?} m: a support fixes the normal component there and carries the contact pressure, so that the bound of this friction law is not known; free the normal component there, or use tresca"
                 )));
             }
-            if !held && point.free_length < 1.0 - ROUNDING {
+            if !is_held && point.free_length < 1.0 - ROUNDING {
                 return Err(Error::Refused(format!(
                     "friction at {place:?} m: a support fixes a component that is neither along the normal of the contact nor perpendicular to it, so that no free direction is tangential; fix all components there, or none"
                 )));
             }
-            let (tangents, count) = span_without(&free, &[point.direction]);
+            let (tangents, count) = span_without(&frame[..free], &[point.direction]);
             if obstacle_moves && count > 0 {
-                held_tangents.extend(tangents_held(point, fixed).map(|tangent| (at, tangent)));
+                held_tangents.extend(tangents_held(point, &frame[free..]).map(|tangent| (at, tangent)));
             }
             out.push(TangentialPoint {
                 at,
@@ -401,11 +400,10 @@ impl<const D: usize> Friction<D> {
 }
 
 /// The directions along the boundary that supports fix at a point.
-fn tangents_held<const D: usize>(point: &Point<D>, fixed: &[bool]) -> impl Iterator<Item = Vector<D>> {
+fn tangents_held<const D: usize>(point: &Point<D>, held: &[Vector<D>]) -> impl Iterator<Item = Vector<D>> {
     let normal = point.normal;
-    (0..D).filter(|i| fixed[point.node() * D + i]).filter_map(move |axis| {
-        let unit: Vector<D> = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
-        let tangent = add_scaled(&unit, -normal[axis], &normal);
+    held.iter().filter_map(move |direction| {
+        let tangent = add_scaled(direction, -dot(direction, &normal), &normal);
         let size = norm(&tangent);
         (size > ROUNDING).then(|| tangent.map(|x| x / size))
     })

@@ -39,7 +39,7 @@ mod unknowns;
 
 use crate::{
     error::Result,
-    fem::space::surface_points,
+    fem::space::{Held, surface_points},
     laws::contact::{Gap, NormalResponse},
     mesh::Mesh,
     parallel::session::Session,
@@ -97,21 +97,21 @@ enum Derivatives {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Applies the law to these facets of this rank. `fixed` has one flag for each local component. Collective.
+    /// Applies the law to these facets of this rank, where `held` is what supports hold. Collective.
     pub fn new(
         session: &Session,
         mesh: &Mesh<D>,
         facets: &[u32],
         conditions: ContactConditions,
-        fixed: &[bool],
+        held: &Held<D>,
     ) -> Result<Self> {
         let ContactConditions { quadrature, law, gap } = conditions;
         let mut points: Vec<Point<D>> = match quadrature {
             Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
-                .map(|p| Point::nodal(p.node, p.normal, p.weight, fixed))
+                .map(|p| Point::nodal(p.node, p.normal, p.weight, held))
                 .collect(),
-            Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, fixed)).collect(),
+            Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, held)).collect(),
         };
         for point in &mut points {
             let mut place = [0.0; D];

@@ -3,7 +3,7 @@
 //! A point reads the values of its nodes from two kinds of vectors, [`Vectors`]. It stores the numbers of its nodes in both.
 
 use crate::{
-    fem::space::facet_points,
+    fem::space::{Held, facet_points},
     laws::contact::{NodeContext, NormalResponse, Resolved},
     linear_algebra::tensor::{Vector, norm},
     mesh::Mesh,
@@ -79,7 +79,7 @@ pub(super) struct Point<const D: usize> {
 }
 
 impl<const D: usize> Point<D> {
-    pub(super) fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
+    pub(super) fn new(nodes: &[u32], shares: &[f64], normal: Vector<D>, weight: f64, held: &Held<D>) -> Self {
         let mut point = Self {
             numbers: [[0; D]; 2],
             count: nodes.len().min(D),
@@ -102,11 +102,7 @@ impl<const D: usize> Point<D> {
             change: 0.0,
         };
         let force =
-            |node: u32, share: f64| -> Vector<D> {
-                std::array::from_fn(|i| {
-                    if fixed[node as usize * D + i] { 0.0 } else { weight * share * normal[i] }
-                })
-            };
+            |node: u32, share: f64| held.free_part(node as usize, &normal).map(|n| weight * share * n);
         for (a, (&node, &share)) in nodes.iter().zip(shares).enumerate().take(D) {
             point.numbers.iter_mut().for_each(|numbers| numbers[a] = node);
             point.shares[a] = share;
@@ -118,10 +114,9 @@ impl<const D: usize> Point<D> {
     }
 
     /// A point at a node, whose unknown is the parameter of the law.
-    pub(super) fn nodal(node: u32, normal: Vector<D>, weight: f64, fixed: &[bool]) -> Self {
-        let mut point = Self::new(&[node], &[1.0], normal, weight, fixed);
-        let free: Vector<D> =
-            std::array::from_fn(|i| if fixed[node as usize * D + i] { 0.0 } else { normal[i] });
+    pub(super) fn nodal(node: u32, normal: Vector<D>, weight: f64, held: &Held<D>) -> Self {
+        let mut point = Self::new(&[node], &[1.0], normal, weight, held);
+        let free = held.free_part(node as usize, &normal);
         point.free_length = norm(&free);
         // A smaller length is a rounding error in the normal of a face that supports fix.
         if point.free_length > 1e-9 {
@@ -287,8 +282,8 @@ impl<const D: usize> Point<D> {
 }
 
 /// The Gauss points of a facet.
-pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, fixed: &[bool]) -> Vec<Point<D>> {
+pub(super) fn gauss_points<const D: usize>(mesh: &Mesh<D>, facet: u32, held: &Held<D>) -> Vec<Point<D>> {
     let (nodes, points) = facet_points(mesh, facet);
     let nodes: Vec<u32> = nodes.collect();
-    points.map(|p| Point::new(&nodes, &p.shares[..nodes.len()], p.normal, p.weight, fixed)).collect()
+    points.map(|p| Point::new(&nodes, &p.shares[..nodes.len()], p.normal, p.weight, held)).collect()
 }

@@ -3,22 +3,23 @@
 use super::{Contact, friction::Friction, point::Vectors};
 use crate::{
     error::{Error, Result},
+    fem::space::Held,
     laws::contact::FrictionLaw,
     linear_algebra::tensor::{Vector, larger},
     mesh::Mesh,
 };
 
 impl<const D: usize> Contact<D> {
-    /// Adds friction, where `fixed` has one flag for each local component; to be called before
+    /// Adds friction, where `held` is what supports hold; to be called before
     /// [`choose_unknowns`](super::choose_unknowns). Refuses supports that leave no tangent, and missing pressure where the law
     /// needs one.
-    pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, fixed: &[bool]) -> Result<()> {
+    pub fn add_friction(&mut self, law: FrictionLaw, mesh: &Mesh<D>, held: &Held<D>) -> Result<()> {
         if self.needs_ghosts {
             return Err(Error::Refused(
                 "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.points, self.gap.surface_may_move(), mesh, fixed)?);
+        self.friction = Some(Friction::new(law, &self.points, self.gap.surface_may_move(), mesh, held)?);
         Ok(())
     }
 

@@ -1,0 +1,111 @@
+//! Moving supports in the equations of a step.
+//!
+//! With the velocity `g` of the supports, zero at free components, and the matrix `K` before components are held, the forces `b` of a
+//! step become `b - K g` at free components and `D g` at held ones, where `D` is the diagonal that assembly leaves there. The solution
+//! is the whole velocity `v`, which is `g` at held components. The reactions are `K v + F - b`, with the forces `F` of flow, and
+//! their work in a step of length `k` is `k g . (K v + F - b) = k (v . K g + g . (F - b))`.
+
+use super::flow::FlowStart;
+use crate::{
+    error::Result,
+    fem::{body::Body, effect::Step, state::State},
+    linear_algebra::petsc::DistributedVector,
+    parallel::session::Session,
+};
+
+/// Work vectors.
+pub(super) struct MovingSupports {
+    /// `g`, with ghosts.
+    pub velocity: DistributedVector,
+    /// `K g`.
+    coupling: DistributedVector,
+    /// `b`.
+    known: DistributedVector,
+    /// `D g`.
+    pub held: DistributedVector,
+    /// Work space for nodal values with ghosts.
+    values: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+impl MovingSupports {
+    /// For a body with moving supports, with vectors like those of the state.
+    pub(super) fn new<const D: usize, const S: usize>(
+        body: &Body<D, S>,
+        state: &State,
+    ) -> Result<Option<Self>> {
+        if body.support_motion.is_none() {
+            return Ok(None);
+        }
+        let like = || state.velocity.like();
+        Ok(Some(Self {
+            velocity: like()?,
+            coupling: like()?,
+            known: like()?,
+            held: like()?,
+            values: Vec::new(),
+            forces: Vec::new(),
+        }))
+    }
+
+    /// Finds the velocity of the supports, and subtracts `K g` from the forces of the step, which are then known. Collective.
+    pub(super) fn impose<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        step: Step,
+        (start, length): (&DistributedVector, f64),
+        forces: &mut DistributedVector,
+    ) -> Result<()> {
+        let Some(motion) = &body.support_motion else { return Ok(()) };
+        let written = {
+            let (start, mut velocity) = (start.owned()?, self.velocity.owned_mut()?);
+            motion.write_velocity(step.time, &start, length, &mut velocity)
+        };
+        session.agree(written)?;
+        self.velocity.update_ghosts()?;
+        {
+            let (velocity, mut coupling) = (self.velocity.local()?, self.coupling.local_mut()?);
+            coupling.fill(0.0);
+            body.add_matrix_product(length, &velocity, &mut self.values, &mut coupling);
+        }
+        self.coupling.add_ghosts_to_owners()?;
+        self.known.copy_from(forces)?;
+        forces.add_scaled(-1.0, &self.coupling)
+    }
+
+    /// Sets the held components of a velocity to those of the supports.
+    pub(super) fn set<const D: usize, const S: usize>(
+        &self,
+        body: &Body<D, S>,
+        velocity: &mut DistributedVector,
+    ) -> Result<()> {
+        body.held.clear(&mut velocity.owned_mut()?);
+        velocity.add_scaled(1.0, &self.velocity)
+    }
+
+    /// The work in J of the supports in a step that was solved, with this velocity with ghosts, and not yet committed. Collective.
+    pub(super) fn work<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        step: Step,
+        velocity: &DistributedVector,
+        start: Option<FlowStart<'_>>,
+    ) -> Result<f64> {
+        let mut flow = 0.0;
+        if let Some(FlowStart { displacement, length }) = start.filter(|_| body.flows()) {
+            let (start, velocity) = (displacement.local()?, velocity.local()?);
+            let Self { velocity: motion, values: end, forces, .. } = &mut *self;
+            end.clear();
+            end.extend(start.iter().zip(velocity.iter()).map(|(u, v)| u + length * v));
+            forces.clear();
+            forces.resize(end.len(), 0.0);
+            body.cells_and_contacts().0.add_flow(end, None, forces);
+            flow = forces.iter().zip(motion.local()?.iter()).map(|(f, g)| f * g).sum();
+        }
+        let [flow] = session.sum([flow]);
+        let constant = velocity.dot(&self.coupling)?;
+        Ok(step.length * (constant + flow - self.velocity.dot(&self.known)?))
+    }
+}
