@@ -36,6 +36,7 @@ RUN useradd --create-home --shell /bin/bash clarke \
 COPY --from=build /build/target/release/solver /usr/local/bin/solver
 COPY --chown=clarke:clarke jobs /opt/clarke/jobs
 COPY --chown=clarke:clarke meshes /opt/clarke/meshes
+COPY --chown=clarke:clarke schema /opt/clarke/schema
 COPY LICENSE-MIT LICENSE-APACHE /usr/share/doc/clarke/
 # One thread a rank. Shared-memory copies by plain memcpy: containers may forbid ranks to read each other's memory.
 ENV OMP_NUM_THREADS=1 \

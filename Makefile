@@ -11,6 +11,7 @@ TARGET64 ?= target/petsc64
 
 binary := $(or $(CARGO_TARGET_DIR),target)/release/solver
 share := $(DESTDIR)$(PREFIX)/share/clarke
+completions := bash-completion/completions zsh/site-functions fish/vendor_completions.d
 
 # One thread a rank: threaded BLAS and OpenMP slow the solvers down when every core has a rank.
 export OMP_NUM_THREADS ?= 1
@@ -27,7 +28,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run test test64 test64-lib check64 hard bench bench-runs bench-accuracy verification lint install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy verification lint install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -35,6 +36,7 @@ help:
 	@echo 'make build     compile the solver: $(binary)'
 	@echo 'make run       deps, build, then: mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)'
 	@echo '               other job: JOB=file.toml   ranks: RANKS=4   options: ARGS="--set time.step=0.01"'
+	@echo 'make reference  build, then write what is generated from the types of the keys: schema/ and docs/reference-*keys.md'
 	@echo 'make test      deps, then every test, and 20 s of random input for each reader of files'
 	@echo 'make test64    the same source against a PETSc with 64-bit indices: tests of the library, every job on two ranks'
 	@echo 'make test64-lib  only the tests of the library there'
@@ -45,7 +47,7 @@ help:
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
-	@echo 'make install   the built solver, jobs and meshes to PREFIX=$(PREFIX)'
+	@echo 'make install   the built solver with manual pages and shell completion, jobs, meshes and schemas to PREFIX=$(PREFIX)'
 	@echo 'make clean     remove everything that was compiled'
 	@echo 'DEPS=no skips the packages, for systems where PETSc, MPI, HDF5 and METIS come from elsewhere.'
 
@@ -65,6 +67,14 @@ build:
 run: deps
 	cargo build --release --locked
 	mpirun -n $(RANKS) $(binary) $(JOB) $(ARGS)
+
+# The schemas that editors use, and the pages of all keys; tests/documents.rs compares them with the source.
+reference: build
+	@mkdir -p schema
+	$(binary) describe --json > schema/job.schema.json
+	$(binary) describe study --json > schema/study.schema.json
+	$(binary) describe --markdown > docs/reference-keys.md
+	$(binary) describe study --markdown > docs/reference-study-keys.md
 
 # The summary of the tests comes last.
 test: deps
@@ -119,7 +129,12 @@ lint: deps
 install:
 	@test -x $(binary) || { echo '$(binary) is not there: run "make build" first' >&2; exit 1; }
 	install -D -m 755 $(binary) $(DESTDIR)$(PREFIX)/bin/solver
-	find $(wildcard jobs meshes) -type f -not -path '*/out/*' -exec install -D -m 644 {} $(share)/{} \;
+	$(binary) man $(DESTDIR)$(PREFIX)/share/man/man1
+	install -d $(completions:%=$(DESTDIR)$(PREFIX)/share/%)
+	$(binary) completion bash > $(DESTDIR)$(PREFIX)/share/bash-completion/completions/solver
+	$(binary) completion zsh > $(DESTDIR)$(PREFIX)/share/zsh/site-functions/_solver
+	$(binary) completion fish > $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/solver.fish
+	find $(wildcard jobs meshes schema) -type f -not -path '*/out/*' -exec install -D -m 644 {} $(share)/{} \;
 	@echo 'Jobs and meshes: $(share). A job writes beside itself: copy it to a folder of your own before a run.'
 
 clean:

@@ -16,7 +16,8 @@ use crate::{
     postprocessing::{report::report, study},
     run::{self, Clock, Start},
 };
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 use mpi::traits::CommunicatorCollectives;
 use std::{
     ffi::OsString,
@@ -39,7 +40,8 @@ Examples:
 Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
 
 /// Names of the commands, for suggestions.
-const COMMANDS: [&str; 7] = ["run", "check", "describe", "inspect", "partition", "study", "report"];
+const COMMANDS: [&str; 9] =
+    ["run", "check", "describe", "inspect", "partition", "study", "report", "completion", "man"];
 
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
 #[derive(Debug, Parser)]
@@ -77,9 +79,12 @@ enum Command {
     Describe {
         /// Table or key to print, such as material.elasticity or time.step; absent: all tables.
         table: Option<String>,
-        /// Print the JSON Schema of the whole job, or of the whole study.
+        /// Print the JSON Schema of the whole job, or of the whole study; editors complete and check keys with it.
         #[arg(long)]
         json: bool,
+        /// Print all keys of a job, or of a study, as a page in Markdown.
+        #[arg(long, conflicts_with = "json")]
+        markdown: bool,
     },
     /// Print the contents of a mesh, a partitioned mesh, a checkpoint or a field file.
     Inspect {
@@ -115,6 +120,16 @@ enum Command {
     /// Write pictures and one self-contained HTML page.
     Report {
         /// Output folder of a run or a study.
+        folder: PathBuf,
+    },
+    /// Print a script with which a shell completes commands, options and files.
+    Completion {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Write the manual pages, one for each command.
+    Man {
+        /// The folder to write to, such as ~/.local/share/man/man1.
         folder: PathBuf,
     },
 }
@@ -168,7 +183,10 @@ fn dispatch(cli: Cli) -> Result<Exit> {
     match cli.command {
         Some(Command::Run(arguments)) => run_job(&arguments),
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
-        Some(Command::Describe { table, json }) => describe(table.as_deref(), json),
+        Some(Command::Describe { table, json, markdown }) => {
+            let form = [(json, Form::Json), (markdown, Form::Markdown)];
+            describe(table.as_deref(), form.into_iter().find(|(chosen, _)| *chosen).map(|(_, form)| form))
+        }
         Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),
         Some(Command::Inspect { file }) if is_mesh(&file) => say(&gmsh::inspect(&file)?),
         Some(Command::Inspect { file }) => say(&inspect(&file)?),
@@ -177,6 +195,8 @@ fn dispatch(cli: Cli) -> Result<Exit> {
             run_study(&study, &overrides, ablate, part)
         }
         Some(Command::Report { folder }) => report_on(&folder),
+        Some(Command::Completion { shell }) => completion(shell),
+        Some(Command::Man { folder }) => manual(&folder),
         None => match &cli.run {
             Some(arguments) => run_job(arguments),
             None => Err(Error::Refused("name a job file; see solver --help".into())),
@@ -184,18 +204,46 @@ fn dispatch(cli: Cli) -> Result<Exit> {
     }
 }
 
-fn describe(table: Option<&str>, json: bool) -> Result<Exit> {
+/// The form of a reference of all keys; absent: text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Json,
+    Markdown,
+}
+
+fn describe(table: Option<&str>, form: Option<Form>) -> Result<Exit> {
     let of_study = table.and_then(|table| table.trim_matches(['[', ']']).strip_prefix("study"));
     let of_study = of_study.filter(|rest| rest.is_empty() || rest.starts_with('.'));
-    match (of_study.map(|rest| rest.trim_start_matches('.')), json) {
-        (Some(""), true) => say(&study::describe_json()),
-        (Some(table), false) => say(&study::describe(Some(table).filter(|table| !table.is_empty()))?),
-        (None, false) => say(&job::describe(table)?),
-        (None, true) if table.is_none() => say(&job::describe_json()),
+    match (of_study.map(|rest| rest.trim_start_matches('.')), form) {
+        (Some(table), None) => say(&study::describe(Some(table).filter(|table| !table.is_empty()))?),
+        (None, None) => say(&job::describe(table)?),
+        (Some(""), Some(Form::Json)) => say(&study::describe_json()),
+        (Some(""), Some(Form::Markdown)) => say(&study::describe_markdown()),
+        (None, Some(Form::Json)) if table.is_none() => say(&job::describe_json()),
+        (None, Some(Form::Markdown)) if table.is_none() => say(&job::describe_markdown()),
         _ => Err(Error::Refused(
-            "--json prints a whole schema: solver describe --json, or describe study --json".into(),
+            "--json and --markdown print all keys: solver describe --json, or describe study --json".into(),
         )),
     }
+}
+
+fn completion(shell: Shell) -> Result<Exit> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "solver", &mut script);
+    say(&String::from_utf8_lossy(&script))
+}
+
+/// Writes the manual pages, on one process.
+fn manual(folder: &Path) -> Result<Exit> {
+    if launched_rank().is_some_and(|rank| rank > 0) {
+        return Ok(Exit::Done);
+    }
+    let write = || {
+        std::fs::create_dir_all(folder)?;
+        clap_mangen::generate_to(Cli::command(), folder)
+    };
+    write().map_err(|error| Error::unwritable(folder, error))?;
+    say(&format!("manual pages: {}", folder.display()))
 }
 
 /// A clearer message for a command line that the parser refuses.

@@ -206,6 +206,33 @@ fn the_jobs_in_the_pages_are_valid() {
 }
 
 #[test]
+fn generated_files_are_those_of_the_source() {
+    use clarke::{job, postprocessing::study};
+    let files = [
+        ("schema/job.schema.json", job::describe_json()),
+        ("schema/study.schema.json", study::describe_json()),
+        ("docs/reference-keys.md", job::describe_markdown()),
+        ("docs/reference-study-keys.md", study::describe_markdown()),
+    ];
+    for (file, text) in files {
+        assert!(
+            read(file) == text + "\n",
+            "{file} differs from the keys of the source; `make reference` writes it"
+        );
+    }
+}
+
+#[test]
+fn every_job_names_the_schema_of_its_keys() {
+    for (path, text) in files("jobs").iter().filter(|(path, _)| path.ends_with(".toml")) {
+        let schema = if path.starts_with("jobs/studies/") { "study" } else { "job" };
+        let up = "../".repeat(Path::new(path).components().count() - 1);
+        let line = format!("#:schema {up}schema/{schema}.schema.json");
+        assert_eq!(text.lines().next(), Some(&*line), "the first line of {path}");
+    }
+}
+
+#[test]
 fn names_that_are_not_there_are_found() {
     let sources = [("src/run/time_loop.rs".to_owned(), "use stepping::next_step;\nstruct Run {\n    state: State,\n}\nimpl Run {\n    fn take_step(&mut self) {}\n}\n".to_owned())];
     let fault = |name: &str| fault(name, &sources, "");

@@ -14,9 +14,17 @@ struct Table {
     path: String,
     /// Whether the table is written with two brackets and may occur several times.
     several: bool,
-    /// The name and the text of each key.
-    keys: Vec<(&'static str, String)>,
+    keys: Vec<Key>,
     meaning: String,
+}
+
+/// A key of a table.
+struct Key {
+    name: &'static str,
+    schema: Schema,
+    /// The alternative that the key is part of, if the table is a choice.
+    branch: Option<Schema>,
+    is_required: bool,
 }
 
 /// Meaning, unit, range, default and example of all keys of `table` and the tables below it (of all tables if `None`), or of the
@@ -31,8 +39,8 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
     let wanted = table.unwrap_or_default().trim_matches(['[', ']']);
     if let Some((path, key)) = wanted.rsplit_once('.') {
         let found = all.iter().find(|table| table.path == path);
-        if let Some((_, text)) = found.and_then(|table| table.keys.iter().find(|(name, _)| *name == key)) {
-            return Ok(format!("[{path}]\n{text}"));
+        if let Some(found) = found.and_then(|table| table.keys.iter().find(|found| found.name == key)) {
+            return Ok(format!("[{path}]\n{}", found.text()));
         }
     }
     let shown: Vec<&Table> = all
@@ -57,6 +65,26 @@ pub fn describe_json() -> String {
     format!("{:#}", Kind::job().schema)
 }
 
+/// The reference of all keys of a job as a page in Markdown.
+pub fn describe_markdown() -> String {
+    markdown_of(Kind::job())
+}
+
+/// As [`describe_markdown`], of another kind of document.
+pub(crate) fn markdown_of(kind: Kind) -> String {
+    let what = kind.prefix.replace('.', " ");
+    let mut page = format!(
+        "# Keys of a {}\n\n`solver describe {what}--markdown` prints this page; it is generated from the source. {}\n\n",
+        kind.name,
+        escaped(&flat(kind.opening))
+    );
+    for table in tables(kind) {
+        page.push_str(&table.markdown());
+    }
+    page.truncate(page.trim_end().len());
+    page
+}
+
 fn unknown_table(kind: Kind, wanted: &str, all: &[Table]) -> Error {
     let help = match nearest(wanted, all.iter().map(|table| table.path.as_str())) {
         Some(near) => format!("did you mean `{near}`?"),
@@ -78,7 +106,7 @@ fn unknown_table(kind: Kind, wanted: &str, all: &[Table]) -> Error {
 pub(super) fn tables_with(kind: Kind, key: &str) -> Option<String> {
     let found: Vec<String> = tables(kind)
         .iter()
-        .filter(|table| table.keys.iter().any(|(name, _)| *name == key))
+        .filter(|table| table.keys.iter().any(|found| found.name == key))
         .map(|table| format!("[{}]", table.path))
         .collect();
     (!found.is_empty()).then(|| found.join(", "))
@@ -116,21 +144,21 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
         let choices = tagged.iter().filter_map(|(name, branch)| Some((*name, branch.property(name)?, false)));
         properties.extend(choices);
     }
-    for (key, inner, required) in properties {
+    for (key, inner, is_required) in properties {
         let branch = tagged.iter().find(|(name, _)| *name == key).map(|(_, branch)| *branch);
         if is_table(inner) && inner.get("additionalProperties").is_boolean()
             || is_tables(inner)
             || !inner.tagged().is_empty()
         {
-            collect(&format!("{path}.{key}"), inner, required, all);
+            collect(&format!("{path}.{key}"), inner, is_required, all);
         } else {
-            keys.push((key, key_text(key, inner, branch, required)));
+            keys.push(Key { name: key, schema: inner, branch, is_required });
         }
     }
     if let Some(free) = body.items().filter(|items| items.accepts("object")) {
         for (key, inner) in free.properties() {
-            let required = free.required().any(|name| name == key);
-            keys.push((key, key_text(key, inner, None, required)));
+            let is_required = free.required().any(|name| name == key);
+            keys.push(Key { name: key, schema: inner, branch: None, is_required });
         }
         meaning.push_str(&format!(" Each: [{path}.\"name\"] or \"name\" = {{ .. }}."));
     }
@@ -147,40 +175,114 @@ fn is_tables(schema: Schema) -> bool {
 }
 
 impl Table {
+    /// Its name in brackets, as in a document.
+    fn title(&self) -> String {
+        if self.several { format!("[[{}]]", self.path) } else { format!("[{}]", self.path) }
+    }
+
     fn text(&self) -> String {
-        let name = if self.several { format!("[[{}]]", self.path) } else { format!("[{}]", self.path) };
-        let mut text = format!("{name}\n{}", wrapped(&self.meaning, 2));
-        for (_, key) in &self.keys {
-            text.push_str(key);
+        let mut text = format!("{}\n{}", self.title(), wrapped(&self.meaning, 2));
+        for key in &self.keys {
+            text.push_str(&key.text());
+        }
+        text
+    }
+
+    /// A section with a row for each key.
+    fn markdown(&self) -> String {
+        let level = if self.path.contains('.') { "###" } else { "##" };
+        let mut text = format!("{level} `{}`\n\n{}\n\n", self.title(), escaped(&self.meaning));
+        if !self.keys.is_empty() {
+            text.push_str("| key | value | unit | default | meaning |\n|---|---|---|---|---|\n");
+            self.keys.iter().for_each(|key| text.push_str(&key.markdown()));
+            text.push('\n');
         }
         text
     }
 }
 
-fn key_text(key: &str, schema: Schema, branch: Option<Schema>, required: bool) -> String {
-    let mut facts = vec![kind(schema)];
-    let range = range(schema.items().filter(|_| schema.accepts("array")).unwrap_or(schema));
-    if range != "any number" {
-        facts.push(range);
+impl Key {
+    /// The accepted kind of value with its range.
+    fn value(&self) -> String {
+        let range =
+            range(self.schema.items().filter(|_| self.schema.accepts("array")).unwrap_or(self.schema));
+        let kind = kind(self.schema);
+        if range == "any number" { kind } else { format!("{kind}; {range}") }
     }
-    facts.extend(schema.text("unit").map(|unit| format!("unit {unit}")));
-    match schema.get("default") {
-        Value::Null if required => facts.push("required".into()),
-        Value::Null => {}
-        default => facts.push(format!("default {}", toml(default))),
-    }
-    let mut text = format!("\n  {key}: {}\n", facts.join("; "));
-    let meaning = schema.text("description").or(branch.and_then(|branch| branch.text("description")));
-    text.push_str(&wrapped(&flat(meaning.unwrap_or_default()), 6));
-    for choice in schema.alternatives() {
-        if let (Some(word), Some(meaning)) = (choice.text("const"), choice.text("description")) {
-            text.push_str(&wrapped(&format!("\"{word}\": {}", flat(meaning)), 8));
+
+    /// The default, or that the key is required.
+    fn default(&self) -> Option<String> {
+        match self.schema.get("default") {
+            Value::Null => self.is_required.then(|| "required".into()),
+            default => Some(toml(default)),
         }
     }
-    for example in schema.get("examples").as_array().into_iter().flatten() {
-        text.push_str(&format!("      example: {key} = {}\n", toml(example)));
+
+    fn meaning(&self) -> String {
+        let meaning = self.schema.text("description");
+        flat(meaning.or(self.branch.and_then(|branch| branch.text("description"))).unwrap_or_default())
     }
-    text
+
+    /// The allowed words with their meanings.
+    fn choices(&self) -> Vec<(&'static str, String)> {
+        let choice = |choice: &Schema| Some((choice.text("const")?, flat(choice.text("description")?)));
+        self.schema.alternatives().iter().filter_map(choice).collect()
+    }
+
+    /// Lines as in a document.
+    fn examples(&self) -> Vec<String> {
+        let examples = self.schema.get("examples").as_array().into_iter().flatten();
+        examples.map(|example| format!("{} = {}", self.name, toml(example))).collect()
+    }
+
+    fn text(&self) -> String {
+        let mut facts = vec![self.value()];
+        facts.extend(self.schema.text("unit").map(|unit| format!("unit {unit}")));
+        facts.extend(self.default().map(|default| match &*default {
+            "required" => default,
+            default => format!("default {default}"),
+        }));
+        let mut text = format!("\n  {}: {}\n", self.name, facts.join("; "));
+        text.push_str(&wrapped(&self.meaning(), 6));
+        for (word, meaning) in self.choices() {
+            text.push_str(&wrapped(&format!("\"{word}\": {meaning}"), 8));
+        }
+        for example in self.examples() {
+            text.push_str(&format!("      example: {example}\n"));
+        }
+        text
+    }
+
+    /// A row of a table.
+    fn markdown(&self) -> String {
+        let mut meaning = vec![escaped(&self.meaning())];
+        let choices = self.choices();
+        meaning.extend(choices.iter().map(|(word, text)| format!("`\"{word}\"`: {}", escaped(text))));
+        meaning.extend(self.examples().iter().map(|example| format!("Example: {}", code(example))));
+        let default = match self.default() {
+            Some(word) if word == "required" => word,
+            default => default.map_or(String::new(), |value| code(&value)),
+        };
+        format!(
+            "| `{}` | {} | {} | {default} | {} |\n",
+            self.name,
+            escaped(&self.value()),
+            escaped(self.schema.text("unit").unwrap_or_default()),
+            meaning.join("<br>")
+        )
+    }
+}
+
+/// Text of a table in Markdown; what is between backquotes stays as it is.
+fn escaped(text: &str) -> String {
+    let plain = |part: &str| part.replace('*', "\\*").replace('<', "&lt;").replace('|', "\\|");
+    let part = |(at, part): (usize, &str)| if at % 2 == 0 { plain(part) } else { part.replace('|', "\\|") };
+    text.split('`').enumerate().map(part).collect::<Vec<_>>().join("`")
+}
+
+/// Code of a table in Markdown.
+fn code(text: &str) -> String {
+    format!("`{}`", text.replace('|', "\\|"))
 }
 
 /// The accepted kind of value, in words.

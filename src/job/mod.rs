@@ -17,8 +17,8 @@ mod tables;
 mod validate;
 
 pub use crate::laws::expression::{Expression, Fault as ExpressionFault, Scalar, Variable};
-pub(crate) use describe::describe_kind;
-pub use describe::{describe, describe_json};
+pub use describe::{describe, describe_json, describe_markdown};
+pub(crate) use describe::{describe_kind, markdown_of};
 pub use document::*;
 pub use effective::differing_keys;
 pub use load::Loaded;

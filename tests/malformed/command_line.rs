@@ -38,6 +38,11 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["check", "nowhere.toml", "--json"], &["cannot read nowhere.toml"]),
     (&["describe", "contat"], &["did you mean `contact`?"]),
     (&["describe", "poisson_ratio"], &["try solver describe material.elasticity.poisson_ratio"]),
+    (&["describe", "--json", "--markdown"], &["cannot be used with"]),
+    (&["describe", "time", "--markdown"], &["print all keys"]),
+    (&["describe", "study.norm", "--json"], &["print all keys"]),
+    (&["completion", "tcsh"], &["invalid value 'tcsh'", "bash"]),
+    (&["man", "Cargo.lock/man1"], &["cannot write Cargo.lock/man1"]),
     (&["inspect", "nowhere.h5"], &["cannot read nowhere.h5"]),
     (&["inspect", "Cargo.lock"], &["Cargo.lock: it is not an HDF5 file"]),
     (&["inspect", "src"], &["src: it is not a file"]),
@@ -65,6 +70,34 @@ fn alone_the_solver_shows_how_it_is_used() {
     run_alone::<&str>(&[]).expect(2).says("Usage: solver");
     run_alone(&["--help"]).expect(0).says("Exit codes: 0 done");
     run_alone(&["--version"]).expect(0).says(env!("CARGO_PKG_VERSION"));
+}
+
+/// Manual pages and scripts for shells mention every command, and bash can read its script.
+#[test]
+fn manual_pages_and_completions_are_written() {
+    let commands =
+        ["run", "check", "describe", "inspect", "partition", "study", "report", "completion", "man"];
+    let folder = tempfile::tempdir().expect("folder");
+    let pages = folder.path().join("share/man/man1");
+    run_alone(&["man", pages.to_str().expect("path")]).expect(0);
+    let page =
+        |name: &str| std::fs::read_to_string(pages.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert!(page("solver.1").contains("Exit codes: 0 done"));
+    for command in commands {
+        assert!(page("solver.1").contains(&format!("solver\\-{command}(1)")), "{command}");
+        assert!(page(&format!("solver-{command}.1")).contains(".SH SYNOPSIS"), "{command}");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        let script = run_alone(&["completion", shell]).expect(0).stdout;
+        assert!(commands.iter().all(|command| script.contains(command)), "{shell}: {script}");
+        assert!(script.contains("restart"), "{shell}: {script}");
+        if shell == "bash" {
+            let file = folder.path().join("solver.bash");
+            std::fs::write(&file, script).expect("written");
+            let read = std::process::Command::new("bash").arg("-n").arg(&file).status().expect("bash starts");
+            assert!(read.success());
+        }
+    }
 }
 
 #[test]

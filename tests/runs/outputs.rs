@@ -66,6 +66,48 @@ fn a_run_leaves_the_files_of_the_contract() {
     assert_eq!(&probes.words("probe")[..3], ["tip", "middle", "inside"]);
 }
 
+/// The names of the members of an object and of the objects in it.
+fn members(value: &serde_json::Value, found: &mut Vec<String>) {
+    for (name, member) in value.as_object().into_iter().flatten() {
+        found.push(name.clone());
+        members(member, found);
+    }
+}
+
+#[test]
+fn the_reference_names_every_file_column_field_and_number() {
+    let also = "['region', 'strain', 'principal_stress', 'pressure', 'contact_pressure', 'gap', 'contact_status', 'branch', \
+                'sliding_velocity']";
+    let case = Case::square(4)
+        .set("time.end", "0.125")
+        .set("contact.0.friction", "{tresca = {bound = 1.0}}")
+        .set("output.also", also)
+        .set("output.error_indicator", "true")
+        .set("checkpoint.every", "2");
+    let results = case.run(2);
+    let mut names = results.files();
+    for table in ["history.csv", "resultants.csv", "probes.csv", "profiles.csv"] {
+        names.extend(results.table(table).columns);
+    }
+    members(&results.summary(), &mut names);
+    let fields = results.text("fields.xdmf");
+    names.extend(
+        fields
+            .split("Attribute Name=\"")
+            .skip(1)
+            .map(|rest| rest.split('"').next().expect("a name").to_owned()),
+    );
+    let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference-outputs.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let is_named = |name: &String| {
+        let name = if name.starts_with("checkpoint-") { "checkpoint-<step>.h5" } else { name };
+        page.contains(&format!("`{name}`"))
+    };
+    let missing: Vec<_> = names.iter().filter(|name| !is_named(name)).collect();
+    assert!(missing.is_empty(), "docs/reference-outputs.md lacks {missing:?}");
+    assert!(names.len() > 120 && names.iter().any(|name| name == "slipping_area"), "{names:?}");
+}
+
 #[test]
 fn tables_of_a_cube_have_three_components() {
     let case =

@@ -32,7 +32,7 @@ pub use results::Results;
 
 use crate::{
     error::{Exit, Result},
-    job::describe_kind,
+    job::{describe_kind, markdown_of},
     parallel::session::Session,
     run::VERSION,
 };
@@ -52,6 +52,11 @@ pub fn describe(table: Option<&str>) -> Result<String> {
 /// The JSON Schema (draft 2020-12) of a study.
 pub fn describe_json() -> String {
     format!("{:#}", document::kind().schema)
+}
+
+/// The reference of all keys of a study as a page in Markdown.
+pub fn describe_markdown() -> String {
+    markdown_of(document::kind())
 }
 
 /// Executes the study and writes its tables; with `with_ablation` the base job is also run without each of its effects. Collective.
