@@ -2,17 +2,19 @@
 
 use crate::{
     error::{Error, Exit, Result},
-    linear_algebra::petsc::Petsc,
+    linear_algebra::petsc::{Petsc, within},
     parallel::agreement::{Agreed, agree},
 };
 use mpi::{
     Threading,
     collective::SystemOperation,
     environment::Universe,
-    topology::{Communicator, SimpleCommunicator},
+    topology::{Color, Communicator, SimpleCommunicator},
     traits::CommunicatorCollectives,
 };
 use std::{
+    fmt,
+    ops::Deref,
     rc::Rc,
     sync::{
         Arc,
@@ -45,13 +47,31 @@ impl Mpi {
     /// Starts PETSc and the signal flags on all ranks.
     pub fn session(&self) -> Result<Session> {
         let petsc = Petsc::start(&self.universe)?;
-        Ok(Session { world: self.universe.world(), petsc, signal: watch_signals()? })
+        Ok(Session { world: World(Rc::new(self.universe.world())), petsc, signal: watch_signals()? })
+    }
+}
+
+/// The communicator of the ranks of a session, shared by what communicates repeatedly.
+#[derive(Clone)]
+pub struct World(Rc<SimpleCommunicator>);
+
+impl Deref for World {
+    type Target = SimpleCommunicator;
+
+    fn deref(&self) -> &SimpleCommunicator {
+        &self.0
+    }
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "World({} ranks)", self.size())
     }
 }
 
 /// The parallel environment: communicator, PETSc and signals.
 pub struct Session {
-    world: SimpleCommunicator,
+    world: World,
     petsc: Petsc,
     signal: Arc<AtomicUsize>,
 }
@@ -60,6 +80,22 @@ impl Session {
     /// The communicator of all ranks.
     pub fn world(&self) -> &SimpleCommunicator {
         &self.world
+    }
+
+    /// The same communicator, to be kept.
+    pub fn shared_world(&self) -> World {
+        self.world.clone()
+    }
+
+    /// Calls `work` with the session of the ranks that give the same number of a group; groups work independently of each other. What
+    /// `work` makes with its session must not outlive it. Collective over all ranks, which wait for each other only at the start.
+    pub fn in_group<T>(&self, group: usize, work: impl FnOnce(&Session) -> T) -> Result<T> {
+        let color = Color::with_value(i32::try_from(group).unwrap_or(i32::MAX));
+        let ranks = self.world.split_by_color(color);
+        let none = || Error::Internal("MPI made no group of ranks".into());
+        let world = World(Rc::new(self.agree(ranks.ok_or_else(none))?));
+        let session = Session { world, petsc: self.petsc.clone(), signal: Arc::clone(&self.signal) };
+        Ok(within(&session.world, || work(&session)))
     }
 
     /// Rank of this process, from 0.
@@ -86,7 +122,7 @@ impl Session {
     /// a rank
     /// can fail, and before anything that depends on the outcome.
     pub fn agree<T, E: Into<Error>>(&self, result: Result<T, E>) -> Result<T, Agreed> {
-        agree(&self.world, result)
+        agree(self.world(), result)
     }
 
     /// The value of a function that is called on rank 0 only; `None` on other ranks, and its failure on all ranks. Collective.

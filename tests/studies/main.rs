@@ -10,5 +10,6 @@ mod refusals;
 mod resume;
 mod results;
 mod scene;
+mod side_by_side;
 mod steps;
 mod table_1;

@@ -3,9 +3,9 @@ use crate::{
     error::{Error, Result},
     linear_algebra::sparse::one_unless_chosen,
 };
-use mpi::{environment::Universe, traits::AsRaw};
+use mpi::{environment::Universe, topology::SimpleCommunicator, traits::AsRaw};
 use std::{
-    cell::RefCell,
+    cell::{Cell, RefCell},
     ffi::{CStr, c_char},
     fmt, ptr,
     rc::{Rc, Weak},
@@ -13,6 +13,8 @@ use std::{
 
 thread_local! {
     static STARTED: RefCell<Weak<Started>> = const { RefCell::new(Weak::new()) };
+    /// The communicator of new handles, if it is not that of all ranks.
+    static OF_GROUP: Cell<Option<sys::MPI_Comm>> = const { Cell::new(None) };
 }
 
 /// PETSc, started on this thread. Dropping the last reference finalises PETSc, then MPI.
@@ -39,7 +41,8 @@ pub(super) fn started() -> Result<Rc<Started>> {
     started.ok_or_else(|| Error::Internal("PETSc is not started on this thread".into()))
 }
 
-/// PETSc, started. It is finalised when this token and all handles are dropped, and MPI after it.
+/// PETSc, started. It is finalised when all such tokens and all handles are dropped, and MPI after it.
+#[derive(Clone)]
 pub struct Petsc {
     _started: Rc<Started>,
 }
@@ -79,10 +82,18 @@ impl Petsc {
     }
 }
 
-/// The communicator of all handles.
+/// The communicator of new handles.
 pub(super) fn communicator() -> sys::MPI_Comm {
     // SAFETY: written by the thread that starts PETSc, which is the only one with handles.
-    unsafe { sys::PETSC_COMM_WORLD }
+    OF_GROUP.get().unwrap_or_else(|| unsafe { sys::PETSC_COMM_WORLD })
+}
+
+/// Calls `work`, during which new handles belong to the ranks of this communicator. No handle made in it may remain.
+pub fn within<T>(group: &SimpleCommunicator, work: impl FnOnce() -> T) -> T {
+    let before = OF_GROUP.replace(Some(group.as_raw()));
+    let result = work();
+    OF_GROUP.set(before);
+    result
 }
 
 /// Sets a PETSc option; the name is without the leading dash, an empty value is a plain flag.

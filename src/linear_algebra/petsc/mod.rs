@@ -1,7 +1,7 @@
 //! PETSc: safe handles that own PETSc objects, one file for each PETSc class.
 //!
 //! Every call that can fail returns `Result` with PETSc's own message and trace. All handles are collective over
-//! the ranks of the MPI universe given to [`Petsc::start`]: every rank creates, uses and drops them in the same order. PETSc
+//! the ranks of the MPI universe given to [`Petsc::start`], or of the group in [`within`]: every rank creates, uses and drops them in the same order. PETSc
 //! remains initialised while a handle exists; creating one while PETSc is not initialised is an error.
 //! Failure of a solver to converge is not an error: read the outcome of [`Ksp::solve`] and [`Snes::solve`].
 #![allow(unsafe_code)]
@@ -28,7 +28,7 @@ mod vector;
 
 pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
-pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option};
+pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option, within};
 pub use matrix::Matrix;
 pub use own_preconditioner::OwnPreconditioner;
 pub use projected::{MISSING_DIRECTIONS, ProjectedKsp};

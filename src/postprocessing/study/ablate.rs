@@ -200,6 +200,7 @@ fn run(
         tolerance: job.solver.tolerance,
         set: Vec::new(),
         adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
+        is_side_by_side: false,
         loaded,
     };
     Ok(match execute(session, &planned, plan.study.timing.repetitions as usize)? {

@@ -265,11 +265,15 @@ pub struct Timing {
     pub repetitions: u32,
     /// The repetition whose wall time is used.
     pub take: Take,
+    /// Ranks of each run. A study on more ranks executes as many runs side by side as fit; surplus ranks are shared among them. Wall
+    /// times then include the disturbance by the other runs. The reference uses all ranks. Absent: each run uses all ranks.
+    #[schemars(range(min = 1), example = 1)]
+    pub ranks: Option<u32>,
 }
 
 impl Default for Timing {
     fn default() -> Self {
-        Self { repetitions: 1, take: Take::Best }
+        Self { repetitions: 1, take: Take::Best, ranks: None }
     }
 }
 

@@ -19,6 +19,7 @@ mod plan;
 mod plot;
 mod record;
 mod results;
+mod side_by_side;
 mod split;
 mod squares;
 mod stored;
@@ -42,6 +43,7 @@ use execute::{Outcome, execute};
 use plan::{Planned, PlannedReference};
 use record::{Ran, seconds_of};
 use results::RunResult;
+use side_by_side::{Numbered, execute_all};
 use std::io::Write;
 
 /// The reference of the keys of studies: of all tables, or of one table or key.
@@ -64,14 +66,14 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
     let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;
     let number = |index: usize| format!("{}/{}", index + 1, plan.runs.len());
-    let runs = plan.runs.iter().enumerate();
+    let numbered = |(index, planned)| (planned, repetitions, number(index));
+    let runs: Vec<Numbered> = plan.runs.iter().enumerate().map(numbered).collect();
     let once = |planned, what| announced(session, planned, 1, what, &say);
     let reference = reference_run(plan).map(|planned| once(planned, "reference"));
     let Some(reference) = reference.into_iter().collect::<Result<Option<Vec<Ran>>>>()? else {
         return stopped(&say);
     };
-    let ran = runs.map(|(index, planned)| announced(session, planned, repetitions, &number(index), &say));
-    let Some(ran) = ran.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(&say) };
+    let Some(ran) = execute_all(session, plan, &runs, &say)? else { return stopped(&say) };
     let on_meshes = plan.split.iter().map(|planned| once(planned, "split"));
     let Some(on_meshes) = on_meshes.collect::<Result<Option<Vec<Ran>>>>()? else { return stopped(&say) };
     let mut results = assembled(session, plan, reference.first(), &ran, &on_meshes)?;
@@ -93,21 +95,19 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
 }
 
 /// Executes a part of the runs of the study, each in its own folder, and writes no tables. When all parts are finished, the study,
-/// started on the same number of ranks, uses their runs. Collective.
+/// started on the same number of ranks (on any, for runs side by side), uses their runs. Collective.
 pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
     let say = speaker(session);
     let repetitions = plan.study.timing.repetitions as usize;
     let once = reference_run(plan).into_iter().chain(&plan.split).map(|planned| (planned, 1));
     let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
-    let mut failed = 0;
-    for (index, (planned, repetitions)) in all.iter().enumerate().filter(|(index, _)| part.has(*index)) {
-        let count = format!("{}/{}", index + 1, all.len());
-        match announced(session, planned, *repetitions, &count, &say)? {
-            Some(ran) => failed += usize::from(ran.record.error.is_some()),
-            None => return stopped(&say),
-        }
-    }
-    Ok(if failed > 0 { Exit::Failed } else { Exit::Done })
+    let mine = all.iter().enumerate().filter(|(index, _)| part.has(*index));
+    let count = |index: usize| format!("{}/{}", index + 1, all.len());
+    let mine: Vec<Numbered> =
+        mine.map(|(index, (planned, repetitions))| (*planned, *repetitions, count(index))).collect();
+    let Some(ran) = execute_all(session, plan, &mine, &say)? else { return stopped(&say) };
+    let failed = ran.iter().any(|ran| ran.record.error.is_some());
+    Ok(if failed { Exit::Failed } else { Exit::Done })
 }
 
 /// Writes lines to the terminal, on the first rank.

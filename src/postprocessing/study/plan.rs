@@ -31,6 +31,8 @@ pub struct Planned {
     pub set: Vec<String>,
     /// Tolerance of adaptive steps.
     pub adaptive: Option<f64>,
+    /// Whether it may run beside others, on a part of the ranks; then any number of ranks counts as the same run.
+    pub is_side_by_side: bool,
     /// Its job.
     pub loaded: Loaded,
 }
@@ -84,9 +86,10 @@ impl Plan {
         let mut taken = vec!["reference".to_owned()];
         let mut refusals = Vec::new();
         let mut runs = Vec::new();
+        let is_side_by_side = study.timing.ranks.is_some();
         for run in &wanted {
             match job.planned(run, None, &output, &mut taken) {
-                Ok(planned) => runs.push(planned),
+                Ok(planned) => runs.push(Planned { is_side_by_side, ..planned }),
                 Err(error) => refusals.push(error.to_string()),
             }
         }
@@ -237,6 +240,7 @@ impl Source<'_> {
             tolerance: job.solver.tolerance,
             set: run.set.clone(),
             adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
+            is_side_by_side: false,
             name,
             loaded,
         })

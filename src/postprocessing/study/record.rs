@@ -17,7 +17,7 @@ const FILE: &str = "run.json";
 /// A run, finished or failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Record {
-    /// Digest of job, mesh file, solver and number of ranks.
+    /// Digest of job, mesh file and solver, and of the number of ranks unless runs are side by side.
     pub digest: String,
     /// `completed` or `failed`.
     pub status: String,
@@ -152,10 +152,16 @@ impl Record {
         std::fs::rename(&part, &path).map_err(|error| Error::unwritable(&path, error))
     }
 
+    /// The record in the folder of a run.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(FILE);
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::unreadable(&path, error))?;
+        serde_json::from_str(&text).map_err(|error| Error::unreadable(&path, error))
+    }
+
     /// The record of a complete run with this digest and this number of repetitions, if its files are unchanged.
     pub(super) fn of_finished(folder: &Path, digest: &str, repetitions: usize) -> Option<Self> {
-        let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
-        let record: Self = serde_json::from_str(&text).ok()?;
+        let record = Self::read(folder).ok()?;
         let sound =
             |(name, digest): (&String, &String)| file_digest(&folder.join(name)).is_ok_and(|d| d == *digest);
         let good = record.is_complete()
@@ -183,8 +189,9 @@ impl Record {
     }
 }
 
-/// Digest of all data that determine a run.
+/// Digest of all data that determine a run; of the number of ranks only if the run is not one of several side by side.
 pub(super) fn digest(planned: &Planned, ranks: usize) -> Result<String> {
+    let ranks = if planned.is_side_by_side { 0 } else { ranks };
     let mut hash = Xxh3::new();
     hash.update(planned.loaded.job.to_toml()?.as_bytes());
     hash.update(VERSION.as_bytes());

@@ -185,7 +185,7 @@ impl Condensed {
             motions: self.nodes.motions.clone(),
             springs: springs.unwrap_or_default(),
             subspace: Subspace::whole(&self.velocity)?,
-            workspace: Workspace::new(&self.nodes.motions, unknowns.len())?,
+            workspace: Workspace::new(session, &self.nodes.motions, unknowns.len())?,
         };
         let scales = if has_springs {
             resistances_of_body(session, &body.contacts, like, matrix)?

@@ -4,9 +4,11 @@ use super::equations::StepMatrix;
 use crate::{
     error::Result,
     linear_algebra::petsc::{DenseCholesky, DistributedVector, MISSING_DIRECTIONS, times_own_transpose},
-    parallel::exchange::Gathering,
+    parallel::{
+        exchange::Gathering,
+        session::{Session, World},
+    },
 };
-use mpi::topology::SimpleCommunicator;
 use std::{cell::RefCell, ops::Range};
 
 /// A motion of one contact node on which laws act: one scalar unknown.
@@ -50,14 +52,15 @@ pub(super) struct Workspace {
     blocks: Vec<f64>,
     block_gathering: Gathering,
     images: [Vec<f64>; MAX_DIMENSION],
+    world: World,
     /// Bytes read since the count of traffic was restarted.
     traffic: u64,
 }
 
 impl Workspace {
     /// For these motions of this rank, and this number of motions of all ranks. Collective.
-    pub(super) fn new(motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
-        let world = SimpleCommunicator::world();
+    pub(super) fn new(session: &Session, motions: &[Motion], total: usize) -> Result<RefCell<Self>> {
+        let world = session.shared_world();
         let pairs = motions.chunk_by(|a, b| a.at == b.at).map(|node| node.len() * node.len()).sum();
         let block_gathering = Gathering::new(&world, pairs)?;
         Ok(RefCell::new(Self {
@@ -69,6 +72,7 @@ impl Workspace {
             blocks: vec![0.0; block_gathering.total()],
             block_gathering,
             images: Default::default(),
+            world,
             traffic: 0,
         }))
     }
@@ -135,14 +139,14 @@ impl CondensedMatrix {
     /// Reads the amounts of all motions in a vector of contact nodes into the first work vector, in the order of the factor.
     /// Collective.
     fn read(&self, vector: &DistributedVector, workspace: &mut Workspace) -> Result<()> {
-        let Workspace { own, all, gathering, ordered_amounts: [ordered, _], .. } = workspace;
+        let Workspace { own, all, gathering, world, ordered_amounts: [ordered, _], .. } = workspace;
         {
             let values = vector.owned()?;
             for (amount, motion) in own.iter_mut().zip(&self.motions) {
                 *amount = dot(&motion.direction, &values[motion.at..][..motion.direction.len()]);
             }
         }
-        gathering.gather(&SimpleCommunicator::world(), own, all);
+        gathering.gather(world, own, all);
         self.positions.iter().zip(all).for_each(|(&position, amount)| ordered[position] = *amount);
         Ok(())
     }
@@ -224,11 +228,7 @@ impl CondensedMatrix {
                 workspace.own_blocks.push(entry);
             }
         }
-        workspace.block_gathering.gather(
-            &SimpleCommunicator::world(),
-            &workspace.own_blocks,
-            &mut workspace.blocks,
-        );
+        workspace.block_gathering.gather(&workspace.world, &workspace.own_blocks, &mut workspace.blocks);
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use crate::{
     parallel::{
         agreement::{Agreed, agree},
         exchange::{Gathering, gather},
-        session::Session,
+        session::{Session, World},
     },
 };
 use mpi::{
@@ -62,14 +62,16 @@ struct Numbering {
     /// Those of all ranks, in their order.
     all: Vec<u32>,
     gathering: Gathering,
+    world: World,
     rank: usize,
 }
 
 impl Numbering {
     /// Collective.
-    fn new(world: &SimpleCommunicator, own: &[u32]) -> Result<Self, Agreed> {
-        let gathering = Gathering::new(world, own.len())?;
-        Ok(Self { all: gather(world, own)?, gathering, rank: world.rank() as usize })
+    fn new(session: &Session, own: &[u32]) -> Result<Self, Agreed> {
+        let world = session.shared_world();
+        let gathering = Gathering::new(&world, own.len())?;
+        Ok(Self { all: gather(&world, own)?, gathering, rank: session.rank(), world })
     }
 
     fn of(&self, rank: usize) -> &[u32] {
@@ -189,7 +191,7 @@ impl Substructures {
             nodes,
             numbers,
             last,
-            numbering: Rc::new(Numbering::new(session.world(), &own)?),
+            numbering: Rc::new(Numbering::new(session, &own)?),
             order: None,
         })
     }
@@ -481,17 +483,17 @@ impl Shared {
         own.copy_from_slice(right_hand_side);
         ghosts.fill(0.0);
         self.interior.forward(&self.local)?;
-        let world = SimpleCommunicator::world();
-        self.numbering.gathering.gather(&world, self.interior.last_mut(), &mut self.gathered);
+        let world = &self.numbering.world;
+        self.numbering.gathering.gather(world, self.interior.last_mut(), &mut self.gathered);
         self.values.fill(0.0);
         for (&number, value) in self.numbering.all.iter().zip(&self.gathered) {
             self.values[number as usize] += value;
         }
-        self.interface.forward(&Ranks(&world), &mut self.values)
+        self.interface.forward(&Ranks(world), &mut self.values)
     }
 
     fn backward(&mut self, solution: &mut [f64]) -> Result<()> {
-        self.interface.backward(&Ranks(&SimpleCommunicator::world()), &mut self.values)?;
+        self.interface.backward(&Ranks(&self.numbering.world), &mut self.values)?;
         let numbers = self.numbering.of(self.numbering.rank);
         for (last, &number) in self.interior.last_mut().iter_mut().zip(numbers) {
             *last = self.values[number as usize];
@@ -521,7 +523,7 @@ impl SharedFactor {
 impl OwnPreconditioner for SharedFactor {
     fn set_up(&mut self, rows: &BlockRows) -> Result<()> {
         self.factors = None;
-        let world = SimpleCommunicator::world();
+        let world = self.substructures.numbering.world.clone();
         self.factors = Factors::new(&world, &mut self.substructures, rows, Precision::Double)?;
         Ok(())
     }
