@@ -11,7 +11,10 @@ mod table;
 
 use clarke::{
     job::{Expected, Job},
-    postprocessing::drawing::chart::{Axis, Chart, Look, Series},
+    postprocessing::{
+        drawing::chart::{Axis, Chart, Look, Series},
+        study::quantity,
+    },
 };
 use std::{
     fs,
@@ -376,8 +379,7 @@ fn found(job: &str, run: &Run, quantities: &[&str], output: &Path) -> Vec<f64> {
     if let Err(words) = checked::run(&file, run.ranks, output, run.changes) {
         panic!("{job}, {}: {words}", run.label);
     }
-    let number =
-        |name: &&str| checked::measured(output, name).unwrap_or_else(|| panic!("{job} left no {name}"));
+    let number = |name: &&str| quantity(output, name).unwrap_or_else(|| panic!("{job} left no {name}"));
     quantities.iter().map(number).collect()
 }
 

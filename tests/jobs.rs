@@ -5,8 +5,11 @@ mod checked;
 
 use std::path::{Path, PathBuf};
 
-use checked::{measured, run};
-use clarke::job::{Expected, Job};
+use checked::run;
+use clarke::{
+    job::{Expected, Job},
+    postprocessing::study::quantity,
+};
 
 /// All jobs of the repository, without studies.
 fn jobs() -> Vec<PathBuf> {
@@ -50,9 +53,9 @@ fn faults(ranks: usize) -> Vec<String> {
             faults.push(format!("{name}: {words}"));
             continue;
         }
-        for (quantity, expected) in &job.check {
-            let fault = difference(measured(output.path(), quantity), expected);
-            faults.extend(fault.map(|words| format!("{name}: {quantity}: {words}")));
+        for (result, expected) in &job.check {
+            let fault = difference(quantity(output.path(), result), expected);
+            faults.extend(fault.map(|words| format!("{name}: {result}: {words}")));
         }
     }
     faults
@@ -80,30 +83,6 @@ fn the_jobs_are_found() {
 }
 
 #[test]
-fn numbers_are_read_where_the_quantity_says() {
-    let folder = tempfile::tempdir().expect("folder");
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
-    write("summary.json", r#"{"max_von_mises": 4.5, "status": "completed", "certificates": {"theta": 0.5}}"#);
-    write("history.csv", "step,work\n1,2.5\n2,3.5\n");
-    write("probes.csv", "step,probe,velocity_y\n1,a,1\n1,b,2\n2,a,3\n2,b,4\n");
-    write("profiles.csv", "time,profile,x,pressure\n1,low,0,9\n2,low,0,-1\n2,low,1,5\n2,top,0,7\n");
-    let cases = [
-        ("max_von_mises", 4.5),
-        ("certificates.theta", 0.5),
-        ("history.work", 3.5),
-        ("probe.a.velocity_y", 3.0),
-        ("probe.b.min.velocity_y", 2.0),
-        ("probe.a.max.velocity_y", 3.0),
-        ("profile.low.max.pressure", 5.0),
-        ("profile.low.min.pressure", -1.0),
-        ("profile.low.first.pressure", -1.0),
-    ];
-    for (quantity, value) in cases {
-        assert_eq!(measured(folder.path(), quantity), Some(value), "{quantity}");
-    }
-}
-
-#[test]
 fn a_quantity_that_the_run_did_not_leave_is_a_fault() {
     let folder = tempfile::tempdir().expect("folder");
     std::fs::write(folder.path().join("summary.json"), r#"{"status": "completed"}"#).expect("written");
@@ -111,8 +90,8 @@ fn a_quantity_that_the_run_did_not_leave_is_a_fault() {
     let expected = Expected { value: 0.0, relative: None, absolute: Some(1e9) };
     let absent =
         ["max_von_misses", "status", "history.work", "probe.b.velocity_y", "probe.a.velocity", "probe.a"];
-    for quantity in absent {
-        assert!(difference(measured(folder.path(), quantity), &expected).is_some(), "{quantity}");
+    for name in absent {
+        assert!(difference(quantity(folder.path(), name), &expected).is_some(), "{name}");
     }
 }
 

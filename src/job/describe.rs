@@ -156,11 +156,15 @@ fn collect(path: &str, schema: Schema, required: bool, all: &mut Vec<Table>) {
         }
     }
     if let Some(free) = body.items().filter(|items| items.accepts("object")) {
-        for (key, inner) in free.properties() {
-            let is_required = free.required().any(|name| name == key);
+        let alternatives = free.alternatives();
+        let values = alternatives.into_iter().find(|one| one.accepts("object")).unwrap_or(free);
+        for (key, inner) in values.properties() {
+            let is_required = values.required().any(|name| name == key);
             keys.push(Key { name: key, schema: inner, branch: None, is_required });
         }
-        meaning.push_str(&format!(" Each: [{path}.\"name\"] or \"name\" = {{ .. }}."));
+        let other =
+            if free.accepts("array") { "\"name\" = [..]".to_owned() } else { format!("[{path}.\"name\"]") };
+        meaning.push_str(&format!(" Each: {other} or \"name\" = {{ .. }}."));
     }
     all.insert(at, Table { path: path.to_owned(), several, keys, meaning });
 }
@@ -294,7 +298,8 @@ pub(super) fn kind(schema: Schema) -> String {
         if !tables.is_empty() {
             kinds.push(format!("a table with one of {}", tables.join(", ")));
         }
-        kinds.extend(alternatives.iter().filter(|one| one.accepts("array")).map(|one| kind(*one)));
+        let plain = |one: &&Schema| one.accepts("array") || one.accepts("object") && one.tag().is_none();
+        kinds.extend(alternatives.iter().filter(plain).map(|one| kind(*one)));
         return kinds.join(" or ");
     }
     if schema.text("format") == Some("expression") {
@@ -315,7 +320,9 @@ pub(super) fn kind(schema: Schema) -> String {
         ("string", "a string"),
         ("boolean", "true or false"),
     ];
-    plain.iter().find(|(name, _)| schema.accepts(name)).map_or("a value", |(_, words)| words).into()
+    let accepted: Vec<&str> =
+        plain.iter().filter(|(name, _)| schema.accepts(name)).map(|(_, words)| *words).collect();
+    if accepted.is_empty() { "a value".into() } else { accepted.join(" or ") }
 }
 
 /// The range of a number, in words.

@@ -117,7 +117,15 @@ impl Schema {
     /// The tables of which exactly one is allowed, each with its name and the schema of the alternative.
     pub(crate) fn tagged(&self) -> Vec<(&'static str, Schema)> {
         let branches = self.alternatives().into_iter();
-        branches.filter_map(|branch| Some((branch.get("required")[0].as_str()?, branch))).collect()
+        branches.filter_map(|branch| Some((branch.tag()?, branch))).collect()
+    }
+
+    /// The name of the table if this schema is an alternative in a choice between tables.
+    pub(crate) fn tag(&self) -> Option<&'static str> {
+        match &self.get("required").as_array()?[..] {
+            [only] if self.alternatives().is_empty() => only.as_str(),
+            _ => None,
+        }
     }
 
     /// The keys of a table.

@@ -32,7 +32,7 @@ impl Walk<'_> {
         let kind = json_kind(&node.value);
         let other = alternatives
             .iter()
-            .find(|one| one.get("const").is_null() && one.tagged_name().is_none() && one.accepts(kind));
+            .find(|one| one.get("const").is_null() && one.tag().is_none() && one.accepts(kind));
         match (&node.value, other) {
             (Value::Text(word), _) if words.contains(&word.as_str()) => {}
             (_, Some(other)) => self.value(node, *other, path),
@@ -76,10 +76,10 @@ impl Walk<'_> {
 
     /// Checks a key whose name is free.
     fn free_key(&mut self, child: &Node, free: Schema, schema: Schema, path: &str) {
-        let split = matches!(&child.value, Value::Table(inner) if inner.values().any(|node| matches!(node.value, Value::Table(_))));
+        let split = matches!(&child.value, Value::Table(inner) if inner.values().any(|node| matches!(node.value, Value::Table(_) | Value::Array(_))));
         match schema.text("key_help").filter(|_| split) {
             Some(help) => {
-                let message = format!("`{path}` is not a quantity by itself");
+                let message = format!("`{path}` is not a complete name");
                 self.faults.push(Fault::new(child.key.clone(), message, "").help(help));
             }
             None => self.value(child, free, path),
@@ -272,13 +272,6 @@ impl Walk<'_> {
             _ => {}
         }
         self.faults.push(fault);
-    }
-}
-
-impl Schema {
-    /// The name of the table if this schema is an alternative in a choice between tables.
-    fn tagged_name(&self) -> Option<&'static str> {
-        self.get("required").get(0).and_then(|name| name.as_str()).filter(|_| self.alternatives().is_empty())
     }
 }
 

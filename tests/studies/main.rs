@@ -12,4 +12,5 @@ mod results;
 mod scene;
 mod side_by_side;
 mod steps;
+mod sweeps;
 mod table_1;

@@ -67,6 +67,24 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             ),
             "probes.csv has no column `velocity_z`",
         ),
+        (
+            "[sweep]\n\"time.step\" = { from = 1, to = 1, draws = 2 }\n".into(),
+            "`time.step` has no values from 1 to 1",
+        ),
+        (
+            "[sweep]\na = { from = 0, to = 1, draws = 2 }\nb = { from = 0, to = 1, draws = 3 }\n".into(),
+            "`b` has 3 draws, but `a` has 2",
+        ),
+        (
+            "[sweep]\na = { from = 0, to = 1, draws = 50000 }\nb = [1, 2]\n".into(),
+            "the study has 100000 runs",
+        ),
+        (format!("{run}[[response]]\nof = \"probe.tip.velocity_y\"\n"), "no probe is called `tip`"),
+        (
+            format!("{run}[[response]]\nof = \"profile.left.max.x\"\n"),
+            "the base job has no profile along `left`",
+        ),
+        (format!("{run}[[response]]\nof = \"history.max.work\"\n"), "`history.max.work` is not a quantity"),
     ];
     for (study, words) in cases {
         let text = refused(&study);
@@ -97,6 +115,30 @@ fn a_run_whose_job_is_refused_is_named_with_the_fault() {
     assert!(text.contains("the job of run long step 5 is refused"), "{text}");
     assert!(text.contains("the step is longer than the whole run"), "{text}");
     assert!(text.contains("did you mean `step`?"), "{text}");
+}
+
+#[test]
+fn keys_and_values_of_a_sweep_are_refused_with_their_place() {
+    let text = refused("[sweep]\ntime.step = [0.1]\ncells = []\nseed = 1\n\"a\" = { from = 0, draws = 0 }\n");
+    for words in [
+        "`sweep.time` is not a complete name",
+        "quote the whole key",
+        "`sweep.cells` has 0 items",
+        "`sweep.seed` must be a list of items, each a number or a string or true or false or a table",
+        "missing key `to` in [sweep.a]",
+        "`sweep.a.draws` is out of range",
+    ] {
+        assert!(text.contains(words), "{words} is not in {text}");
+    }
+    let steps: Vec<String> = (2..10).map(|step| format!("{step}.5")).collect();
+    let text = refused(&format!("[sweep]\n\"time.step\" = [{}]\n", steps.join(", ")));
+    assert!(text.contains("the job of run step-2.5 is refused"), "{text}");
+    assert!(
+        text.contains("the step is longer than the whole run") && text.contains("3 more runs are refused"),
+        "{text}"
+    );
+    let text = refused("[sweep]\n\"material.densty\" = [1.0]\n");
+    assert!(text.contains("did you mean `density`?"), "{text}");
 }
 
 #[test]

@@ -170,6 +170,7 @@ fn studies_of_the_repository_load() {
     }
     names.sort();
     let known = [
+        ("belt_friction", 5),
         ("graded_corners", 8),
         ("solver_tolerance", 18),
         ("wang_cheng_honest_reference", 63),
@@ -185,6 +186,9 @@ fn every_key_of_a_study_is_described() {
     let text = describe(None).expect("described");
     for part in [
         "[[run]]",
+        "[sweep]",
+        "Each: \"name\" = [..] or \"name\" = { .. }.",
+        "draws: a whole number; at least 1; required",
         "[reference.exact]",
         "[[norm]]",
         "expected_order",

@@ -189,6 +189,7 @@ fn run(
     mut loaded: Loaded,
     say: &dyn Fn(&str),
 ) -> Result<Option<Record>> {
+    loaded.job.output.profile.clear();
     remove_unused_output(&mut loaded.job, &folder(plan).join(name));
     loaded.job.output.fields = None;
     let job = &loaded.job;
@@ -199,6 +200,7 @@ fn run(
         scheme: job.time.scheme,
         tolerance: job.solver.tolerance,
         set: Vec::new(),
+        swept: Vec::new(),
         adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
         is_side_by_side: false,
         loaded,

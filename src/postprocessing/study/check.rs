@@ -1,21 +1,24 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
-use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study};
+use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
 use crate::job::{Document, Job};
 
 /// The most runs of a study.
 const MOST_RUNS: usize = 1000;
 
-/// Checks the keys of the study against each other and against its base job; `products` is the number of runs of [product].
-pub(super) fn check(study: &Study, base: &Job, products: usize, document: &mut Document) {
-    let count = study.run.len() + products;
+/// Checks the keys of the study against each other and against its base job; `derived` is the number of runs
+/// of [product] and [sweep].
+pub(super) fn check(study: &Study, base: &Job, derived: usize, document: &mut Document) {
+    let count = study.run.len().saturating_add(derived);
     if count == 0 {
-        document.fault("", "the study has no runs", "add [[run]] tables, or lists in [product]");
+        document.fault("", "the study has no runs", "add [[run]] tables, or lists in [product] or [sweep]");
     }
     if count > MOST_RUNS {
-        document.fault("product", format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
+        let place = if study.sweep.is_empty() { "product" } else { "sweep" };
+        document.fault(place, format!("the study has {count} runs"), format!("at most {MOST_RUNS}"));
     }
     check_cells(study, base, document);
+    check_sweep(study, document);
     if study.compare.split
         && (base.dimension().is_none() || !matches!(study.reference, Some(Reference::Run(_))))
     {
@@ -39,13 +42,12 @@ pub(super) fn check(study: &Study, base: &Job, products: usize, document: &mut D
             let message = format!("a {:?} has no norm in {:?}", norm.of, norm.space).to_lowercase();
             document.fault(&format!("norm.{index}.in"), message, help);
         }
-        if !norm.published.is_empty() && (norm.published.len() != study.run.len() || study.product.is_some())
-        {
+        if !norm.published.is_empty() && (norm.published.len() != study.run.len() || derived > 0) {
             let message = format!("{} published errors for {count} runs", norm.published.len());
             document.fault(
                 &format!("norm.{index}.published"),
                 message,
-                "give one for each [[run]], and no [product]",
+                "give one for each [[run]], and no [product] or [sweep]",
             );
         }
         if let Some(Reference::Exact(exact)) = &study.reference {
@@ -58,6 +60,27 @@ pub(super) fn check(study: &Study, base: &Job, products: usize, document: &mut D
     }
     for index in 0..study.probe.len() {
         check_probe(study, base, index, document);
+    }
+    for index in 0..study.response.len() {
+        check_response(study, base, index, document);
+    }
+}
+
+fn check_sweep(study: &Study, document: &mut Document) {
+    let mut first: Option<(&str, u32)> = None;
+    for (key, values) in &study.sweep {
+        let Values::Draws(draws) = values else { continue };
+        if draws.from >= draws.to {
+            let message = format!("`{key}` has no values from {} to {}", draws.from, draws.to);
+            document.fault("sweep", message, "`from` must be below `to`");
+        }
+        match first {
+            Some((other, count)) if count != draws.draws => {
+                let message = format!("`{key}` has {} draws, but `{other}` has {count}", draws.draws);
+                document.fault("sweep", message, "keys with random values are drawn together");
+            }
+            _ => first = Some((key.as_str(), draws.draws)),
+        }
     }
 }
 
@@ -118,17 +141,56 @@ fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &m
     }
 }
 
+/// Checks that the quantity is one of a known form, and that the base job has its probe or profile.
+fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
+    let name = &study.response[index].of;
+    let path = format!("response.{index}.of");
+    let has_form = match name.split('.').collect::<Vec<_>>()[..] {
+        ["probe", probe, _] | ["probe", probe, "max" | "min", _] => {
+            check_probe_name(base, probe, &path, document);
+            true
+        }
+        ["profile", boundary, "max" | "min" | "first", _] => {
+            let names: Vec<&str> = base.output.profile.iter().map(|profile| profile.on.as_str()).collect();
+            if !names.contains(&boundary) {
+                let message = format!("the base job has no profile along `{boundary}`");
+                document.fault(&path, message, listed(&names, "profiles: add [[output.profile]] to it"));
+            }
+            true
+        }
+        ["history", _] | ["resultant", _, _] => true,
+        ["probe" | "profile" | "history" | "resultant", ..] => false,
+        ref parts => parts.iter().all(|part| !part.is_empty()),
+    };
+    if !has_form {
+        let help = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
+                    resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also .min., of profiles .first.)";
+        document.fault(&path, format!("`{name}` is not a quantity"), help);
+    }
+    if study.response[..index].iter().any(|other| other.of == *name) {
+        document.fault(&path, format!("`{name}` is given twice"), "delete one of them");
+    }
+}
+
+fn check_probe_name(base: &Job, name: &str, path: &str, document: &mut Document) {
+    let names: Vec<&str> = base.output.probe.iter().map(|probe| probe.name.as_str()).collect();
+    if !names.contains(&name) {
+        let help = listed(&names, "probes: add [[output.probe]] to it");
+        document.fault(path, format!("no probe is called `{name}`"), help);
+    }
+}
+
+/// The names, or what the base job lacks.
+fn listed(names: &[&str], lacks: &str) -> String {
+    if names.is_empty() {
+        return format!("the base job has no {lacks}");
+    }
+    format!("the base job has: {}", names.join(", "))
+}
+
 fn check_probe(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let ProbeError { name, value, .. } = &study.probe[index];
-    if !base.output.probe.iter().any(|probe| probe.name == *name) {
-        let names: Vec<&str> = base.output.probe.iter().map(|probe| probe.name.as_str()).collect();
-        let help = if names.is_empty() {
-            "the base job has no probes: add [[output.probe]] to it".to_owned()
-        } else {
-            format!("the base job has: {}", names.join(", "))
-        };
-        document.fault(&format!("probe.{index}.name"), format!("no probe is called `{name}`"), help);
-    }
+    check_probe_name(base, name, &format!("probe.{index}.name"), document);
     let axes = &["x", "y", "z"][..base.dimension().unwrap_or(3)];
     let column = |field: &str| value.strip_prefix(field).is_some_and(|axis| axes.contains(&axis));
     let path = format!("probe.{index}.value");

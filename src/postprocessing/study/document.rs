@@ -9,9 +9,10 @@ use crate::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::{path::PathBuf, sync::LazyLock};
+use std::{collections::BTreeMap, path::PathBuf, sync::LazyLock};
 
-/// A study: a job that is run on several meshes, with several steps and schemes, and compared with a reference.
+/// A study: a job that is run on several meshes, with several steps, schemes and values of other keys, and compared with a
+/// reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
@@ -25,7 +26,15 @@ pub struct Study {
     pub run: Vec<Run>,
     /// Runs for all combinations of the values in lists. They follow the runs of [[run]].
     pub product: Option<Product>,
-    /// The solution with which runs are compared. Absent: runs are timed only.
+    /// Runs of the base job with other values of its keys: every combination of the listed values, and random draws. They follow the
+    /// runs of [product].
+    #[serde(default)]
+    #[schemars(extend("key_help" = "quote the whole key: \"time.step\" = [0.1, 0.2]"))]
+    pub sweep: BTreeMap<String, Values>,
+    /// Quantities that responses.csv and a table show for each run, and charts over each key of a sweep that has numbers.
+    #[serde(default)]
+    pub response: Vec<Response>,
+    /// The solution with which runs are compared. Absent: runs are timed only, and contain the fields of their last state only.
     pub reference: Option<Reference>,
     /// The times at which runs are compared with the reference.
     #[serde(default)]
@@ -122,6 +131,69 @@ pub struct Product {
     /// Tolerances of the solver, from loose to tight. They show from which tolerance on the solver's error affects the results.
     #[schemars(transform = positive_items, example = [1e-4, 1e-7, 1e-10])]
     pub tolerances: Vec<f64>,
+}
+
+/// The values of a key of the job, as with --set; the entries of lists are keys, too: "traction.0.value.1".
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Values {
+    /// A list of values.
+    List(#[schemars(length(min = 1))] Vec<SweptValue>),
+    /// Random values with equal probability between two bounds.
+    Draws(Draws),
+}
+
+/// A value of a key.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(inline, extend("type" = ["number", "string", "boolean", "array"]))]
+pub struct SweptValue(#[schemars(with = "bool")] pub toml::Value);
+
+impl SweptValue {
+    /// The value, if it is a number.
+    pub fn number(&self) -> Option<f64> {
+        self.0.as_float().or(self.0.as_integer().map(|number| number as f64))
+    }
+
+    /// The value as text, without quotes.
+    pub fn text(&self) -> String {
+        self.0.as_str().map_or_else(|| self.0.to_string(), str::to_owned)
+    }
+}
+
+/// Random values with equal probability between two bounds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Draws {
+    /// The lower bound, in the unit of the key.
+    #[schemars(example = 0.1)]
+    pub from: f64,
+    /// The upper bound, in the unit of the key.
+    #[schemars(example = 0.4)]
+    pub to: f64,
+    /// Number of draws. Keys with random values are drawn together and have the same number.
+    #[schemars(range(min = 1), example = 8)]
+    pub draws: u32,
+    /// The seed. The same seed and key give the same values; more draws are appended.
+    #[serde(default)]
+    pub seed: u32,
+}
+
+/// A quantity that is shown for each run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Response {
+    /// A quantity named as in [check] of a job: a number of summary.json such as "max_von_mises", or history.COLUMN,
+    /// probe.NAME.COLUMN, probe.NAME.max.COLUMN, resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN; .min. and, of profiles, .first. in place of .max. Probes and profiles are those
+    /// of the base job.
+    #[schemars(length(min = 1), example = "probe.tip.displacement_y")]
+    pub of: String,
+}
+
+impl Response {
+    /// Whether the quantity is of the profile along this boundary.
+    pub fn is_on(&self, boundary: &str) -> bool {
+        self.of.strip_prefix("profile.").and_then(|rest| rest.split('.').next()) == Some(boundary)
+    }
 }
 
 /// Number of cells along each axis.
@@ -265,8 +337,9 @@ pub struct Timing {
     pub repetitions: u32,
     /// The repetition whose wall time is used.
     pub take: Take,
-    /// Ranks of each run. A study on more ranks executes as many runs side by side as fit; surplus ranks are shared among them. Wall
-    /// times then include the disturbance by the other runs. The reference uses all ranks. Absent: each run uses all ranks.
+    /// Ranks of each run. A study on more ranks executes as many runs side by side as fit, and shares surplus ranks among them; wall
+    /// times then include the disturbance by the other runs. The reference uses all ranks. Absent: all ranks, but 1 for runs of
+    /// [sweep].
     #[schemars(range(min = 1), example = 1)]
     pub ranks: Option<u32>,
 }
@@ -319,8 +392,8 @@ static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(schema_of::<Study>);
 
 const OPENING: &str = "\
 A study is a TOML file with the tables below; run it with solver study STUDY.toml. It runs a job on several meshes, with
-several steps and schemes, and measures the errors with respect to a reference and the computing time. Paths are relative
-to the study file.
+several steps and schemes, and measures the errors with respect to a reference and the computing time; or it runs a job
+with several values of its keys and collects the results. Paths are relative to the study file.
 
 ";
 

@@ -1,4 +1,4 @@
-//! Studies of accuracy and cost: a job on several meshes, with several steps and schemes, compared with a reference.
+//! Studies: a job on several meshes, with several steps and schemes, compared with a reference; sweeps over any keys of a job.
 //!
 //! Every run is an ordinary run in its own folder; a restarted study uses the finished runs. Each rank reads the complete fields of
 //! a run and of the reference and integrates over its part of the cells.
@@ -17,18 +17,22 @@ mod overlap;
 mod part;
 mod plan;
 mod plot;
+mod quantity;
 mod record;
+mod responses;
 mod results;
 mod side_by_side;
 mod split;
 mod squares;
 mod stored;
+mod sweep;
 mod table;
 mod targets;
 mod write;
 
 pub use part::Part;
 pub use plan::Plan;
+pub use quantity::quantity;
 pub use results::Results;
 
 use crate::{
@@ -165,6 +169,8 @@ fn assembled(
         source: study.about.reference.clone(),
         notes: study.about.notes.clone(),
         reference: None,
+        sweep: study.sweep.keys().cloned().collect(),
+        response: study.response.iter().map(|response| response.of.clone()).collect(),
         norms: table::norms(study),
         runs: plan.runs.iter().zip(ran).map(|(planned, ran)| result(planned, ran, take)).collect(),
         tolerances: Vec::new(),
@@ -179,6 +185,7 @@ fn assembled(
         run.error = added.err().map(|error| error.to_string());
         run.errors.resize(results.norms.len(), None);
     }
+    responses::add(session, plan, &mut results);
     split::add_parts(session, plan, ran, on_meshes, &mut results)?;
     convergence::add_orders(plan, ran, &mut results);
     convergence::add_published(plan, ran, &mut results);
@@ -197,6 +204,8 @@ fn result(planned: &Planned, ran: &Ran, take: Take) -> RunResult {
         adaptive: planned.adaptive,
         tolerance: planned.tolerance,
         set: planned.set.clone(),
+        sweep: planned.swept.clone(),
+        response: Vec::new(),
         status: record.status.clone(),
         error: record.error.clone(),
         notes: Vec::new(),

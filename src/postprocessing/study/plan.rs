@@ -2,8 +2,9 @@
 
 use super::{
     check::check,
-    document::{Product, Reference, Run, Study, kind},
+    document::{Product, Reference, Run, Study, SweptValue, kind},
     exact::ExactFields,
+    sweep::{self, Member},
 };
 use crate::{
     error::{Error, Result},
@@ -11,6 +12,8 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
+/// The most refused runs that are shown.
+const MOST_REFUSALS: usize = 5;
 /// Tolerance in tests for integer multiples.
 const WHOLE: f64 = 1e-6;
 
@@ -29,6 +32,8 @@ pub struct Planned {
     pub tolerance: f64,
     /// Further overrides.
     pub set: Vec<String>,
+    /// For a run of the sweep, a value for each key of the sweep.
+    pub swept: Vec<SweptValue>,
     /// Tolerance of adaptive steps.
     pub adaptive: Option<f64>,
     /// Whether it may run beside others, on a part of the ranks; then any number of ranks counts as the same run.
@@ -74,22 +79,25 @@ impl Plan {
         let (study, root, texts) = document.fill::<Study>()?;
         let mut document = Document { root, texts, faults: Vec::new() };
         let base = Job::load_coloured(&normal(&folder.join(&study.base.job)), &study.base.set, colour)?;
-        check(&study, &base.job, products(study.product.as_ref()).len(), &mut document);
+        let derived = products(study.product.as_ref()).len().saturating_add(sweep::count(&study.sweep));
+        check(&study, &base.job, derived, &mut document);
         let (study, ..) = document.fill::<Study>()?;
 
         let name = path.file_stem().map_or("study".into(), |stem| stem.to_string_lossy().into_owned());
         let below = study.output.folder.clone().unwrap_or_else(|| Path::new("out").join(&name));
         let output = normal(&folder.join(below));
-        let job =
-            Source { file: normal(&folder.join(&study.base.job)), set: &study.base.set, base: &base.job };
-        let wanted: Vec<Run> = study.run.iter().cloned().chain(products(study.product.as_ref())).collect();
+        let job = Source { file: normal(&folder.join(&study.base.job)), study: &study, base: &base.job };
+        let plain = study.run.iter().cloned().chain(products(study.product.as_ref()));
+        let plain = plain.map(|run| Member { run, values: Vec::new() });
+        let wanted = plain.chain(sweep::members(&study.sweep));
         let mut taken = vec!["reference".to_owned()];
         let mut refusals = Vec::new();
         let mut runs = Vec::new();
-        let is_side_by_side = study.timing.ranks.is_some();
-        for run in &wanted {
-            match job.planned(run, None, &output, &mut taken) {
-                Ok(planned) => runs.push(Planned { is_side_by_side, ..planned }),
+        let has_groups = study.timing.ranks.is_some();
+        for Member { run, values } in wanted {
+            let is_side_by_side = has_groups || !values.is_empty();
+            match job.planned(&run, None, &output, &mut taken) {
+                Ok(planned) => runs.push(Planned { swept: values, is_side_by_side, ..planned }),
                 Err(error) => refusals.push(error.to_string()),
             }
         }
@@ -120,6 +128,10 @@ impl Plan {
             refusals.push(format!("[pictures] names {unknown}, but the runs are {names}"));
         }
         if !refusals.is_empty() {
+            if let Some(more) = refusals.len().checked_sub(MOST_REFUSALS).filter(|more| *more > 0) {
+                refusals.truncate(MOST_REFUSALS);
+                refusals.push(format!("{more} more runs are refused"));
+            }
             return Err(Error::Refused(refusals.join("\n\n")));
         }
         let mut plan = Self { study, name, folder: output, base, runs, reference, split };
@@ -129,6 +141,10 @@ impl Plan {
 
     /// Sets the output times: every run writes its fields at the times of comparison, the reference at all of these times.
     fn choose_times(&mut self) -> Result<()> {
+        if self.reference.is_none() {
+            self.runs.iter_mut().for_each(|run| run.loaded.job.output.fields = None);
+            return Ok(());
+        }
         let mut faults = Vec::new();
         let interval = self.study.compare.interval;
         let mut spacings = Vec::new();
@@ -187,7 +203,7 @@ fn greatest_common_divisor(a: u64, b: u64) -> u64 {
 /// The data from which runs are derived.
 struct Source<'a> {
     file: PathBuf,
-    set: &'a [String],
+    study: &'a Study,
     base: &'a Job,
 }
 
@@ -199,7 +215,7 @@ impl Source<'_> {
         output: &Path,
         taken: &mut Vec<String>,
     ) -> Result<Planned> {
-        let mut overrides = self.set.to_vec();
+        let mut overrides = self.study.base.set.clone();
         if let Some(cells) = &run.cells {
             let kind = if matches!(self.base.mesh.source, MeshSource::Box(_)) { "box" } else { "rectangle" };
             overrides.push(format!("mesh.{kind}.cells={cells:?}"));
@@ -232,6 +248,8 @@ impl Source<'_> {
             }
             taken.push(name.clone());
         }
+        let shown = |boundary: &str| self.study.response.iter().any(|response| response.is_on(boundary));
+        job.output.profile.retain(|profile| shown(&profile.on));
         remove_unused_output(job, &output.join("runs").join(&name));
         Ok(Planned {
             cells,
@@ -239,6 +257,7 @@ impl Source<'_> {
             scheme: job.time.scheme,
             tolerance: job.solver.tolerance,
             set: run.set.clone(),
+            swept: Vec::new(),
             adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
             is_side_by_side: false,
             name,
@@ -289,7 +308,6 @@ fn cells_name(cells: &[u32]) -> String {
 /// Removes output that a study does not use, and sets the output folder of the run.
 pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.output.folder = Some(folder.to_owned());
-    job.output.profile.clear();
     job.output.profiles = None;
     job.checkpoint = None;
     job.check.clear();

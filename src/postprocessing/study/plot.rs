@@ -1,12 +1,14 @@
-//! Pictures of a study: error against wall time and against unknowns times steps, errors over time, errors on the body.
+//! Pictures of a study: error against wall time and against unknowns times steps, errors over time, errors on the body, responses
+//! over the keys of a sweep.
 //!
 //! Each mark is a run. A line joins those runs of a scheme that are more accurate than all cheaper runs of the scheme.
 
 use super::{
-    document::{Quantity, Space},
+    document::{Quantity, Space, Values},
     measure::Place,
     plan::Plan,
     results::{NormResult, Results, RunResult},
+    sweep::short,
 };
 use crate::{
     error::Result,
@@ -16,9 +18,12 @@ use crate::{
         chart::{Axis, Chart, Look, Series},
         colour::{LINES, VIRIDIS},
         picture::Picture,
-        scale::{number, size},
+        scale::{extent, number, size},
     },
 };
+
+/// Ratio of the values of a swept key from which its axis is logarithmic.
+const WIDE: f64 = 100.0;
 
 /// Cost and error of a run.
 type Point = [f64; 2];
@@ -40,6 +45,7 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
         pictures.extend(over_time(plan, results, at, norm, of)?);
         pictures.extend(on_the_body(plan, results, at, norm, of)?);
     }
+    pictures.extend(responses(plan, results)?);
     Ok(pictures)
 }
 
@@ -116,6 +122,77 @@ fn front(points: &[Point]) -> Vec<Point> {
         better
     });
     sorted
+}
+
+/// A chart of each response over each key of the sweep whose values are different numbers. Listed values of the other keys make a line
+/// each, if there are not too many; random draws are dots.
+fn responses(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
+    let is_drawn = |key: &String| matches!(plan.study.sweep.get(key), Some(Values::Draws(_)));
+    let mut pictures = Vec::new();
+    for (position, key) in results.sweep.iter().enumerate() {
+        let others: Vec<usize> =
+            (0..results.sweep.len()).filter(|at| *at != position && !is_drawn(&results.sweep[*at])).collect();
+        let look = if results.sweep.iter().any(is_drawn) { Look::Dots } else { Look::Dotted };
+        for (at, name) in results.response.iter().enumerate() {
+            let mut curves: Vec<Curve> = Vec::new();
+            for run in results.runs.iter().filter(|run| !run.sweep.is_empty()) {
+                let point = run.sweep[position].number().zip(run.response.get(at).copied().flatten());
+                let Some((x, y)) = point.filter(|(x, y)| x.is_finite() && y.is_finite()) else { continue };
+                let value =
+                    |other: &usize| format!("{} {}", short(&results.sweep[*other]), run.sweep[*other].text());
+                let line = others.iter().map(value).collect::<Vec<_>>().join(", ");
+                match curves.iter_mut().find(|curve| curve.name == line) {
+                    Some(curve) => curve.points.push([x, y]),
+                    None => curves.push(Curve { name: line, points: vec![[x, y]] }),
+                }
+            }
+            pictures.extend(response(results, [key, name], curves, look)?);
+        }
+    }
+    Ok(pictures)
+}
+
+/// A chart of a response over a key; `None` if there are no two different values of the key.
+fn response(
+    results: &Results,
+    [key, name]: [&String; 2],
+    mut curves: Vec<Curve>,
+    look: Look,
+) -> Result<Option<Picture>> {
+    let all = || curves.iter().flat_map(|curve| &curve.points);
+    let range = |axis: usize| extent(all().map(|point| point[axis]));
+    let (Some(keys), Some(values)) = (range(0), range(1)) else { return Ok(None) };
+    if keys.0 == keys.1 {
+        return Ok(None);
+    }
+    let look = if curves.len() > LINES.len() {
+        let points = all().copied().collect();
+        curves = vec![Curve { name: String::new(), points }];
+        Look::Dots
+    } else {
+        look
+    };
+    let words = format!(
+        "{name} over {key}: from {} to {} for {key} from {} to {}",
+        size(values.0),
+        size(values.1),
+        size(keys.0),
+        size(keys.1)
+    );
+    let series = curves.into_iter().enumerate().map(|(place, mut curve)| {
+        curve.points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Series::new(place, curve.name, look, curve.points)
+    });
+    let [x, y] = [key, name].map(|quantity| Axis { quantity, unit: "" });
+    let is_wide = keys.0 > 0.0 && keys.1 >= WIDE * keys.0;
+    let chart = Chart { logarithmic_x: is_wide, ..Chart::new(x, y, series.collect()) };
+    let over = if results.sweep.len() > 1 { format!("-over-{}", short(key)) } else { String::new() };
+    Ok(Some(Picture::new(
+        &format!("response-{name}{over}"),
+        format!("Chart of {words}"),
+        format!("{words}."),
+        chart.svg()?,
+    )))
 }
 
 fn unit(of: Option<(Quantity, Space)>) -> &'static str {

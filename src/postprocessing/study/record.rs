@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, io::Read, path::Path};
 use xxhash_rust::xxh3::Xxh3;
 
+/// Files from which errors and responses are computed.
+const RESULTS: [&str; 6] =
+    ["fields.vtkhdf", "probes.csv", "profiles.csv", "resultants.csv", "history.csv", "summary.json"];
 /// Name of the file in the folder of the run.
 const FILE: &str = "run.json";
 
@@ -34,7 +37,7 @@ pub(super) struct Record {
     pub effects: Vec<String>,
     /// Wall seconds of each repetition.
     pub seconds: Vec<Seconds>,
-    /// Digests of the files from which errors are computed.
+    /// Digests of the files from which errors and responses are computed.
     pub files: BTreeMap<String, String>,
 }
 
@@ -133,7 +136,7 @@ impl Record {
 
     /// Marks the run as finished and stores the digests of its files.
     pub(super) fn complete(&mut self, folder: &Path) -> Result<()> {
-        for name in ["fields.vtkhdf", "probes.csv"] {
+        for name in RESULTS {
             if folder.join(name).exists() {
                 self.files.insert(name.into(), file_digest(&folder.join(name))?);
             }

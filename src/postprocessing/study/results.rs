@@ -1,6 +1,7 @@
 //! The results of a study: the object in `study.json`, from which all tables are generated.
 
 use super::{
+    document::SweptValue,
     measure::{Measured, Place},
     orders::Refined,
     record::{Counts, Seconds},
@@ -22,6 +23,10 @@ pub struct Results {
     pub notes: Vec<String>,
     /// The reference run; absent for an exact solution or no reference.
     pub reference: Option<RunResult>,
+    /// Keys of the sweep.
+    pub sweep: Vec<String>,
+    /// Names of the quantities shown for each run.
+    pub response: Vec<String>,
     /// Norms, then probes.
     pub norms: Vec<NormResult>,
     /// The runs, in the order of the study.
@@ -62,6 +67,10 @@ pub struct RunResult {
     pub tolerance: f64,
     /// Further overrides.
     pub set: Vec<String>,
+    /// For a run of the sweep, a value for each of its keys; empty for other runs.
+    pub sweep: Vec<SweptValue>,
+    /// One value for each response; null if the run has no such quantity.
+    pub response: Vec<Option<f64>>,
     /// `completed` or `failed`.
     pub status: String,
     /// The reason why it failed or could not be compared.

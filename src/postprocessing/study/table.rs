@@ -4,6 +4,7 @@ use super::{
     document::{Norm, Over, ProbeError, Quantity, Space, Study},
     results::{ErrorResult, NormResult, Results, RunResult},
 };
+use crate::postprocessing::drawing::scale::number;
 
 /// A table with a title and lines below it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -122,6 +123,7 @@ fn meaning(norm: &Norm) -> String {
 /// All tables of the results, in the order in which they are read.
 pub(super) fn all(results: &Results) -> Vec<Table> {
     let mut tables: Vec<Table> = (0..results.norms.len()).map(|norm| errors(results, norm)).collect();
+    tables.extend(responses(results));
     tables.extend(targets(results));
     tables.push(costs(results));
     if !results.tolerances.is_empty() {
@@ -196,6 +198,29 @@ fn refined(results: &Results, norm: usize) -> Vec<&'static str> {
     found.sort();
     found.dedup();
     found.into_iter().map(|refined| refined.symbol()).collect()
+}
+
+/// The responses of all runs.
+fn responses(results: &Results) -> Option<Table> {
+    let mut header = vec!["run"];
+    header.extend(results.sweep.iter().chain(&results.response).map(String::as_str));
+    let mut table = Table::new("Responses   [in the SI units of the quantities]", &header);
+    for run in &results.runs {
+        let mut row = vec![run.name.clone()];
+        for at in 0..results.sweep.len() {
+            row.push(
+                run.sweep
+                    .get(at)
+                    .map_or("-".into(), |value| value.number().map_or_else(|| value.text(), number)),
+            );
+        }
+        let lacks = if run.status == "completed" { "-" } else { "failed" };
+        row.extend(
+            run.response.iter().map(|value| value.map_or(lacks.into(), |value| format!("{value:.6e}"))),
+        );
+        table.rows.push(row);
+    }
+    (!results.response.is_empty()).then_some(table)
 }
 
 /// For each norm the cost of its target errors, with one row per target and scheme.

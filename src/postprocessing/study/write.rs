@@ -1,4 +1,4 @@
-//! The files of a study: `study.json`, `study.csv`, `study.md`, `errors.csv` and the pictures.
+//! The files of a study: `study.json`, `study.csv`, `study.md`, `errors.csv`, `responses.csv` and the pictures.
 
 use super::{orders::Refined, plan::Plan, plot, results::Results, table};
 use crate::{
@@ -22,6 +22,9 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<()> {
     write(&folder.join("study.json"), (json + "\n").as_bytes())?;
     write(&folder.join("study.csv"), csv(results).as_bytes())?;
     write(&folder.join("errors.csv"), over_time(results).as_bytes())?;
+    if !results.response.is_empty() {
+        write(&folder.join("responses.csv"), responses(results).as_bytes())?;
+    }
     let pictures = plot::all(plan, results)?;
     for picture in &pictures {
         write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
@@ -45,6 +48,29 @@ fn over_time(results: &Results) -> String {
         }
     }
     out
+}
+
+/// `responses.csv`: a row for each run.
+fn responses(results: &Results) -> String {
+    let header = ["run"].into_iter().chain(results.sweep.iter().map(String::as_str));
+    let header = header.chain(["status"]).chain(results.response.iter().map(String::as_str));
+    let mut out = line(header.map(str::to_owned));
+    for run in &results.runs {
+        let swept =
+            (0..results.sweep.len()).map(|at| run.sweep.get(at).map_or(String::new(), |value| value.text()));
+        let values = run.response.iter().map(|value| number(*value));
+        out += &line([run.name.clone()].into_iter().chain(swept).chain([run.status.clone()]).chain(values));
+    }
+    out
+}
+
+/// A line of a CSV file; fields with separators are quoted.
+fn line(fields: impl Iterator<Item = String>) -> String {
+    let quoted = fields.map(|field| match field.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", field.replace('"', "\"\"")),
+        false => field,
+    });
+    quoted.collect::<Vec<_>>().join(",") + "\n"
 }
 
 /// A row for each run and norm; a run without errors has one row.
@@ -132,4 +158,15 @@ fn markdown(results: &Results, pictures: &[Picture]) -> String {
     }
     out.push_str(&format!("Solver {}, {} rank(s).\n", results.version, results.ranks));
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_with_separators_are_quoted() {
+        let fields = ["a", "if(t<1,2,3)", "\"x\""].map(str::to_owned);
+        assert_eq!(line(fields.into_iter()), "a,\"if(t<1,2,3)\",\"\"\"x\"\"\"\n");
+    }
 }

@@ -1,0 +1,84 @@
+//! Responses: quantities of the finished runs.
+
+use super::{plan::Plan, quantity::quantity, results::Results};
+use crate::{laws::nearest::nearest, parallel::session::Session};
+use std::path::Path;
+
+/// Adds the responses of the completed runs; a quantity that a run does not have is an error of this run. Collective.
+pub(super) fn add(session: &Session, plan: &Plan, results: &mut Results) {
+    let names = results.response.clone();
+    // For each response of each run, whether it exists and its value; zeros on all ranks but the first.
+    let mut found = vec![0.0; 2 * names.len() * results.runs.len()];
+    let place = |run: usize, name: usize| 2 * (run * names.len() + name);
+    let folders: Vec<&Path> = plan.runs.iter().map(|planned| planned.loaded.job.output_folder()).collect();
+    for (at, run) in results.runs.iter().enumerate() {
+        for (name, response) in names.iter().enumerate() {
+            let here = session.is_first() && run.status == "completed";
+            if let Some(value) = here.then(|| quantity(folders[at], response)).flatten() {
+                found[place(at, name)] = 1.0;
+                found[place(at, name) + 1] = value;
+            }
+        }
+    }
+    let found = session.sum_of_lists(&found);
+    for (at, run) in results.runs.iter_mut().enumerate() {
+        let value = |name: usize| (found[place(at, name)] > 0.0).then(|| found[place(at, name) + 1]);
+        run.response = (0..names.len()).map(value).collect();
+        let missing = names.iter().zip(&run.response).find(|(_, value)| value.is_none());
+        if let Some((name, _)) = missing.filter(|_| run.status == "completed" && run.error.is_none()) {
+            let help =
+                near(folders[at], name).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            run.error = Some(format!("it has no quantity `{name}`{help}"));
+        }
+    }
+}
+
+/// The name most similar to `name` among the numbers of `summary.json` and the columns of the tables.
+fn near(folder: &Path, name: &str) -> Option<String> {
+    let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap_or_default();
+    let mut known: Vec<String> = Vec::new();
+    let (prefix, column) = name.rsplit_once('.').unwrap_or(("", name));
+    let table = match prefix.split('.').next() {
+        Some("history") => "history.csv",
+        Some("probe") => "probes.csv",
+        Some("profile") => "profiles.csv",
+        Some("resultant") => "resultants.csv",
+        _ => "",
+    };
+    if table.is_empty() {
+        let summary = serde_json::from_str(&read("summary.json")).unwrap_or_default();
+        numbers(&summary, "", &mut known);
+        return nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+    }
+    known.extend(read(table).lines().next().unwrap_or_default().split(',').map(str::to_owned));
+    nearest(column, known.iter().map(String::as_str)).map(|near| format!("{prefix}.{near}"))
+}
+
+/// The names of all numbers in an object.
+fn numbers(value: &serde_json::Value, name: &str, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::Number(_) => found.push(name.to_owned()),
+        serde_json::Value::Object(members) => {
+            for (key, member) in members {
+                numbers(member, format!("{name}.{key}").trim_start_matches('.'), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_quantity_is_compared_with_those_of_the_run() {
+        let folder = tempfile::tempdir().expect("folder");
+        let text = r#"{"max_von_mises": 4.5, "status": "completed", "certificates": {"theta": 0.5}}"#;
+        std::fs::write(folder.path().join("summary.json"), text).expect("written");
+        std::fs::write(folder.path().join("history.csv"), "step,kinetic_energy\n1,2\n").expect("written");
+        assert_eq!(near(folder.path(), "max_von_misses").as_deref(), Some("max_von_mises"));
+        assert_eq!(near(folder.path(), "certificates.teta").as_deref(), Some("certificates.theta"));
+        assert_eq!(near(folder.path(), "history.kinetic_enery").as_deref(), Some("history.kinetic_energy"));
+    }
+}

@@ -1,0 +1,69 @@
+//! Sweeps over keys of a job.
+
+use crate::{
+    launch::run,
+    scene::{Scene, number},
+};
+use serde_json::Value;
+use std::path::Path;
+
+#[test]
+fn members_of_a_sweep_give_the_results_of_runs_alone_and_a_failed_one_does_not_stop_the_others() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/papers/wang_cheng_2022.toml");
+    let scene = Scene::new("", "");
+    // The first step length exceeds the bound of the scheme.
+    let study = format!(
+        "[base]\njob = {paper:?}\nset = [\"mesh.rectangle.cells=[4, 4]\"]\n[sweep]\n\"time.step\" = [0.25, 0.0625, 0.03125]\n\
+         [[response]]\nof = \"max_von_mises\"\n[[response]]\nof = \"probe.tip.min.velocity_y\"\n\
+         [[response]]\nof = \"profile.bottom.max.contact_pressure\"\n"
+    );
+    scene.write("study.toml", &study);
+    // The middle member first, as a job array would.
+    scene.study(2, &["--part", "2/3"]).expect(0).says("step-0.0625");
+    let outcome =
+        scene.study(2, &[]).expect(1).says("explicit stresses amplify errors").says("1 of 3 runs failed");
+    assert_eq!(outcome.stdout.matches("already finished").count(), 1, "{}", outcome.stdout);
+
+    let results = scene.results();
+    assert_eq!(results["sweep"], serde_json::json!(["time.step"]));
+    assert_eq!(results["runs"][0]["status"], "failed");
+    assert_eq!(results["runs"][0]["response"], serde_json::json!([null, null, null]));
+    let alone = scene.path("alone");
+    let folder = format!("output.folder={alone:?}");
+    let job = paper.display().to_string();
+    let set = ["--set", "mesh.rectangle.cells=[4, 4]", "--set", "time.step=0.03125", "--set", &folder];
+    let _ = run(1, &[&["run", &job][..], &set].concat()).expect(0);
+    let summary = std::fs::read_to_string(alone.join("summary.json")).expect("summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(number(&results, "/runs/2/response/0"), summary["max_von_mises"].as_f64().expect("number"));
+    assert!(number(&results, "/runs/1/response/1") < 0.0 && number(&results, "/runs/1/response/2") > 0.0);
+
+    let out = scene.path("out/study");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    let csv = read("responses.csv");
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0][..4], ["run", "time.step", "status", "max_von_mises"]);
+    assert_eq!(rows[1], ["step-0.25", "0.25", "failed", "", "", ""]);
+    assert_eq!(rows[3][3].parse(), Ok(number(&results, "/runs/2/response/0")));
+    assert_eq!(rows.len(), 4);
+    let text = read("study.md");
+    assert!(text.contains("| step-0.25 | 0.25 | failed | failed | failed |"), "{text}");
+    assert!(text.contains("Failed runs") && text.contains("(response-max_von_mises.svg)"), "{text}");
+    assert!(read("response-max_von_mises.svg").contains("time.step"));
+}
+
+#[test]
+fn a_response_that_no_run_has_fails_with_the_nearest_name() {
+    let sweep = "[sweep]\n\"material.density\" = { from = 0.5, to = 2.0, draws = 2, seed = 3 }\n";
+    let scene =
+        Scene::new(crate::scene::SQUARE, &format!("{sweep}[[response]]\nof = \"history.kinetic_enery\"\n"));
+    scene.study(1, &[]).expect(1).says("did you mean `history.kinetic_energy`?").says("2 of 2 runs failed");
+    // The finished runs are used again.
+    let set = "response.0.of=history.kinetic_energy";
+    let outcome = scene.study(1, &["--set", set]).expect(0);
+    assert_eq!(outcome.stdout.matches("already finished").count(), 2, "{}", outcome.stdout);
+    let results = scene.results();
+    let density = |run: usize| number(&results, &format!("/runs/{run}/sweep/0"));
+    assert!(density(0) != density(1) && [0, 1].iter().all(|run| (0.5..2.0).contains(&density(*run))));
+    assert!(number(&results, "/runs/0/response/0") > 0.0);
+}
