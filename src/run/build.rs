@@ -8,7 +8,7 @@ use crate::{
             Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, Resistances,
             SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
         },
-        space::{Geometry, Held, SurfacePoint, facets, surface_points},
+        space::{Geometry, Held, SurfacePoint, cell_rule, facets, surface_points, values},
         state::State,
     },
     job::{self, Job, Material, Scalar},
@@ -16,7 +16,7 @@ use crate::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Hypothesis},
     },
-    linear_algebra::tensor::{Mandel, Vector, component, norm},
+    linear_algebra::tensor::{Mandel, Vector, add_scaled, component, norm},
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
     solver::stepping::evaluation,
@@ -33,7 +33,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
     let mut state = session.agree(State::at_rest(&mesh))?;
     let Supports { held, motion } = Supports::new(session, &mesh, &job.support, &state.velocity)?;
-    let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh))?;
+    let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
     let effects = session.agree(effects(&materials, &geometry, &initial_stress))?;
     let load = load(job, &mesh, &materials);
     let elastic_support = elastic_support::<D, S>(session, job, &mesh, (&materials, &of_region))?;
@@ -84,10 +84,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.keep_earlier();
     }
     if !initial_stress.is_empty() {
-        let points = body.geometry.points();
-        let of_points: Vec<Mandel<S>> =
-            initial_stress.iter().flat_map(|stress| std::iter::repeat_n(*stress, points)).collect();
-        body.restore_history("viscoplastic_history", of_points.as_flattened());
+        body.restore_history("viscoplastic_history", initial_stress.as_flattened());
     }
     Ok((body, state))
 }
@@ -119,31 +116,45 @@ pub fn normal_law(contact: &job::Contact) -> Result<(NormalResponse, Gap)> {
     Ok((law, contact.obstacle.clone().unwrap_or_else(distance)))
 }
 
-/// The initial stress of each cell of this rank; empty if there is none.
-fn initial_stress<const D: usize, const S: usize>(job: &Job, mesh: &Mesh<D>) -> Result<Vec<Mandel<S>>> {
+/// The initial stress at each point of this rank's cells, cell by cell; empty if there is none.
+fn initial_stress<const D: usize, const S: usize>(
+    job: &Job,
+    mesh: &Mesh<D>,
+    geometry: &Geometry<D>,
+) -> Result<Vec<Mandel<S>>> {
     let Some(stress) = job.initial.as_ref().and_then(|initial| initial.stress.as_ref()) else {
         return Ok(Vec::new());
     };
     let job::InitialStress { xx, yy, zz, xy, yz, xz } = stress;
     let components = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let of_cell = |cell: usize| {
-        let corners = &mesh.corners(cell)[..=D];
-        let centre: Vector<D> =
-            std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / (D + 1) as f64);
+    let stress_at = |at: Vector<D>| {
         let mut out = [0.0; S];
         for (c, value) in out.iter_mut().enumerate() {
             let (i, j, factor) = component::<S>(c);
-            let number = components[i][j].evaluate(0.0, &centre);
+            let number = components[i][j].evaluate(0.0, &at);
             if !number.is_finite() {
                 return Err(Error::Refused(format!(
-                    "initial.stress: a component is {number} at {centre:?} m; correct the expression"
+                    "initial.stress: a component is {number} at {at:?} m; correct the expression"
                 )));
             }
             *value = factor * number;
         }
         Ok(out)
     };
-    (0..mesh.cell_count()).map(of_cell).collect()
+    let points =
+        (0..mesh.cell_count()).flat_map(|cell| (0..geometry.points()).map(move |point| (cell, point)));
+    points.map(|(cell, point)| stress_at(place_of(mesh, cell, point))).collect()
+}
+
+/// The place of a point of a cell: of a linear cell its centre.
+fn place_of<const D: usize>(mesh: &Mesh<D>, cell: usize, point: usize) -> Vector<D> {
+    if mesh.order() == 1 {
+        let corners = &mesh.corners(cell)[..=D];
+        return std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / (D + 1) as f64);
+    }
+    let shares = values(D + 1, &cell_rule::<D>()[point].0);
+    let nodes = mesh.cell_nodes(cell).zip(shares);
+    nodes.fold([0.0; D], |sum, (node, share)| add_scaled(&sum, share, &mesh.nodes[node as usize]))
 }
 
 /// The springs and dashpots of the supports that give way. Collective.

@@ -16,12 +16,12 @@ use crate::{
 #[derive(Debug)]
 pub struct InitialStress<const S: usize> {
     elasticity: ByMaterial<Isotropic>,
-    /// One for each run of cells; `None` where the material has no such stress.
+    /// One for each batch; `None` where the material has no such stress.
     stress: Vec<Option<Pack<S>>>,
 }
 
 impl<const S: usize> InitialStress<S> {
-    /// The stress of each run of cells, with the elastic tensors of the materials that have it.
+    /// The stress of each batch, with the elastic tensors of the materials that have it.
     pub fn new(elasticity: ByMaterial<Isotropic>, stress: Vec<Option<Pack<S>>>) -> Self {
         Self { elasticity, stress }
     }

@@ -85,8 +85,8 @@ pub const ENERGIES: &[EnergyKind] = &[
 
 const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at its declared position");
 
-/// The effects in the interior of bodies of these materials, with the initial stress of each cell, if there is any. A table that is
-/// absent creates none.
+/// The effects in the interior of bodies of these materials, with the initial stress at each point of the cells, cell by cell, if there
+/// is any. A table that is absent creates none.
 pub fn effects<const D: usize, const S: usize>(
     materials: &[&Material],
     geometry: &Geometry<D>,
@@ -111,12 +111,14 @@ pub fn effects<const D: usize, const S: usize>(
         Some(_) => None,
     };
     if let Some(laws) = by_material(materials, elastic).filter(|_| !initial_stress.is_empty()) {
-        let pack = |run: &CellRun| {
-            let value = |lane| initial_stress.get(run.first + lane).filter(|_| lane < run.count);
+        let points = geometry.points();
+        let pack = |(run, point): (&CellRun, usize)| {
+            let at = |lane| (run.first + lane) * points + point;
+            let value = |lane| initial_stress.get(at(lane)).filter(|_| lane < run.count);
             laws.get(run.material).map(|_| Pack::from_lanes(|lane| value(lane).copied().unwrap_or([0.0; S])))
         };
-        let points = |run: &CellRun| std::iter::repeat_n(pack(run), geometry.points());
-        let stress = geometry.runs.iter().flat_map(points).collect();
+        let batches = geometry.runs.iter().flat_map(|run| (0..points).map(move |point| (run, point)));
+        let stress = batches.map(pack).collect();
         effects.push(Box::new(InitialStress::new(laws, stress)));
     }
     let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
