@@ -108,7 +108,7 @@ fn differences<const D: usize, const S: usize>(session: &Session, whole: &Global
                 vec![contact(&bottom, if moves { belt::<D>() } else { wall() }), contact(&right, wall())]
             };
             assert!(session.total(contacts[0].point_count()) > 0);
-            contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant() + 30.0);
+            contacts.iter_mut().for_each(|c| c.scale = 2.0 * normal.monotonicity_constant(1.0) + 30.0);
             if let Some(friction) = friction {
                 contacts[0].add_friction(friction, &body.mesh, &body.held).expect("friction");
                 assert!(session.total(contacts[0].friction_point_count()) > 0);

@@ -232,7 +232,7 @@ fn compare<const D: usize, const S: usize>(
         )
         .expect("contact")
     };
-    let falling_contacts = run.body.contacts.iter().filter(|c| c.law.monotonicity_constant() > 0.0);
+    let falling_contacts = run.body.contacts.iter().filter(|c| c.law.monotonicity_constant(1.0) > 0.0);
     let mut exact: Vec<Contact<D>> = falling_contacts.map(exact).collect();
     choose_unknowns(&mut exact, &run.body.mesh).expect("Gauss points");
     let exact = falling(session, &run, &mut exact);

@@ -3,6 +3,7 @@
 mod compliance;
 mod coulomb;
 mod damped_response;
+mod displacement_graph;
 mod exponential_damper;
 mod graph;
 mod slip_weakening;
@@ -12,6 +13,7 @@ mod unilateral;
 pub use compliance::Compliance;
 pub use coulomb::Coulomb;
 pub use damped_response::{DampedResponse, Symmetry};
+pub use displacement_graph::DisplacementGraph;
 pub use exponential_damper::ExponentialDamper;
 pub use graph::Graph;
 pub use slip_weakening::SlipWeakening;
@@ -38,6 +40,9 @@ normal_laws! {
     /// Pressure as a piecewise linear function of the normal velocity, given by its corners, which may decrease and have upward
     /// jumps.
     Graph = "graph",
+    /// Pressure as a piecewise linear function of the normal displacement, given by its corners, which may pull, decrease and have
+    /// upward jumps: delamination, nonmonotone compliance.
+    DisplacementGraph = "displacement_graph",
     /// An elastic foundation: the pressure is stiffness times the penetration beyond the gap to the power of the exponent.
     Compliance = "compliance",
     /// A rigid obstacle: the normal displacement never exceeds the gap, or the normal velocity never exceeds zero.

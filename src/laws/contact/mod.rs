@@ -48,8 +48,8 @@ pub struct Contact {
     pub quadrature: Quadrature,
     /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
     pub normal: NormalLaw,
-    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance` and `unilateral`; other normal
-    /// laws have no distance to an obstacle. Absent: `gap` applies.
+    /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
+    /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.

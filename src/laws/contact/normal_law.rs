@@ -93,7 +93,7 @@ pub trait NormalParameters {
 
     /// Message and advice if the law with this name cannot be combined with an obstacle.
     fn against_obstacle(&self, name: &str) -> Option<[String; 2]> {
-        let help = "delete the obstacle, or use `compliance` or `unilateral`";
+        let help = "delete the obstacle, or use `compliance`, `displacement_graph` or `unilateral`";
         Some([format!("`{name}` does not depend on the distance to an obstacle"), help.into()])
     }
 }
@@ -148,8 +148,9 @@ pub trait Response {
         None
     }
 
-    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v): the steepest decrease, 0 for a nondecreasing graph.
-    fn monotonicity_constant(&self) -> f64 {
+    /// Relaxed monotonicity constant `m_j` of assumption H(j)(v) in Pa s/m: the steepest decrease in a step of this length in s, 0 for a
+    /// nondecreasing graph.
+    fn monotonicity_constant(&self, _step_length: f64) -> f64 {
         0.0
     }
 
@@ -212,7 +213,7 @@ macro_rules! normal_laws {
                 depends_on_displacement() -> bool;
                 is_zero() -> bool;
                 velocity_bound(node: NodeContext) -> Option<f64>;
-                monotonicity_constant() -> f64;
+                monotonicity_constant(step_length: f64) -> f64;
                 greatest_pressure() -> f64;
                 energy(penetration: f64) -> Option<f64>;
                 corners() -> &[[f64; 2]];

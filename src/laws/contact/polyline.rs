@@ -9,7 +9,10 @@
 //! velocity and pressure are Lipschitz continuous functions of `s`, also where the graph is vertical ([`Polyline::resolve`]).
 
 use super::normal_law::{Branch, NodeContext, Resolved, Response};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    laws::law::LawFault,
+};
 
 /// A piecewise linear law that may decrease and have upward jumps.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +51,59 @@ impl Polyline {
         let larger = |[v, p]: [f64; 2], [w, q]: &[f64; 2]| [f64::max(v, w.abs()), f64::max(p, q.abs())];
         let reach = points.iter().fold([0.0; 2], larger);
         Ok(Self { points, slopes, reach })
+    }
+
+    /// The faults of corners [abscissa, pressure], whose abscissa has this name; keys are those of a list `points`.
+    pub(super) fn faults(points: &[[f64; 2]], along: &str) -> Vec<LawFault> {
+        let mut faults = Vec::new();
+        for (index, pair) in points.windows(2).enumerate() {
+            let ([before, low], [after, high]) = (pair[0], pair[1]);
+            let mut fault = |message: &str, help: &str| {
+                faults.push(LawFault::at_value(format!("points.{}", index + 1), message, help));
+            };
+            if after < before {
+                let help = format!("it must be at least {before}");
+                fault(
+                    &format!("the {along} of a corner must not be below that of the corner before it"),
+                    &help,
+                );
+            } else if after == before && high < low {
+                fault(
+                    "a downward jump has no relaxed monotonicity constant: no step is short enough to be solvable",
+                    "order the two points upwards, or replace the jump by a steep slope",
+                );
+            } else if after == before && high == low {
+                fault("this point occurs twice", "delete one");
+            }
+        }
+        for (index, three) in points.windows(3).enumerate() {
+            if three[0][0] == three[2][0] {
+                let help =
+                    format!("two points with the same {along} define a jump: delete those between them");
+                let key = format!("points.{}", index + 2);
+                faults.push(LawFault::at_value(key, format!("three points with the same {along}"), help));
+            }
+        }
+        faults
+    }
+
+    /// Descriptions of the branches, with the units of the abscissa and of slopes.
+    pub(super) fn branches_in(&self, [along, steep]: [&str; 2], number: fn(f64) -> String) -> Vec<Branch> {
+        let words = |branch: usize| {
+            let before = branch.checked_sub(1).map(|at| number(self.points[at][0]));
+            let after = self.points.get(branch).map(|[v, _]| number(*v));
+            let vertical = self.is_vertical(branch);
+            let range = match (before, after) {
+                (Some(v), _) if vertical => format!("at {v} {along}"),
+                (Some(v), Some(w)) => format!("{v} to {w} {along}"),
+                (Some(v), None) => format!("from {v} m/s on"),
+                (None, after) => format!("below {} m/s", after.unwrap_or_default()),
+            };
+            let slope =
+                if vertical { "vertical".into() } else { format!("{} {steep}", number(self.slopes[branch])) };
+            Branch::new(format!("S{}", branch + 1), range, slope)
+        };
+        (0..self.slopes.len()).map(words).collect()
     }
 
     /// The linear branch that contains the parameter `s = c v + p`, numbered as in [`branch`](Response::branch).
@@ -131,7 +187,7 @@ impl Response for Polyline {
         }
     }
 
-    fn monotonicity_constant(&self) -> f64 {
+    fn monotonicity_constant(&self, _step_length: f64) -> f64 {
         self.slopes.iter().fold(0.0, |m, &slope| f64::max(m, -slope))
     }
 
@@ -155,21 +211,7 @@ impl Response for Polyline {
     }
 
     fn branches(&self, number: fn(f64) -> String) -> Vec<Branch> {
-        let words = |branch: usize| {
-            let before = branch.checked_sub(1).map(|at| number(self.points[at][0]));
-            let after = self.points.get(branch).map(|[v, _]| number(*v));
-            let vertical = self.is_vertical(branch);
-            let range = match (before, after) {
-                (Some(v), _) if vertical => format!("at {v} m/s"),
-                (Some(v), Some(w)) => format!("{v} to {w} m/s"),
-                (Some(v), None) => format!("from {v} m/s on"),
-                (None, after) => format!("below {} m/s", after.unwrap_or_default()),
-            };
-            let slope =
-                if vertical { "vertical".into() } else { format!("{} Pa s/m", number(self.slopes[branch])) };
-            Branch::new(format!("S{}", branch + 1), range, slope)
-        };
-        (0..self.slopes.len()).map(words).collect()
+        self.branches_in(["m/s", "Pa s/m"], number)
     }
 
     fn corners(&self) -> &[[f64; 2]] {
@@ -225,7 +267,7 @@ mod tests {
             [0.0, 1.0, 2.0, 1.5, 1.0, 4.0]
         );
         assert_eq!([-5.0, -0.5, 0.0, 0.5, 1.0].map(|v| g.slope(v, NODE)), [0.0, 2.0, -1.0, -1.0, 3.0]);
-        assert_eq!(g.monotonicity_constant(), 1.0);
+        assert_eq!(g.monotonicity_constant(1.0), 1.0);
     }
 
     #[test]
@@ -289,7 +331,7 @@ mod tests {
         assert!(Polyline::new(vec![[0.0, 1.0]], f64::NEG_INFINITY, 0.0).is_err());
         let up = Polyline::new(vec![[0.0, -1.0], [0.0, 1.0]], 0.0, 0.0).unwrap();
         assert!(up.has_vertical_parts() && up.is_vertical(1) && !up.is_vertical(0));
-        assert_eq!(up.monotonicity_constant(), 0.0);
+        assert_eq!(up.monotonicity_constant(1.0), 0.0);
         assert_eq!(up.distance(0.0, 0.3, NODE, [1.0, 0.0]), 0.0);
         assert_eq!(up.distance(0.0, 1.5, NODE, [1.0, 0.0]), 0.5);
     }
@@ -322,12 +364,12 @@ mod tests {
     proptest! {
         #[test]
         fn the_resolvent_finds_every_point_of_the_graph(g in any_graph(), s in -20.0f64..20.0, more in 1.01f64..5.0) {
-            let c = more * g.monotonicity_constant() + 0.3;
+            let c = more * g.monotonicity_constant(1.0) + 0.3;
             let found = g.resolve(s, c, NODE);
             prop_assert!((c * found.velocity + found.pressure - s).abs() < 1e-11);
             let off = g.distance_in(found.velocity, found.pressure, [1.0, 1.0]);
             prop_assert!(off < 1e-11, "{} off the graph", off);
-            let bound = 1.0 / (c - g.monotonicity_constant());
+            let bound = 1.0 / (c - g.monotonicity_constant(1.0));
             prop_assert!((0.0..=bound * (1.0 + 1e-14)).contains(&found.derivative));
             prop_assert_eq!(found.derivative == 0.0, g.is_vertical(found.branch));
             let h = 1e-5;
@@ -357,7 +399,7 @@ mod tests {
             prop_assert!(g.pressure(v, NODE).abs() <= (at_rest + slope * v.abs()) * (1.0 + 1e-14));
             for w in [v - 1.0, v + 0.3] {
                 let rise = (g.pressure(v, NODE) - g.pressure(w, NODE)) * (v - w);
-                prop_assert!(rise >= -g.monotonicity_constant() * (v - w) * (v - w) - 1e-12);
+                prop_assert!(rise >= -g.monotonicity_constant(1.0) * (v - w) * (v - w) - 1e-12);
             }
         }
     }

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quadrature {
-    /// The nodes of the facet (trapezoidal rule). Required with friction, adhesion, memory, compliance, rigid obstacles and graphs
-    /// with jumps.
+    /// The nodes of the facet: trapezoidal rule, Simpson's rule for quadratic cells in the plane, and the midpoints of edges for
+    /// quadratic cells in space. Required with friction, adhesion, memory, laws of the displacement, rigid obstacles and graphs with jumps.
     #[default]
     Nodal,
     /// Gauss points inside the facet.

@@ -73,7 +73,7 @@ impl Law {
         let reach = |axis: usize| all().map(|p| p[axis].abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let steep = reach(1) / reach(0);
         let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
-        let c = steep.max(2.0 * self.law.monotonicity_constant());
+        let c = steep.max(2.0 * self.law.monotonicity_constant(1.0));
         // A node that has not touched the wall may be beyond it by rounding.
         let is_wall = self.gap.is_some() && self.law.has_vertical_parts();
         let slack = if is_wall { 1e-9 * c * reach(0) } else { 0.0 };

@@ -37,6 +37,9 @@ pub struct Certificates {
     /// Step in s below which errors do not grow, however much of the body flows; for the verdict only.
     #[serde(skip)]
     pub flowing_step_bound: Option<f64>,
+    /// The steepest decrease of a contact law with the displacement in Pa/m, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decrease_with_displacement: Option<f64>,
     /// Descriptions of the cases that `theta` and `theta_step` do not cover; absent if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_covered: Vec<String>,

@@ -7,8 +7,7 @@ use crate::fem::{body::Body, effect::Contact};
 /// step.
 pub(super) fn not_covered<const D: usize, const S: usize>(
     body: &Body<D, S>,
-    theta_step: Option<f64>,
-    slip_pressure_bound: Option<f64>,
+    &Certificates { theta_step, slip_pressure_bound, decrease_with_displacement, .. }: &Certificates,
 ) -> Vec<String> {
     let contacts = &body.contacts;
     let mut words = Vec::new();
@@ -17,6 +16,12 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
             "friction bounds depend on the contact pressure: theta holds for given pressures and does not cover their change with the solution; above some friction coefficient there may be several solutions"
                 .into(),
         );
+    }
+    if let Some(decrease) = decrease_with_displacement {
+        words.push(format!(
+            "a contact law decreases with the displacement, by {decrease:.4e} Pa/m: theta of a step covers it in each step; for the \
+             continuous problem no certificate is known"
+        ));
     }
     for fall in contacts.iter().filter_map(Contact::decrease_per_pressure) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {

@@ -18,7 +18,9 @@
 //! `growth_constants` are the `c0` and `c1` of the growth condition `|dj(r)| <= c0 + c1 |r|`, on which existence is based: the
 //! smallest `c1`, then the smallest `c0`, that hold for all contact laws. A rigid obstacle has no growth constants, because its
 //! graph ends in a vertical ray; there, existence follows from the monotonicity of the graph. Laws that depend on the displacement
-//! have none either.
+//! have none either. Where a law decreases with the displacement, by `m` in Pa/m at most, its `m_j` in a step of length `k` is `k m`:
+//! `theta_step` covers each step, and no certificate of the continuous problem is known. Where the steps have several lengths, these
+//! are certificates of the first one.
 //!
 //! `m_j` is the steepest decrease of a contact graph, `m_t` that of a friction graph (slip weakening: the decrease of the
 //! coefficient times the largest pressure of the normal law), `m_A` the smallest eigenvalue of the viscosity. If the normal law has
@@ -70,7 +72,10 @@ impl Certificates {
         matrix: &mut MatrixOfStep<'_>,
         longest: f64,
     ) -> Result<Self> {
-        let falls = body.contacts.iter().map(|c| c.monotonicity_constants().into_iter().fold(0.0, f64::max));
+        let steepest = |constants: [f64; 2]| constants.into_iter().fold(0.0, f64::max);
+        let falls = body.contacts.iter().map(|c| steepest(c.monotonicity_constants(matrix.length)));
+        let decrease = body.contacts.iter().filter_map(Contact::decrease_with_displacement);
+        let decrease = decrease.reduce(f64::max);
         let growth = growth(&body.contacts);
         let viscous = body.has_form_everywhere(Form::Viscosity);
         let mut known = Self {
@@ -86,7 +91,7 @@ impl Certificates {
         if !body.contacts.is_empty() {
             let falling = known.monotonicity_constant.is_some_and(|m| m > 0.0);
             known.theta_step = Some(if falling { find(Supremum::ThetaStep)? } else { 0.0 });
-            if viscous {
+            if viscous && decrease.is_none() {
                 known.theta = Some(if falling { find(Supremum::Theta)? } else { 0.0 });
             }
             known.trace_norm_squared = Some(find(Supremum::TraceNorm)?)
@@ -100,7 +105,8 @@ impl Certificates {
             };
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
-        known.not_covered = not_covered(body, known.theta_step, known.slip_pressure_bound);
+        known.decrease_with_displacement = decrease;
+        known.not_covered = not_covered(body, &known);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;

@@ -117,7 +117,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
             (supremum, _) => {
                 return forms::apply(body, x, y, |x, y| {
                     for contact in &body.contacts {
-                        let falls = contact.monotonicity_constants();
+                        let falls = contact.monotonicity_constants(self.matrix.length);
                         match (supremum, form) {
                             (Supremum::TraceNorm, _) => {
                                 forms::add_trace(&body.mesh, contact, [1.0, 0.0], x, y)

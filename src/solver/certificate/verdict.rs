@@ -37,7 +37,8 @@ impl Certificates {
             };
             verdict.words.push(format!("theta = {}, {meaning}{covered}", short(theta)));
         }
-        if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, self.monotonicity_constant) {
+        let fall = self.monotonicity_constant.filter(|_| self.decrease_with_displacement.is_none());
+        if let (Some(modulus), Some(fall)) = (self.viscosity_modulus, fall) {
             let product = match self.trace_norm_squared {
                 Some(trace) => fall * trace,
                 None if fall > 0.0 => f64::INFINITY,
@@ -164,6 +165,7 @@ mod tests {
             explicit_bound_is_least: false,
             explicit_bound_follows_stress: false,
             flowing_step_bound: Some(0.08),
+            decrease_with_displacement: None,
             not_covered: Vec::new(),
         }
     }

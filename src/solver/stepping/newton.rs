@@ -158,7 +158,7 @@ impl Newton {
             contacts.iter_mut().zip(&self.scales).zip(&self.steepest_decreases)
         {
             let [normal, tangential] = scales.map(|scale| fallback.stiffness_factor * scale);
-            contact.scale = normal.max(2.0 * contact.law.monotonicity_constant());
+            contact.scale = normal.max(2.0 * contact.monotonicity_constant());
             contact.set_friction(tangential.max(decrease / INITIAL_DECREASE_RATIO), follows);
         }
     }

@@ -23,7 +23,7 @@ pub(super) fn resistances<const D: usize>(
         motion.fill(0.0)?;
         contact.add_normals(&mut motion.owned_mut()?);
         let square = contact.normal_square(&motion.owned()?);
-        let normal = against(&motion, square)?.max(2.0 * contact.law.monotonicity_constant());
+        let normal = against(&motion, square)?.max(2.0 * contact.monotonicity_constant());
         if contact.friction().is_none() {
             return Ok([normal; 2]);
         }

@@ -73,6 +73,8 @@ pub struct Stepper {
 pub struct MatrixOfStep<'a> {
     /// The time scheme of the step.
     pub scheme: Scheme,
+    /// Length of the step in s.
+    pub length: f64,
     solver: &'a mut StepSolver,
 }
 
@@ -163,7 +165,7 @@ impl Stepper {
     ) -> Result<MatrixOfStep<'_>> {
         self.base_length = length;
         self.prepare_matrix(session, body, Step { time: length, length, previous_length: 0.0 })?;
-        Ok(MatrixOfStep { scheme: self.scheme, solver: &mut self.solver })
+        Ok(MatrixOfStep { scheme: self.scheme, length, solver: &mut self.solver })
     }
 
     /// Assembles the matrix of a step, if the previous step had another length. Collective.

@@ -57,7 +57,7 @@ impl<const D: usize> Contact<D> {
     /// Nodes of this rank with directions along which the contact can resist a motion of a body at rest: the normal, unless the law
     /// never presses or descends, and the tangents of friction.
     pub fn holding_directions(&self) -> Vec<(usize, Vector<D>)> {
-        let presses = !self.law.is_zero() && self.law.monotonicity_constant() == 0.0;
+        let presses = !self.law.is_zero() && self.law.monotonicity_constant(1.0) == 0.0;
         let normal = |point: &Point<D>| {
             let normal = point.normal;
             point.nodes().map(move |(node, _)| (node, normal)).collect::<Vec<_>>()

@@ -31,8 +31,9 @@ impl<const D: usize> Contact<D> {
             let change = point.context.step_length * v;
             let after = point.context.penetration + change;
             let mismatch = length * v - change - point.blend_offset;
+            let energies = self.law.energy(after).zip(self.law.energy(point.penetration_before));
+            let stored = energies.map(|(after, before)| after - before);
             let before = if point.penetration_before.is_finite() { point.penetration_before } else { 0.0 };
-            let stored = self.law.energy(after).zip(self.law.energy(before)).map(|(e, before)| e - before);
             let numerical = match stored {
                 None => 0.0,
                 Some(stored) if pressure == 0.0 => stored,

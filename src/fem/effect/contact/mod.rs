@@ -75,6 +75,8 @@ pub struct Contact<const D: usize> {
     pub gap: Gap,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
+    /// Length in s of the current step, as laws of the displacement see it.
+    step_length: f64,
     /// Reference values for errors of velocities and tractions where the laws have no range of their own.
     pub reference: ReferenceValues,
     facets: Vec<u32>,
@@ -109,6 +111,7 @@ impl<const D: usize> Contact<D> {
         let mut points: Vec<Point<D>> = match quadrature {
             Quadrature::Nodal => surface_points(session, mesh, facets)?
                 .into_iter()
+                .filter(|p| p.weight > 0.0)
                 .map(|p| Point::nodal(p.node, p.normal, p.weight, held))
                 .collect(),
             Quadrature::Gauss => facets.iter().flat_map(|&f| gauss_points(mesh, f, held)).collect(),
@@ -122,13 +125,13 @@ impl<const D: usize> Contact<D> {
             }
             point.place = place;
         }
-        let scale = 2.0 * law.monotonicity_constant() + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
         let reference = ReferenceValues::default();
         Ok(Self {
             law,
             gap,
-            scale,
+            scale: 1.0,
+            step_length: 0.0,
             reference,
             facets: facets.to_vec(),
             points,

@@ -19,6 +19,7 @@ impl<const D: usize> Contact<D> {
         if !self.law.depends_on_displacement() {
             return Ok(());
         }
+        self.step_length = length;
         for point in &mut self.points {
             let gap_at = |time| self.gap.at(time, &point.place, &point.normal);
             let (gap, before) = (gap_at(time)?, gap_at(time - length)?);
@@ -38,6 +39,7 @@ impl<const D: usize> Contact<D> {
         if !self.law.depends_on_displacement() {
             return Ok(());
         }
+        self.step_length = blend.length;
         for point in &mut self.points {
             debug_assert!(point.blend_offset == 0.0, "the point was prepared");
             point.blend_offset = point.normal_component(Body, shift);

@@ -59,13 +59,25 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
     }
 
-    /// The steepest descents in Pa s/m of the normal and of the friction graph, as far as they are known before a step. Friction
-    /// that depends on an unbounded pressure counts as not descending; see [`decrease_per_pressure`](Self::decrease_per_pressure).
-    pub fn monotonicity_constants(&self) -> [f64; 2] {
+    /// The steepest decrease in Pa s/m of the normal graph in the current step.
+    pub fn monotonicity_constant(&self) -> f64 {
+        self.law.monotonicity_constant(self.step_length)
+    }
+
+    /// The steepest decreases in Pa s/m of the normal and of the friction graph in a step of this length in s, as far as they are known
+    /// before it. Friction that depends on an unbounded pressure counts as not decreasing; see
+    /// [`decrease_per_pressure`](Self::decrease_per_pressure).
+    pub fn monotonicity_constants(&self, step_length: f64) -> [f64; 2] {
         let friction = self.friction().map_or(0.0, |friction| friction.steepest_decrease());
         let most = self.law.greatest_pressure();
         let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
-        [self.law.monotonicity_constant(), tangential]
+        [self.law.monotonicity_constant(step_length), tangential]
+    }
+
+    /// The steepest decrease of the normal law with the displacement in Pa/m, if it depends on the displacement and decreases.
+    pub fn decrease_with_displacement(&self) -> Option<f64> {
+        let decrease = self.law.monotonicity_constant(1.0);
+        (self.law.depends_on_displacement() && decrease > 0.0).then_some(decrease)
     }
 
     /// The steepest descent of the friction coefficient in s/m, where the pressure that multiplies it is unbounded.

@@ -126,7 +126,7 @@ mod tests {
             let v = f64::from(i) * 1.3e-4;
             assert!((graph.pressure(v, NODE) - printed(v)).abs() < 1e-15, "{v}");
         }
-        assert_eq!(graph.monotonicity_constant(), 10.0);
+        assert_eq!(graph.monotonicity_constant(1.0), 10.0);
     }
 
     #[test]

@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn what_is_known_of_the_law() {
         assert_eq!(OIL.growth_constants(), Ok([10.0, 0.0]));
-        assert_eq!((OIL.monotonicity_constant(), OIL.greatest_pressure()), (0.0, 10.0));
+        assert_eq!((OIL.monotonicity_constant(1.0), OIL.greatest_pressure()), (0.0, 10.0));
         assert!(!OIL.is_zero() && !OIL.has_vertical_parts() && !OIL.depends_on_displacement());
         assert_eq!((OIL.velocity_bound(NODE), OIL.energy(1.0)), (None, None), "it stores nothing");
     }

@@ -31,32 +31,7 @@ impl NormalParameters for Graph {
     }
 
     fn own_faults(&self) -> Vec<LawFault> {
-        let mut faults = Vec::new();
-        for (index, pair) in self.points.windows(2).enumerate() {
-            let ([before, low], [after, high]) = (pair[0], pair[1]);
-            let mut fault = |message: &str, help: &str| {
-                faults.push(LawFault::at_value(format!("points.{}", index + 1), message, help));
-            };
-            if after < before {
-                let help = format!("it must be at least {before}");
-                fault("the velocities of a graph must ascend", &help);
-            } else if after == before && high < low {
-                fault(
-                    "a downward jump has no relaxed monotonicity constant: no step is short enough to be solvable",
-                    "order the two points upwards, or replace the jump by a steep slope",
-                );
-            } else if after == before && high == low {
-                fault("this point occurs twice", "delete one");
-            }
-        }
-        for (index, three) in self.points.windows(3).enumerate() {
-            if three[0][0] == three[2][0] {
-                let help = "two points with the same velocity define a jump: delete those between them";
-                let key = format!("points.{}", index + 2);
-                faults.push(LawFault::at_value(key, "three points with the same velocity", help));
-            }
-        }
-        faults
+        Polyline::faults(&self.points, "velocity")
     }
 }
 
