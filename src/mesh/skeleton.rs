@@ -82,7 +82,7 @@ fn nodes_of<const D: usize>(mesh: &Mesh<D>, bodies: &Bodies) -> Vec<Vec<u32>> {
     let mut last_body = vec![u32::MAX; mesh.nodes.len()];
     for cell in order {
         let body = bodies.of_cell[cell as usize];
-        for &node in mesh.cell(cell as usize) {
+        for node in mesh.cell_nodes(cell as usize) {
             if std::mem::replace(&mut last_body[node as usize], body) != body {
                 nodes[body as usize].push(node);
             }

@@ -6,7 +6,6 @@ use crate::{
     fem::{body::Body, state::State},
     io::output::probes::Probes,
     job::Loaded,
-    laws::contact::Quadrature,
     linear_algebra::petsc::set_option,
     mesh::Mesh,
     parallel::session::Session,
@@ -15,9 +14,6 @@ use crate::{
         stepping::{Stepper, StepperSettings},
     },
 };
-
-/// Nodal contact forces of a constant pressure vanish at the corners of quadratic facets, but the weights of the corners do not.
-const QUADRATIC_PRESSURES: &str = "mesh.order = 2 in space: contact pressures at single nodes alternate, by a third at midside nodes and more at corners; forces, displacements and means over facets are not affected; use order = 1 for pressures at nodes";
 
 /// All that is needed for the first step.
 pub(super) struct Setup<const D: usize, const S: usize> {
@@ -47,13 +43,7 @@ pub(super) fn setup<const D: usize, const S: usize>(
     let (mut body, mut state) = build::body::<D, S>(session, job, mesh)?;
     let began_from = transfer(session, loaded, &mut body, &mut state)?;
     refuse_free_bodies(session, &body, loaded)?;
-    let mut warnings = obstacles::warnings(session, job, &body, &state)?;
-    if D == 3
-        && body.mesh.order() == 2
-        && job.contact.iter().any(|contact| contact.quadrature == Quadrature::Nodal)
-    {
-        warnings.push(QUADRATIC_PRESSURES.into());
-    }
+    let warnings = obstacles::warnings(session, job, &body, &state)?;
     let shared = steps::steps_a_matrix(job);
     let settings = StepperSettings { scheme: job.time.scheme, solver: &job.solver, steps: shared };
     let scheme = Stepper::new(session, &mut body, &state, settings);

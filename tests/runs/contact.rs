@@ -69,3 +69,33 @@ fn a_foundation_of_springs_carries_the_load_at_the_penetration_of_the_closed_for
     assert!((stored - 0.5 * 20.0 * 0.02).abs() < 1e-3, "{stored}");
     assert!(results.number("max_energy_imbalance") < 1e-10);
 }
+
+/// A block of uniform stress presses on a rigid plane with 3 Pa, at midside nodes and at corners.
+#[test]
+fn quadratic_cells_press_on_a_plane_with_a_uniform_pressure() {
+    for (dimension, up) in [(2, "[0.0, -3.0]"), (3, "[0.0, 0.0, -3.0]")] {
+        let case = if dimension == 2 { Case::square(4) } else { Case::cube(3) };
+        let sides = if dimension == 2 {
+            "[{on = ['left'], fix = ['x']}]"
+        } else {
+            "[{on = ['left'], fix = ['x']}, {on = ['front'], fix = ['y']}]"
+        };
+        let case = case
+            .set("mesh.order", "2")
+            .set("material", "{elasticity = {youngs_modulus = 1000.0, poisson_ratio = 0.25}}")
+            .set("support", sides)
+            .set("traction", &format!("[{{on = ['top'], value = {up}}}]"))
+            .set("contact", "[{on = ['bottom'], normal = {unilateral = {gap = 0.0}}, friction = {coulomb = {coefficient = 0.1}}}]")
+            .without("body_force")
+            .without("initial")
+            .set("time", "{end = 1.0, step = 1.0, scheme = 'implicit_euler'}")
+            .set("output.also", "['contact_pressure', 'gap']")
+            .set("output.profile", "[{on = 'bottom'}]");
+        for ranks in 1..=4 {
+            let profile = case.run(ranks).table("profiles.csv");
+            let pressures = profile.numbers("contact_pressure");
+            let pressures = &pressures[pressures.len() / 2..];
+            assert!(pressures.iter().all(|p| (p - 3.0).abs() < 1e-7), "{ranks} ranks: {pressures:?}");
+        }
+    }
+}

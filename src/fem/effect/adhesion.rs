@@ -79,14 +79,16 @@ impl<const D: usize> Adhesion<D> {
         }
     }
 
-    /// Sums over the points of a node: driving force and threshold of debonding in J, and viscosity in J s.
+    /// Sums over the points of a node: driving force and threshold of debonding in J, and viscosity in J s. At the corners of quadratic
+    /// facets in space, whose points have no weight, the bonding follows from sums with equal weights; it has no forces.
     fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> [f64; 3] {
         let [mut drive, mut energy, mut viscosity] = [0.0; 3];
         for (law, point) in group {
             let law = &self.laws[*law];
-            drive += point.weight * law.drive(&point.value(displacement), &point.normal);
-            energy += point.weight * law.energy;
-            viscosity += point.weight * law.viscosity;
+            let weight = if point.weight > 0.0 { point.weight } else { 1.0 };
+            drive += weight * law.drive(&point.value(displacement), &point.normal);
+            energy += weight * law.energy;
+            viscosity += weight * law.viscosity;
         }
         [drive, energy, viscosity]
     }

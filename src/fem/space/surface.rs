@@ -6,7 +6,10 @@ use super::{
 };
 use crate::{
     error::Result,
-    linear_algebra::tensor::{Vector, dot, norm},
+    linear_algebra::{
+        petsc::DistributedVector,
+        tensor::{Vector, dot, norm},
+    },
     mesh::{Mesh, shape::facet_normal},
     parallel::{agreement::Agreed, exchange::exchange_lists, session::Session},
 };
@@ -55,45 +58,106 @@ const SAME_FACE: f64 = 0.766_044_443_118_978;
 /// The quadrature points of these boundaries at nodes owned here, ordered by node. Collective.
 ///
 /// A node on an edge between faces of the body gets a point for each face; facets that meet at a smaller angle share a
-/// point with their mean normal. The weights are those of the trapezoidal rule, for quadratic cells in the plane those of Simpson's
-/// rule: a constant pressure has the same nodal forces as by exact integration. For quadratic cells in space they are those of the
-/// linear facets between corners and midside nodes, because the exact ones vanish at corners.
+/// point with their mean normal. A constant pressure has the same nodal forces as by exact integration: the weights are those of the
+/// trapezoidal rule, for quadratic cells in the plane those of Simpson's rule, and in space those of the rule with the midpoints of
+/// edges, whose weights at corners are zero.
 pub fn surface_points<const D: usize>(
     session: &Session,
     mesh: &Mesh<D>,
     facets: &[u32],
 ) -> Result<Vec<SurfacePoint<D>>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
-    let has_simpson_weights = D == 2 && mesh.order() == 2;
     for &facet in facets {
         let corners = mesh.facets[facet as usize];
         for nodes in mesh.sub_facets(facet) {
             let normal = facet_normal(&nodes.map(|node| mesh.nodes[node as usize]));
             for node in nodes {
-                let share = match has_simpson_weights {
-                    true if corners.contains(&node) => 2.0 / 3.0,
-                    true => 4.0 / 3.0,
-                    false => 1.0,
+                let factor = match (mesh.order(), corners.contains(&node)) {
+                    (1, _) => 1.0,
+                    (_, false) => 4.0 / 3.0,
+                    (_, true) if acts_at_midsides(mesh) => 0.0,
+                    (_, true) => 2.0 / 3.0,
                 };
                 let global = mesh.global_node(node);
                 let record = &mut outgoing[mesh.owner(global)];
-                record.push(f64::from(global));
-                record.extend(normal.map(|n| share * n));
+                record.extend([f64::from(global), factor]);
+                record.extend(normal);
             }
         }
     }
     let incoming = exchange_lists(session.world(), &outgoing)?;
-    let mut shares: Vec<(u32, Vector<D>)> = incoming
-        .chunks_exact(D + 1)
-        .map(|record| (record[0] as u32, std::array::from_fn(|i| record[i + 1])))
+    let mut shares: Vec<Share<D>> = incoming
+        .chunks_exact(D + 2)
+        .map(|record| Share {
+            node: record[0] as u32,
+            factor: record[1],
+            normal: std::array::from_fn(|i| record[i + 2]),
+        })
         .collect();
     shares.sort_by(|a, b| {
-        let vectors = a.1.iter().zip(&b.1);
-        a.0.cmp(&b.0).then_with(|| {
+        let vectors = a.normal.iter().zip(&b.normal);
+        a.node.cmp(&b.node).then_with(|| {
             vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
     });
-    Ok(shares.chunk_by(|a, b| a.0 == b.0).flat_map(|around| points_of_node(mesh, around)).collect())
+    Ok(shares.chunk_by(|a, b| a.node == b.node).flat_map(|around| points_of_node(mesh, around)).collect())
+}
+
+/// A linear facet at one of its nodes.
+struct Share<const D: usize> {
+    /// Global number of the node.
+    node: u32,
+    /// Weight of the node as a multiple of its equal share.
+    factor: f64,
+    /// Normal of the facet, as long as its measure.
+    normal: Vector<D>,
+}
+
+/// Whether laws on boundaries act at midside nodes alone: of quadratic cells in space.
+pub fn acts_at_midsides<const D: usize>(mesh: &Mesh<D>) -> bool {
+    D == 3 && mesh.order() == 2
+}
+
+/// Adds to the corners of quadratic facets in space, at which [`surface_points`] have no weight, the means of the values at the
+/// midside nodes of these facets: `width` values for each node, which `of_midsides` holds in the first places of each node and `nodal`
+/// without gaps. Collective.
+pub fn add_corner_means<const D: usize>(
+    mesh: &Mesh<D>,
+    facets: &[u32],
+    of_midsides: &mut DistributedVector,
+    width: usize,
+    nodal: &mut [f64],
+) -> Result<()> {
+    if !acts_at_midsides(mesh) {
+        return Ok(());
+    }
+    of_midsides.update_ghosts()?;
+    let (mut sums, mut counts) = (of_midsides.like()?, of_midsides.like()?);
+    {
+        let (values, mut sums, mut counts) = (of_midsides.local()?, sums.local_mut()?, counts.local_mut()?);
+        sums.fill(0.0);
+        counts.fill(0.0);
+        for &facet in facets {
+            let corners = mesh.facets[facet as usize];
+            for (i, midside) in mesh.facet_midsides(facet).into_iter().enumerate() {
+                let value = &values[midside as usize * D..][..width];
+                for corner in [corners[i], corners[(i + 1) % D]] {
+                    let at = corner as usize * D;
+                    counts[at] += 1.0;
+                    value.iter().zip(&mut sums[at..]).for_each(|(value, sum)| *sum += value);
+                }
+            }
+        }
+    }
+    sums.add_ghosts_to_owners()?;
+    counts.add_ghosts_to_owners()?;
+    let (sums, counts) = (sums.owned()?, counts.owned()?);
+    for (node, nodal) in nodal.chunks_exact_mut(width).enumerate().filter(|(node, _)| counts[node * D] > 0.0)
+    {
+        let sums = &sums[node * D..][..width];
+        nodal.iter_mut().zip(sums).for_each(|(value, sum)| *value += sum / counts[node * D]);
+    }
+    Ok(())
 }
 
 /// A Gauss point of a facet.
@@ -149,22 +213,22 @@ pub fn facet_points<const D: usize>(
     (nodes.into_iter().take(count), rule.iter().map(point))
 }
 
-fn points_of_node<const D: usize>(mesh: &Mesh<D>, shares: &[(u32, Vector<D>)]) -> Vec<SurfacePoint<D>> {
+fn points_of_node<const D: usize>(mesh: &Mesh<D>, shares: &[Share<D>]) -> Vec<SurfacePoint<D>> {
     let mut faces: Vec<(Vector<D>, f64)> = Vec::new();
-    for (_, share) in shares {
-        let size = norm(share);
-        let face = faces.iter_mut().find(|(sum, _)| dot(sum, share) > SAME_FACE * size * norm(sum));
+    for Share { factor, normal, .. } in shares {
+        let size = norm(normal);
+        let face = faces.iter_mut().find(|(sum, _)| dot(sum, normal) > SAME_FACE * size * norm(sum));
         match face {
             Some((sum, weight)) => {
                 for i in 0..D {
-                    sum[i] += share[i];
+                    sum[i] += normal[i];
                 }
-                *weight += size;
+                *weight += factor * size;
             }
-            None => faces.push((*share, size)),
+            None => faces.push((*normal, factor * size)),
         }
     }
-    let node = mesh.owned_node(shares[0].0) as u32;
+    let node = mesh.owned_node(shares[0].node) as u32;
     faces
         .into_iter()
         .map(|(sum, weight)| {

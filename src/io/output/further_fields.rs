@@ -6,7 +6,10 @@ use super::{
 };
 use crate::{
     error::Result,
-    fem::effect::PointState,
+    fem::{
+        effect::{Contact, PointState},
+        space::{acts_at_midsides, add_corner_means},
+    },
     job::FurtherField,
     linear_algebra::tensor::{Mandel, principal_values},
 };
@@ -62,11 +65,43 @@ pub(super) fn pressure<'a, const D: usize, const S: usize>(at: Converged<'a, D, 
 }
 
 /// Values of the states of nodal contact points, `W` for each owned node; zero at other nodes. At a node with several points, the last
-/// one that touches counts, or the last one.
+/// one that touches counts, or the last one. Corners of quadratic facets in space, where no law acts, have the
+/// means of the midside nodes around. Collective.
+pub(super) fn means_of_contacts<'a, const D: usize, const S: usize, const W: usize>(
+    at: Converged<'a, D, S>,
+    value: impl Fn(&PointState<D>) -> [f64; W],
+) -> Result<Computed<'a>> {
+    let mut values = point_values(at, value)?;
+    if acts_at_midsides(&at.body.mesh) {
+        let mut of_midsides = at.state.velocity.like()?;
+        for (target, value) in of_midsides.owned_mut()?.chunks_exact_mut(D).zip(values.chunks_exact(W)) {
+            target[..W].copy_from_slice(value);
+        }
+        let facets = at.body.contacts.iter().filter(|contact| !contact.needs_ghosts()).map(Contact::facets);
+        add_corner_means(
+            &at.body.mesh,
+            &facets.flatten().copied().collect::<Vec<_>>(),
+            &mut of_midsides,
+            W,
+            &mut values,
+        )?;
+    }
+    Ok(Computed::of(values))
+}
+
+/// Values of the states of nodal contact points, `W` for each owned node; zero at nodes that are none. At a node with several points,
+/// the last one that touches counts, or the last one.
 pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
     at: Converged<'a, D, S>,
     value: impl Fn(&PointState<D>) -> [f64; W],
 ) -> Result<Computed<'a>> {
+    Ok(Computed::of(point_values(at, value)?))
+}
+
+fn point_values<const D: usize, const S: usize, const W: usize>(
+    at: Converged<'_, D, S>,
+    value: impl Fn(&PointState<D>) -> [f64; W],
+) -> Result<Vec<f64>> {
     let mut values = vec![0.0; at.body.mesh.owned * W];
     let mut touched = vec![false; at.body.mesh.owned];
     let (displacement, velocity) = (at.state.displacement.local()?, at.state.velocity.local()?);
@@ -79,7 +114,7 @@ pub(super) fn of_contacts<'a, const D: usize, const S: usize, const W: usize>(
             }
         })?;
     }
-    Ok(Computed::of(values))
+    Ok(values)
 }
 
 /// The number of a state in the field `contact_status`.

@@ -5,6 +5,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{CONTACT, Energy, NUMERICAL, Step, WORK},
+        space::{acts_at_midsides, add_corner_means},
         state::State,
     },
 };
@@ -54,14 +55,25 @@ pub(super) fn restore_pressures<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Copies the pressures of the step just taken into the state.
+/// Copies the pressures of the step just taken into the state. Collective.
 pub(super) fn commit_tractions<const D: usize, const S: usize>(
     body: &Body<D, S>,
     state: &mut State,
 ) -> Result<()> {
     let Some(traction) = &mut state.contact_traction else { return Ok(()) };
-    let (velocity, mut traction) = (state.velocity.local()?, traction.owned_mut()?);
-    traction.fill(0.0);
-    body.contacts.iter().for_each(|contact| contact.add_tractions(&velocity, &mut traction));
+    let velocity = state.velocity.local()?;
+    traction.owned_mut()?.fill(0.0);
+    for contact in &body.contacts {
+        contact.add_tractions(&velocity, &mut traction.owned_mut()?);
+    }
+    if !acts_at_midsides(&body.mesh) {
+        return Ok(());
+    }
+    let mut of_contact = traction.like()?;
+    for contact in body.contacts.iter().filter(|contact| !contact.needs_ghosts()) {
+        of_contact.owned_mut()?.fill(0.0);
+        contact.add_tractions(&velocity, &mut of_contact.owned_mut()?);
+        add_corner_means(&body.mesh, contact.facets(), &mut of_contact, D, &mut traction.owned_mut()?)?;
+    }
     Ok(())
 }
