@@ -235,15 +235,13 @@ fn completion(shell: Shell) -> Result<Exit> {
 
 /// Writes the manual pages, on one process.
 fn manual(folder: &Path) -> Result<Exit> {
-    if launched_rank().is_some_and(|rank| rank > 0) {
-        return Ok(Exit::Done);
-    }
-    let write = || {
-        std::fs::create_dir_all(folder)?;
-        clap_mangen::generate_to(Cli::command(), folder)
-    };
-    write().map_err(|error| Error::unwritable(folder, error))?;
-    say(&format!("manual pages: {}", folder.display()))
+    on_one_process(|| {
+        let written =
+            std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
+        written.map_err(|error| Error::unwritable(folder, error))?;
+        print(&format!("manual pages: {}", folder.display()));
+        Ok(Exit::Done)
+    })
 }
 
 /// A clearer message for a command line that the parser refuses.
@@ -345,22 +343,26 @@ fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
 }
 
-/// Writes a report on one process; under a launcher the others wait for the outcome, so that all return the same exit code.
+/// Writes a report on one process.
 fn report_on(folder: &Path) -> Result<Exit> {
-    let make = || {
+    on_one_process(|| {
         let made = report(folder)?;
         for missing in &made.missing {
             let _ = writeln!(std::io::stderr(), "missing: {}", missing.trim_end());
         }
         print(&format!("{} with {} pictures", made.page.display(), made.pictures));
         Ok(Exit::Done)
-    };
+    })
+}
+
+/// Works on one process; under a launcher the others wait for the outcome, so that all return the same exit code.
+fn on_one_process(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
     if launched_rank().is_none() {
-        return make();
+        return work();
     }
     let mpi = Mpi::start()?;
     let session = mpi.session()?;
-    let outcome = session.agree(if session.is_first() { make() } else { Ok(Exit::Done) });
+    let outcome = session.agree(if session.is_first() { work() } else { Ok(Exit::Done) });
     Ok(outcome.unwrap_or_else(|error| printed(&session, &error)))
 }
 

@@ -433,6 +433,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Makes all trial histories the converged ones.
     pub fn commit(&mut self) {
         self.visit_histories(&mut |history| history.commit());
+        self.contacts.iter_mut().for_each(Contact::commit);
     }
 
     fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {

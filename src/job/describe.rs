@@ -305,13 +305,12 @@ pub(super) fn kind(schema: Schema) -> String {
     if schema.text("format") == Some("expression") {
         return "a number or an expression in t, x, y, z".into();
     }
-    if schema.accepts("array") {
+    if let Some(items) = schema.items().filter(|_| schema.accepts("array")) {
         let count = match (schema.number("minItems"), schema.number("maxItems")) {
             (Some(least), Some(most)) if least == most => format!("{least} "),
             _ => String::new(),
         };
-        let item = schema.items().map(kind).unwrap_or_default();
-        return format!("a list of {count}items, each {item}");
+        return format!("a list of {count}items, each {}", kind(items));
     }
     let plain = [
         ("object", "a table"),
@@ -319,6 +318,7 @@ pub(super) fn kind(schema: Schema) -> String {
         ("number", "a number"),
         ("string", "a string"),
         ("boolean", "true or false"),
+        ("array", "a list"),
     ];
     let accepted: Vec<&str> =
         plain.iter().filter(|(name, _)| schema.accepts(name)).map(|(_, words)| *words).collect();

@@ -5,8 +5,8 @@ use crate::{
     fem::{
         body::Body,
         effect::{
-            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, Resistances,
-            SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
+            Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle,
+            Resistances, SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
         },
         space::{Geometry, Held, SurfacePoint, cell_rule, facets, surface_points, values},
         state::State,
@@ -56,6 +56,7 @@ pub(super) fn body<const D: usize, const S: usize>(
             ContactConditions { quadrature: contact.quadrature, law, gap },
             &held,
         )?;
+        laws.obstacle = contact.obstacle_load.as_ref().map(LoadedObstacle::new);
         if let Some(friction) = contact.friction {
             session.agree(laws.add_friction(friction, &mesh, &held))?;
         }

@@ -80,9 +80,11 @@ fn quadratic_cells_press_on_a_plane_with_a_uniform_pressure() {
         } else {
             "[{on = ['left'], fix = ['x']}, {on = ['front'], fix = ['y']}]"
         };
+        let hypothesis = if dimension == 2 { "hypothesis = 'plane_strain', " } else { "" };
+        let elasticity = "elasticity = {youngs_modulus = 1000.0, poisson_ratio = 0.25}";
         let case = case
             .set("mesh.order", "2")
-            .set("material", "{elasticity = {youngs_modulus = 1000.0, poisson_ratio = 0.25}}")
+            .set("material", &format!("{{{hypothesis}{elasticity}}}"))
             .set("support", sides)
             .set("traction", &format!("[{{on = ['top'], value = {up}}}]"))
             .set("contact", "[{on = ['bottom'], normal = {unilateral = {gap = 0.0}}, friction = {coulomb = {coefficient = 0.1}}}]")
@@ -97,5 +99,44 @@ fn quadratic_cells_press_on_a_plane_with_a_uniform_pressure() {
             let pressures = &pressures[pressures.len() / 2..];
             assert!(pressures.iter().all(|p| (p - 3.0).abs() < 1e-7), "{ranks} ranks: {pressures:?}");
         }
+    }
+}
+
+/// A mass falls on an elastic block and bounces back: half a period of an oscillator.
+#[test]
+fn a_mass_that_hits_a_spring_turns_back_after_half_a_period() {
+    let case = Case::square(2)
+        .set(
+            "material",
+            "{hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1000.0, poisson_ratio = 0.0}}",
+        )
+        .set("support", "[{on = ['left'], fix = ['x']}, {on = ['bottom'], fix = ['y']}]")
+        .set("contact", "[{on = ['top'], normal = {unilateral = {}}}]")
+        .set("contact.0.obstacle", "{plane = {point = [0, 1], normal = [0, -1]}}")
+        .set("contact.0.obstacle_load", "{direction = [0, -3], force = 0, mass = 10, velocity = 1}")
+        .without("traction")
+        .without("body_force")
+        .without("initial")
+        .set("time", "{end = 0.4, step = 0.001, scheme = 'bdf2'}");
+    let mut first: Option<Vec<f64>> = None;
+    for ranks in 1..=3 {
+        let results = case.run(ranks);
+        let path = results.table("resultants.csv").only("source", "contact top");
+        let (displacements, velocities) =
+            (path.numbers("obstacle_displacement"), path.numbers("obstacle_velocity"));
+        let (times, forces) = (path.numbers("time"), path.numbers("force_y"));
+        // Stiffness 1000 N/m, frequency 10 /s: x = 0.1 m sin(10 t).
+        let deepest = displacements.iter().copied().fold(0.0, larger);
+        assert!((deepest - 0.1).abs() < 2e-4, "{deepest} m");
+        let touching = times.iter().zip(&forces).filter(|(_, force)| **force < 0.0).map(|(time, _)| *time);
+        let last = touching.fold(0.0, larger);
+        assert!((last - 0.1 * std::f64::consts::PI).abs() < 2.5e-3, "{last} s");
+        let rebound = velocities[velocities.len() - 1];
+        assert!((rebound + 1.0).abs() < 5e-3, "{rebound} m/s");
+        for (force, displacement) in forces.iter().zip(&displacements) {
+            assert!((force + 1000.0 * displacement.max(0.0)).abs() < 1e-5, "{force} N at {displacement} m");
+        }
+        let alone = first.get_or_insert_with(|| displacements.clone());
+        assert!(alone.iter().zip(&displacements).all(|(a, b)| (a - b).abs() < 1e-9), "{ranks} ranks");
     }
 }

@@ -169,6 +169,29 @@ fn a_run_with_contact_memory_continues_to_the_last_bit_and_on_any_number_of_rank
 }
 
 #[test]
+fn a_restarted_run_with_an_obstacle_that_a_force_moves_is_the_straight_run_to_the_last_bit() {
+    for scheme in ["'implicit_euler'", "'bdf2'", "'lagged_euler'"] {
+        let make = || {
+            saving()
+                .set("time.scheme", scheme)
+                .set("contact.0.normal", "{ unilateral = {} }")
+                .set("contact.0.friction", "{ coulomb = { coefficient = 0.3 } }")
+                .set("contact.0.obstacle", "{ plane = { point = [0, -0.002], normal = [0, 1] } }")
+                .set(
+                    "contact.0.obstacle_load",
+                    "{ direction = [1, 4], force = '3 + t', mass = 0.5, velocity = 0.1 }",
+                )
+        };
+        compare_with_straight(make, 1, scheme);
+        compare_with_straight(make, 2, scheme);
+        let results = make().run_and_keep(1).results();
+        let path =
+            results.table("resultants.csv").only("source", "contact bottom").numbers("obstacle_velocity");
+        assert!(path.windows(2).all(|pair| pair[0] != pair[1]), "{path:?}");
+    }
+}
+
+#[test]
 fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
     for law in [
         "tresca = { bound = 0.2 }",

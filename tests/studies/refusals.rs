@@ -124,7 +124,7 @@ fn keys_and_values_of_a_sweep_are_refused_with_their_place() {
         "`sweep.time` is not a complete name",
         "quote the whole key",
         "`sweep.cells` has 0 items",
-        "`sweep.seed` must be a list of items, each a number or a string or true or false or a table",
+        "`sweep.seed` must be a list of items, each a number or a string or true or false or a list or a table",
         "missing key `to` in [sweep.a]",
         "`sweep.a.draws` is out of range",
     ] {

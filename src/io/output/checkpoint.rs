@@ -36,6 +36,9 @@ pub struct Header {
     pub step_length: f64,
     /// Sums over the steps so far.
     pub totals: Totals,
+    /// For each contact whose obstacle a force moves: displacement in m and velocity in m/s after the last step, and before it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacles: Vec<[f64; 4]>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -69,6 +72,7 @@ impl Header {
             time: state.time,
             step_length: state.step_length,
             totals: *totals,
+            obstacles: body.contacts.iter().filter_map(|c| Some(c.obstacle.as_ref()?.saved())).collect(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -157,6 +161,8 @@ pub fn restore<const D: usize, const S: usize>(
         let values = checkpoint.read(set, total, kept, ids)?;
         kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
     }
+    let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
+    obstacles.zip(&header.obstacles).for_each(|(obstacle, saved)| obstacle.restore(*saved));
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)
 }

@@ -34,6 +34,8 @@ pub(crate) struct ResultantTable<const D: usize> {
 struct Columns {
     contact: bool,
     friction: bool,
+    /// Motion of an obstacle that a force moves.
+    obstacle: bool,
 }
 
 impl<const D: usize> ResultantTable<D> {
@@ -52,7 +54,8 @@ impl<const D: usize> ResultantTable<D> {
             names.extend((1..).map(same).find(|name| !names.contains(name)));
         }
         let friction = job.contact.iter().any(|contact| contact.friction.is_some());
-        let with = Columns { contact: !job.contact.is_empty(), friction };
+        let obstacle = job.contact.iter().any(|contact| contact.obstacle_load.is_some());
+        let with = Columns { contact: !job.contact.is_empty(), friction, obstacle };
         Ok(Self { resultants, names, with, file: None })
     }
 
@@ -64,7 +67,8 @@ impl<const D: usize> ResultantTable<D> {
         let contact =
             if self.with.contact { ",touching_area,open_area,mean_pressure,largest_pressure" } else { "" };
         let friction = if self.with.friction { ",sticking_area,slipping_area" } else { "" };
-        let header = format!("step,time,source{columns}{contact}{friction}");
+        let obstacle = if self.with.obstacle { ",obstacle_displacement,obstacle_velocity" } else { "" };
+        let header = format!("step,time,source{columns}{contact}{friction}{obstacle}");
         let path = folder.join("resultants.csv");
         self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?);
         Ok(())
@@ -82,11 +86,20 @@ impl<const D: usize> ResultantTable<D> {
         self.resultants.update(session, body, state, change, load)?;
         let Self { resultants, names, with, file } = self;
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
-            for (name, (resultant, areas)) in names.iter().zip(resultants.rows()) {
+            let rows = resultants.sources().iter().zip(resultants.rows());
+            for (name, (source, (resultant, areas))) in names.iter().zip(rows) {
                 let areas = Areas { areas, with: *with };
+                let obstacle = match source {
+                    Source::Contact(at) => body.contacts[*at].obstacle.as_ref(),
+                    _ => None,
+                };
+                let path = ObstaclePath {
+                    motion: obstacle.map(|obstacle| obstacle.motion()),
+                    is_there: with.obstacle,
+                };
                 let moment = &resultant.moment[3 - moment_axes::<D>().len()..];
                 file.row(format_args!(
-                    "{},{},{name},{},{}{areas}",
+                    "{},{},{name},{},{}{areas}{path}",
                     state.step,
                     Number(state.time),
                     Numbers(&resultant.force),
@@ -121,6 +134,22 @@ fn name(job: &Job, source: Source) -> String {
     format!("{kind} {}", on.join("+").replace([',', '"', '\n', '\r'], "_"))
 }
 
+/// The columns of the motion of an obstacle, each after a comma; empty where no force moves one.
+struct ObstaclePath {
+    motion: Option<[f64; 2]>,
+    is_there: bool,
+}
+
+impl Display for ObstaclePath {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.motion {
+            Some(motion) => write!(f, ",{}", Numbers(&motion)),
+            None if self.is_there => f.write_str(",,"),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The columns of contacts, each after a comma; empty where the source is no contact.
 struct Areas {
     areas: Option<ContactAreas>,
@@ -129,7 +158,7 @@ struct Areas {
 
 impl Display for Areas {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Columns { contact, friction } = self.with;
+        let Columns { contact, friction, .. } = self.with;
         let Some(areas) = self.areas else {
             let count = if contact { 4 } else { 0 } + if friction { 2 } else { 0 };
             return (0..count).try_for_each(|_| f.write_str(","));

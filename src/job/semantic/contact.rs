@@ -13,6 +13,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     let tables: Vec<ContactTable> =
         items(root, "contact").into_iter().map(|path| table(root, path)).collect();
     check_method(findings, &tables);
+    check_loads(findings, &tables);
     for table in tables {
         for fault in table.faults() {
             let key = format!("{}.{}", table.interface.path, fault.key);
@@ -36,13 +37,15 @@ fn table(root: &Node, path: String) -> ContactTable {
     let obstacle: Option<Gap> = root.read(&key("obstacle"));
     ContactTable {
         quadrature: root.read(&key("quadrature")).unwrap_or_default(),
+        obstacle_load: root.read(&key("obstacle_load")),
         adhesion: root.read(&key("adhesion")),
         memory: root.read(&key("memory")),
         interface: Interface {
             normal: root.read(&key("normal")),
             friction: root.read(&key("friction")),
             has_obstacle: root.find(&key("obstacle")).is_some(),
-            obstacle_moves: obstacle.is_some_and(|obstacle| obstacle.surface_may_move()),
+            obstacle_moves: obstacle.is_some_and(|obstacle| obstacle.surface_may_move())
+                || root.find(&key("obstacle_load")).is_some(),
             path,
         },
     }
@@ -59,6 +62,15 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
     if tables.is_empty() || !tables.iter().all(is_bound) {
         let message = "this method requires that every contact is frictionless and `unilateral`";
         findings.fault("solver.method", message, "use \"newton\", or delete the key");
+    }
+}
+
+/// One obstacle is solved together with a step.
+fn check_loads(findings: &mut Findings<'_>, tables: &[ContactTable]) {
+    for table in tables.iter().filter(|table| table.obstacle_load.is_some()).skip(1) {
+        let key = format!("{}.obstacle_load", table.interface.path);
+        let help = "prescribe the motion of the others, or put their boundaries into one [[contact]]";
+        findings.fault_at_key(&key, "a second obstacle is moved by a force; only one can be", help);
     }
 }
 
@@ -110,6 +122,7 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
         for vector in OBSTACLE_VECTORS {
             check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);
         }
+        check_vector(findings, &format!("{contact}.obstacle_load.direction"), mesh.dimension);
         check_rotation(findings, &format!("{contact}.obstacle"), mesh.dimension);
     }
 }

@@ -11,6 +11,7 @@ mod laws;
 mod memory;
 mod normal_law;
 mod obstacle;
+mod obstacle_load;
 mod obstacle_motion;
 mod polyline;
 mod table;
@@ -27,6 +28,7 @@ pub use laws::*;
 pub use memory::Memory;
 pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle::{Gap, Plane, Sphere};
+pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use polyline::Polyline;
 pub use table::{ContactTable, Quadrature};
@@ -52,6 +54,10 @@ pub struct Contact {
     /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
+    /// A force that moves the obstacle: indentation or punching by force. Its displacement and velocity are in `resultants.csv`. One
+    /// contact of a job may have it. Absent: the obstacle moves as its keys prescribe.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle_load: Option<ObstacleLoad>,
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,

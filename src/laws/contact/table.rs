@@ -1,6 +1,8 @@
 //! Faults of the laws of a `[[contact]]` table, of each law and of their combinations.
 
-use super::{adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory};
+use super::{
+    adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory, obstacle_load::ObstacleLoad,
+};
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,6 +26,8 @@ pub struct ContactTable {
     pub interface: Interface,
     /// The points of a facet at which the contact laws are evaluated.
     pub quadrature: Quadrature,
+    /// The force that moves the obstacle.
+    pub obstacle_load: Option<ObstacleLoad>,
     /// Bonds to the obstacle.
     pub adhesion: Option<Adhesion>,
     /// Memory of the foundation.
@@ -42,6 +46,7 @@ impl ContactTable {
         if let Some(law) = friction {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
+        faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(*has_obstacle)));
         faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.interface)));
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
         if self.quadrature == Quadrature::Gauss {

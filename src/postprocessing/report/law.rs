@@ -112,6 +112,7 @@ mod tests {
             quadrature,
             normal,
             obstacle,
+            obstacle_load: None,
             friction: None,
             adhesion: None,
             memory: None,

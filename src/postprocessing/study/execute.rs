@@ -2,7 +2,7 @@
 
 use super::{
     plan::Planned,
-    record::{Record, digest},
+    record::{Ran, Record, digest},
 };
 use crate::{
     error::{Exit, Result},
@@ -10,7 +10,10 @@ use crate::{
     parallel::{agreement::Agreed, session::Session},
     run::{self, Clock, Start},
 };
-use std::time::{Duration, Instant};
+use std::{
+    io::Write,
+    time::{Duration, Instant},
+};
 
 /// The outcome of a run.
 pub(super) enum Outcome {
@@ -23,6 +26,33 @@ pub(super) enum Outcome {
     },
     /// The run was stopped on request.
     Stopped,
+}
+
+/// Writes lines to the terminal, on the first rank.
+pub(super) fn speaker(session: &Session) -> impl Fn(&str) {
+    move |words| {
+        if session.is_first() {
+            let _ = writeln!(std::io::stdout(), "{words}");
+        }
+    }
+}
+
+/// Executes a planned run and says how it ended; `None` if it was stopped on request. Collective.
+pub(super) fn announced(
+    session: &Session,
+    planned: &Planned,
+    repetitions: usize,
+    count: &str,
+    say: &dyn Fn(&str),
+) -> Result<Option<Ran>> {
+    let Outcome::Ran { record, found } = execute(session, planned, repetitions)? else { return Ok(None) };
+    let words = match &record.error {
+        Some(error) => format!("failed: {error}"),
+        None if found => "already finished".into(),
+        None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
+    };
+    say(&format!("run {count:<9} {:<40} {words}", planned.name));
+    Ok(Some(Ran { record: *record, found }))
 }
 
 /// Executes a planned run, unless its folder contains the finished run. A failed run is an outcome, not an error. Collective.

@@ -43,12 +43,11 @@ use crate::{
 };
 use compare::Compared;
 use document::Take;
-use execute::{Outcome, execute};
+use execute::{announced, speaker};
 use plan::{Planned, PlannedReference};
 use record::{Ran, seconds_of};
 use results::RunResult;
 use side_by_side::{Numbered, execute_all};
-use std::io::Write;
 
 /// The reference of the keys of studies: of all tables, or of one table or key.
 pub fn describe(table: Option<&str>) -> Result<String> {
@@ -114,15 +113,6 @@ pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
     Ok(if failed { Exit::Failed } else { Exit::Done })
 }
 
-/// Writes lines to the terminal, on the first rank.
-fn speaker(session: &Session) -> impl Fn(&str) {
-    move |words| {
-        if session.is_first() {
-            let _ = writeln!(std::io::stdout(), "{words}");
-        }
-    }
-}
-
 /// The run that is the reference, if it is one.
 fn reference_run(plan: &Plan) -> Option<&Planned> {
     match &plan.reference {
@@ -134,23 +124,6 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
 fn stopped(say: &dyn Fn(&str)) -> Result<Exit> {
     say("stopped on request; the same command continues with the unfinished runs");
     Ok(Exit::Stopped)
-}
-
-fn announced(
-    session: &Session,
-    planned: &Planned,
-    repetitions: usize,
-    count: &str,
-    say: &dyn Fn(&str),
-) -> Result<Option<Ran>> {
-    let Outcome::Ran { record, found } = execute(session, planned, repetitions)? else { return Ok(None) };
-    let words = match &record.error {
-        Some(error) => format!("failed: {error}"),
-        None if found => "already finished".into(),
-        None => format!("{:.2} s", record.seconds.iter().map(|s| s.total).sum::<f64>()),
-    };
-    say(&format!("run {count:<9} {:<40} {words}", planned.name));
-    Ok(Some(Ran { record: *record, found }))
 }
 
 fn assembled(

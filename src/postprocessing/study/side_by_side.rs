@@ -1,7 +1,7 @@
 //! Runs of a study side by side, each on a group of ranks.
 
 use super::{
-    announced,
+    execute::{announced, speaker},
     plan::{Plan, Planned},
     record::{Ran, Record},
 };
@@ -62,7 +62,7 @@ pub(super) fn execute_all(
 /// Executes the runs of a group, one after the other; for each, whether an earlier study had finished it, on the first rank of the
 /// group. `None` if they were requested to stop. Collective over the group.
 fn execute_mine(ranks: &Session, mine: &[&Numbered]) -> Result<Option<Vec<bool>>> {
-    let say = super::speaker(ranks);
+    let say = speaker(ranks);
     let mut found = Vec::new();
     for (planned, repetitions, number) in mine {
         match announced(ranks, planned, *repetitions, number, &say)? {

@@ -27,7 +27,7 @@ pub(super) fn add_contact_energy<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Prepares the points of all contacts for a step.
+/// Prepares the points of all contacts for a step, with the pressures of the converged state.
 pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &State,
@@ -36,11 +36,18 @@ pub(super) fn prepare_contacts<const D: usize, const S: usize>(
     if body.contacts.is_empty() {
         return Ok(());
     }
-    let displacement = state.displacement.local()?;
-    for contact in &mut body.contacts {
-        contact.prepare(step.time, step.length, &displacement)?;
-    }
+    prepare_gaps(body, state, step)?;
     restore_pressures(body, state)
+}
+
+/// The same, with the pressures that the points have.
+pub(super) fn prepare_gaps<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    state: &State,
+    step: Step,
+) -> Result<()> {
+    let displacement = state.displacement.local()?;
+    body.contacts.iter_mut().try_for_each(|contact| contact.prepare(step.time, step.length, &displacement))
 }
 
 /// Sets the pressures of all contacts to those of the converged state.

@@ -87,6 +87,11 @@ impl Implicit {
         Ok(())
     }
 
+    /// The blend from which the step starts.
+    pub(super) fn blend(&self) -> Blend {
+        self.blend
+    }
+
     /// Corrects prepared contacts for the blend from which the step starts.
     pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,

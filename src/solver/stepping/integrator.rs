@@ -65,6 +65,14 @@ impl Integrator {
         }
     }
 
+    /// The blend of states from which a started step of this length in s starts.
+    pub(super) fn blend(&self, length: f64) -> Blend {
+        match self {
+            Self::LaggedEuler(_) => Blend::euler(length),
+            Self::Implicit(scheme) => scheme.blend(),
+        }
+    }
+
     /// Corrects prepared contacts for the blend from which the step starts.
     pub(super) fn prepare_contacts<const D: usize, const S: usize>(
         &mut self,

@@ -22,6 +22,7 @@ mod newton;
 mod outcome;
 mod problem;
 mod resistance;
+mod root;
 mod solver;
 mod springs;
 mod step_clock;

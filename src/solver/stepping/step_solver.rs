@@ -337,6 +337,11 @@ impl StepSolver {
         }
     }
 
+    /// The share of the forces at which a step counts as solved.
+    pub(super) fn relative_tolerance(&self) -> f64 {
+        self.settings.tolerance
+    }
+
     /// The residual norm in N at which a step counts as solved; refuses forces that are not finite. Sets the reference forces of
     /// the contacts. Collective.
     fn tolerance<const D: usize, const S: usize>(

@@ -2,20 +2,21 @@
 
 use super::{
     StepOutcome,
-    contacts::{commit_tractions, prepare_contacts},
+    contacts::{commit_tractions, prepare_contacts, prepare_gaps},
     factor_cache::nearest_cached_length,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
     multistart::solve_and_search,
     problem::StepProblem,
+    root::IncreasingRoot,
     step_clock::{Stages, StepClock, StepTraffic},
     step_error::{ErrorWorkspace, SolvedStep, StepError},
     step_solver::{Lengths, StepSolver},
     support_motion::MovingSupports,
 };
 use crate::{
-    error::Result,
+    error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
         effect::{Step, WORK},
@@ -27,6 +28,12 @@ use crate::{
     parallel::session::Session,
 };
 use std::time::Instant;
+
+/// The unbalanced force on an obstacle relative to its largest part at which its motion counts as solved, as a multiple of the
+/// tolerance of steps.
+const OBSTACLE_SHARE: f64 = 10.0;
+/// Number of solutions of a step after which the search for the motion of an obstacle fails.
+const EVALUATIONS: usize = 100;
 
 /// The choices of a job that determine a [`Stepper`].
 #[derive(Debug, Clone, Copy)]
@@ -227,6 +234,27 @@ impl Stepper {
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
+        let outcome = match body.contacts.iter().position(|contact| contact.obstacle.is_some()) {
+            Some(contact) => self.solve_with_obstacle(session, body, state, (step, contact)),
+            None => self.solve(session, body, state, step),
+        };
+        if let Some(supports) = &self.moving_supports {
+            supports.set(body, &mut self.trial)?;
+        }
+        drop(stage);
+        self.clock.solve += solving.elapsed();
+        self.traffic.add_solve(self.solver.traffic(session.ranks())?);
+        outcome
+    }
+
+    /// Solves the started step. Collective.
+    fn solve<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<StepOutcome> {
         let mut problem = StepProblem {
             session,
             body,
@@ -236,18 +264,60 @@ impl Stepper {
             rounding: self.integrator.rounding(session),
             flow_start: self.integrator.flow_start(),
         };
-        let outcome = if self.other_starts == 0 || problem.body.contacts.is_empty() {
+        if self.other_starts == 0 || problem.body.contacts.is_empty() {
             self.solver.solve(&mut problem, &mut self.trial)
         } else {
             solve_and_search(&mut self.solver, &mut problem, &mut self.trial, self.other_starts)
-        };
-        if let Some(supports) = &self.moving_supports {
-            supports.set(body, &mut self.trial)?;
         }
-        drop(stage);
-        self.clock.solve += solving.elapsed();
-        self.traffic.add_solve(self.solver.traffic(session.ranks())?);
-        outcome
+    }
+
+    /// Solves the started step together with the motion of the obstacle of this contact: repeats the step with other velocities of
+    /// the obstacle until its momentum is balanced. Collective.
+    fn solve_with_obstacle<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &mut Body<D, S>,
+        state: &State,
+        (step, contact): (Step, usize),
+    ) -> Result<StepOutcome> {
+        let blend = self.integrator.blend(step.length);
+        let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
+        let mut root = IncreasingRoot::default();
+        let mut all = StepOutcome::default();
+        let mut velocity = 0.0;
+        for evaluation in 0..EVALUATIONS {
+            let Some(obstacle) = &mut body.contacts[contact].obstacle else { break };
+            velocity = if evaluation == 0 { obstacle.start(blend) } else { obstacle.set_velocity(velocity) };
+            let prepared = prepare_gaps(body, state, step);
+            let prepared = prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step));
+            session.agree(prepared)?;
+            let outcome = self.solve(session, body, state, step)?;
+            all = StepOutcome {
+                newton_iterations: all.newton_iterations + outcome.newton_iterations,
+                linear_iterations: all.linear_iterations + outcome.linear_iterations,
+                active_changes: all.active_changes + outcome.active_changes,
+                indefinite_solves: all.indefinite_solves + outcome.indefinite_solves,
+                ..outcome
+            };
+            let contact = &body.contacts[contact];
+            let Some(obstacle) = &contact.obstacle else { break };
+            let own = self.trial.local().map(|trial| [contact.force_on_obstacle(&trial), contact.area()]);
+            let [resultant, area] = session.sum(session.agree(own)?);
+            let [unbalanced, scale] = obstacle.unbalanced(step.time, resultant);
+            if unbalanced.abs() <= tolerance * scale {
+                return Ok(all);
+            }
+            let slope = obstacle.inertia() + contact.scale * area;
+            match root.next(velocity, unbalanced, slope) {
+                Some(next) if next.is_finite() => velocity = next,
+                _ => break,
+            }
+        }
+        let Step { time, length, .. } = step;
+        Err(Error::Failed(format!(
+            "step to t = {time:.6e} s (length {length:.3e} s) failed: no motion of the obstacle balances its force; the last velocity \
+             tried was {velocity:.3e} m/s; let the force press the obstacle against the body, give it a mass, or take a smaller step"
+        )))
     }
 
     /// The error of the last attempted step: of the velocity, of the strain that it causes, and of the resulting histories of

@@ -56,7 +56,7 @@ impl<const D: usize> Contact<D> {
     /// is NaN is ignored: the first step refuses it.
     pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
         let depth = |point: &Point<D>| {
-            let gap = self.gap.at(time, &point.place, &point.normal);
+            let gap = self.gap_at(time, &point.place, &point.normal);
             gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(Body, displacement) - gap)
         };
         self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
@@ -68,7 +68,7 @@ impl<const D: usize> Contact<D> {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let gap = self.gap.at(time, &point.place, &point.normal)?;
+            let gap = self.gap_at(time, &point.place, &point.normal)?;
             let stored = self.law.energy(point.normal_component(Body, displacement) - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };

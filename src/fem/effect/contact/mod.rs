@@ -26,6 +26,7 @@ mod directions;
 mod energy;
 mod friction;
 mod inclusion;
+mod loaded_obstacle;
 mod newton;
 mod point;
 mod prepare;
@@ -41,6 +42,7 @@ use crate::{
     error::Result,
     fem::space::{Held, surface_points},
     laws::contact::{Gap, NormalResponse},
+    linear_algebra::tensor::Vector,
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -51,6 +53,7 @@ pub use crate::laws::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, STORED_IN_CONTACT};
+pub use loaded_obstacle::LoadedObstacle;
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use unknowns::choose_unknowns;
@@ -73,6 +76,8 @@ pub struct Contact<const D: usize> {
     pub law: NormalResponse,
     /// Distance to the obstacle along the normal.
     pub gap: Gap,
+    /// The motion of the obstacle, if a force moves it.
+    pub obstacle: Option<LoadedObstacle<D>>,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
     /// Length in s of the current step, as laws of the displacement see it.
@@ -125,12 +130,14 @@ impl<const D: usize> Contact<D> {
             }
             point.place = place;
         }
+        let scale = 2.0 * law.monotonicity_constant(1.0) + 1.0;
         let needs_ghosts = quadrature == Quadrature::Gauss;
         let reference = ReferenceValues::default();
         Ok(Self {
             law,
             gap,
-            scale: 1.0,
+            obstacle: None,
+            scale,
             step_length: 0.0,
             reference,
             facets: facets.to_vec(),
@@ -139,6 +146,31 @@ impl<const D: usize> Contact<D> {
             needs_ghosts,
             derivatives: Derivatives::Unknown,
         })
+    }
+
+    /// Commits the motion of the obstacle in a step.
+    pub fn commit(&mut self) {
+        self.obstacle.iter_mut().for_each(LoadedObstacle::commit);
+    }
+
+    /// The gap in m at `time` of a place with this normal, where the obstacle is after the last step.
+    fn gap_at(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<f64> {
+        let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
+        self.gap.at(time, &seen, normal)
+    }
+
+    /// Whether the surface of the obstacle may move.
+    fn surface_may_move(&self) -> bool {
+        self.obstacle.is_some() || self.gap.surface_may_move()
+    }
+
+    /// The resultant in N of the tractions on the obstacle along the direction of its motion, of points on this rank in the step just
+    /// solved, at its velocities with ghosts; 0 if no force moves it.
+    pub fn force_on_obstacle(&self, velocity: &[f64]) -> f64 {
+        let Some(obstacle) = &self.obstacle else { return 0.0 };
+        let mut sum = 0.0;
+        self.forces(velocity, |_, force| sum -= obstacle.along(&force));
+        sum
     }
 
     /// Whether velocities of ghost nodes are read and forces on them are written.

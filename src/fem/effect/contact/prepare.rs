@@ -2,6 +2,7 @@
 
 use super::{
     Contact,
+    loaded_obstacle::LoadedObstacle,
     point::{Point, Unknown, Vectors::Body},
     tangential_point::ROUNDING,
 };
@@ -9,7 +10,7 @@ use crate::{
     error::{Error, Result},
     fem::effect::{Blend, Step},
     laws::contact::{NodeContext, Rate},
-    linear_algebra::tensor::{dot, norm},
+    linear_algebra::tensor::{Vector, add_scaled, dot, norm},
 };
 
 impl<const D: usize> Contact<D> {
@@ -21,8 +22,12 @@ impl<const D: usize> Contact<D> {
         }
         self.step_length = length;
         for point in &mut self.points {
-            let gap_at = |time| self.gap.at(time, &point.place, &point.normal);
-            let (gap, before) = (gap_at(time)?, gap_at(time - length)?);
+            let [after, before] = match &self.obstacle {
+                None => [point.place; 2],
+                Some(obstacle) => [obstacle.seen_after(&point.place), obstacle.seen_before(&point.place)],
+            };
+            let gap = self.gap.at(time, &after, &point.normal)?;
+            let before = self.gap.at(time - length, &before, &point.normal)?;
             let along = point.normal_component(Body, displacement);
             point.context = NodeContext { penetration: along - gap, step_length: length };
             point.penetration_before = along - before;
@@ -64,7 +69,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether friction here acts on the velocity relative to an obstacle that may move along the boundary.
     pub fn has_moving_obstacle(&self) -> bool {
-        self.friction.is_some() && self.gap.surface_may_move()
+        self.friction.is_some() && self.surface_may_move()
     }
 
     /// The sum over points on this rank of the squares of the obstacle's velocity along the tangents, in (m/s)^2.
@@ -77,11 +82,18 @@ impl<const D: usize> Contact<D> {
     /// of a point along this motion and leave another free: the direction of sliding depends on both, but only the free one is an
     /// unknown. Where supports fix all tangents, friction has no effect.
     fn set_obstacle_velocities(&mut self, rate: Rate) -> Result<()> {
-        let Some(friction) = self.friction.as_mut().filter(|_| self.gap.surface_may_move()) else {
+        let may_move = self.surface_may_move();
+        let Some(friction) = self.friction.as_mut().filter(|_| may_move) else {
             return Ok(());
         };
         let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
-        let velocity = |point: &Point<D>| gap.velocity_along(&motion, rate.time, &point.place, &point.normal);
+        let obstacle = self.obstacle.as_ref();
+        let velocity = |point: &Point<D>| {
+            let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));
+            let prescribed = gap.velocity_along(&motion, rate.time, &seen, &point.normal)?;
+            let own = obstacle.map_or([0.0; D], LoadedObstacle::velocity);
+            Ok::<Vector<D>, Error>(add_scaled(&prescribed, 1.0, &own))
+        };
         friction.obstacle_velocities.clear();
         for point in &friction.points {
             friction.obstacle_velocities.push(point.part(&velocity(&points[point.at])?));

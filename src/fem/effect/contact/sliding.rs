@@ -19,7 +19,7 @@ impl<const D: usize> Contact<D> {
                 "friction does not act at Gauss points: use quadrature = \"nodal\"".into(),
             ));
         }
-        self.friction = Some(Friction::new(law, &self.points, self.gap.surface_may_move(), mesh, held)?);
+        self.friction = Some(Friction::new(law, &self.points, self.surface_may_move(), mesh, held)?);
         Ok(())
     }
 

@@ -218,7 +218,7 @@ mod tests {
     fn the_energy_is_that_of_the_closed_gap_whatever_the_corners() {
         for points in [vec![[1e-3, 0.0], [2e-3, 4.0]], vec![[-2e-3, 0.0], [-1e-3, -3.0]], vec![[0.0, 0.0]]] {
             let law = DisplacementGraph { points, slope_after: 7.0, gap: None }.response().unwrap();
-            assert_eq!(law.energy(0.0), Some(0.0));
+            assert!(law.energy(0.0).unwrap().abs() < 1e-17);
             for d in [-3e-3, -1.5e-3, 0.5e-3, 1.5e-3, 5e-3] {
                 let h = 1e-8;
                 let change = (law.energy(d + h).unwrap() - law.energy(d - h).unwrap()) / (2.0 * h);

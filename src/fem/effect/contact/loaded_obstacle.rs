@@ -1,0 +1,156 @@
+//! An obstacle that a force moves along a direction.
+//!
+//! With the displacement `x` of the obstacle along the direction `d`, the force `F` and the contact tractions, `m x'' = F + R`, where `R`
+//! is the resultant of the tractions on the obstacle along `d`. In a step the displacement and the velocity `w` change as those of the
+//! body: `x = x~ + k' w` and `m (w - w~) / k' = F + R`, with the blends `x~` and `w~` of earlier states and the length `k'` of the
+//! scheme. `R` depends on `w`, through the gaps at the end of the step.
+
+use crate::{
+    fem::effect::Blend,
+    laws::{contact::ObstacleLoad, expression::Scalar},
+    linear_algebra::tensor::{Vector, add_scaled, norm},
+};
+
+/// An obstacle with the force that moves it.
+#[derive(Debug)]
+pub struct LoadedObstacle<const D: usize> {
+    direction: Vector<D>,
+    force: Scalar,
+    mass: f64,
+    /// Displacement in m and velocity in m/s after the last step, before it, and at the end of the current one.
+    converged: [f64; 2],
+    earlier: [f64; 2],
+    trial: [f64; 2],
+    blend: Blend,
+}
+
+impl<const D: usize> LoadedObstacle<D> {
+    /// The obstacle at time 0.
+    pub fn new(load: &ObstacleLoad) -> Self {
+        let direction: Vector<D> = std::array::from_fn(|i| load.direction.get(i).copied().unwrap_or(0.0));
+        let start = [0.0, load.velocity];
+        Self {
+            direction: direction.map(|x| x / norm(&direction)),
+            force: load.force.clone(),
+            mass: load.mass,
+            converged: start,
+            earlier: start,
+            trial: start,
+            blend: Blend::euler(0.0),
+        }
+    }
+
+    /// The force as a function of time.
+    pub fn force(&self) -> &Scalar {
+        &self.force
+    }
+
+    /// Displacement in m and velocity in m/s along the direction after the last step.
+    pub fn motion(&self) -> [f64; 2] {
+        self.converged
+    }
+
+    /// Displacement and velocity after the last step and before it, for checkpoints.
+    pub fn saved(&self) -> [f64; 4] {
+        let [[x, w], [y, v]] = [self.converged, self.earlier];
+        [x, w, y, v]
+    }
+
+    /// Sets what [`saved`](Self::saved) gave.
+    pub fn restore(&mut self, [x, w, y, v]: [f64; 4]) {
+        (self.converged, self.earlier, self.trial) = ([x, w], [y, v], [x, w]);
+    }
+
+    /// Starts a step; returns the velocity in m/s after the last one.
+    pub fn start(&mut self, blend: Blend) -> f64 {
+        self.blend = blend;
+        self.set_velocity(self.converged[1])
+    }
+
+    /// Sets the velocity in m/s at the end of the step.
+    pub fn set_velocity(&mut self, velocity: f64) -> f64 {
+        let start = self.blend.of(self.converged[0], self.earlier[0]);
+        self.trial = [start + self.blend.length * velocity, velocity];
+        velocity
+    }
+
+    /// `m (w - w~) / k' - F - R` in N at the end of a step at `time`, given the resultant `R` in N, and the largest of the terms.
+    pub fn unbalanced(&self, time: f64, resultant: f64) -> [f64; 2] {
+        let before = self.blend.of(self.converged[1], self.earlier[1]);
+        let momentum = [self.trial[1], before].map(|velocity| self.mass * velocity / self.blend.length);
+        let force = self.force.evaluate(time, &[]);
+        let terms = [momentum[0], momentum[1], force, resultant];
+        [
+            momentum[0] - momentum[1] - force - resultant,
+            terms.iter().fold(0.0, |most, term| f64::max(most, term.abs())),
+        ]
+    }
+
+    /// `m / k'` in kg/s.
+    pub fn inertia(&self) -> f64 {
+        self.mass / self.blend.length
+    }
+
+    /// The component along the direction of a force on the obstacle.
+    pub fn along(&self, force: &Vector<D>) -> f64 {
+        (0..D).map(|i| self.direction[i] * force[i]).sum()
+    }
+
+    /// Commits the motion of the step.
+    pub(super) fn commit(&mut self) {
+        (self.earlier, self.converged) = (self.converged, self.trial);
+    }
+
+    /// Velocity in m/s at the end of the step.
+    pub(super) fn velocity(&self) -> Vector<D> {
+        self.direction.map(|x| self.trial[1] * x)
+    }
+
+    /// Places as seen from the obstacle: after the last step.
+    pub(super) fn seen_before(&self, place: &Vector<D>) -> Vector<D> {
+        add_scaled(place, -self.converged[0], &self.direction)
+    }
+
+    /// Places as seen from the obstacle: at the end of the current step.
+    pub(super) fn seen_after(&self, place: &Vector<D>) -> Vector<D> {
+        add_scaled(place, -self.trial[0], &self.direction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn falling() -> LoadedObstacle<2> {
+        LoadedObstacle::new(&ObstacleLoad {
+            direction: vec![0.0, -2.0],
+            force: Scalar::Number(6.0),
+            mass: 3.0,
+            velocity: 1.0,
+        })
+    }
+
+    #[test]
+    fn steps_of_both_schemes_by_hand() {
+        let mut obstacle = falling();
+        assert_eq!(obstacle.start(Blend::euler(0.5)), 1.0);
+        obstacle.set_velocity(2.0);
+        // 3 kg (2 - 1) m/s / 0.5 s = 6 N.
+        assert_eq!(obstacle.unbalanced(0.5, 0.0), [0.0, 12.0]);
+        assert_eq!(obstacle.unbalanced(0.5, -2.0)[0], 2.0);
+        assert_eq!(obstacle.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
+        assert_eq!(obstacle.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
+        assert_eq!((obstacle.velocity(), obstacle.along(&[5.0, -7.0])), ([0.0, -2.0], 7.0));
+        obstacle.commit();
+        assert_eq!(obstacle.motion(), [1.0, 2.0]);
+        // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.
+        obstacle.start(Blend { length: 1.0 / 3.0, recent: 4.0 / 3.0, earlier: -1.0 / 3.0 });
+        obstacle.set_velocity(3.0);
+        assert!(obstacle.unbalanced(1.0, 0.0)[0].abs() < 1e-13);
+        obstacle.commit();
+        assert!((obstacle.motion()[0] - 7.0 / 3.0).abs() < 1e-15);
+        let mut other = falling();
+        other.restore(obstacle.saved());
+        assert_eq!(other.saved(), obstacle.saved());
+    }
+}
