@@ -284,7 +284,7 @@ impl Stepper {
         let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
         let mut root = IncreasingRoot::default();
         let mut all = StepOutcome::default();
-        let mut velocity = 0.0;
+        let (mut velocity, mut largest) = (0.0, 0.0);
         for evaluation in 0..EVALUATIONS {
             let Some(obstacle) = &mut body.contacts[contact].obstacle else { break };
             velocity = if evaluation == 0 { obstacle.start(blend) } else { obstacle.set_velocity(velocity) };
@@ -304,7 +304,9 @@ impl Stepper {
             let own = self.trial.local().map(|trial| [contact.force_on_obstacle(&trial), contact.area()]);
             let [resultant, area] = session.sum(session.agree(own)?);
             let [unbalanced, scale] = obstacle.unbalanced(step.time, resultant);
-            if unbalanced.abs() <= tolerance * scale {
+            // A force that vanishes is compared with the contact forces of the first solutions.
+            largest = f64::max(largest, scale);
+            if unbalanced.abs() <= tolerance * largest {
                 return Ok(all);
             }
             let slope = obstacle.inertia() + contact.scale * area;
