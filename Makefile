@@ -10,6 +10,7 @@ PETSC64_DIR ?= /usr/lib/petscdir/petsc64-real
 TARGET64 ?= target/petsc64
 
 binary := $(or $(CARGO_TARGET_DIR),target)/release/solver
+msrv := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 share := $(DESTDIR)$(PREFIX)/share/clarke
 completions := bash-completion/completions zsh/site-functions fish/vendor_completions.d
 
@@ -28,7 +29,7 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy verification lint install clean
+.PHONY: help deps deps64 build run reference test test64 test64-lib check64 hard bench bench-runs bench-accuracy verification lint deny msrv deb install clean
 .DEFAULT_GOAL := help
 
 help:
@@ -47,6 +48,9 @@ help:
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
 	@echo 'make hard      what make test samples of hard cases and faults, whole; random input; a Slurm of its own (1.5 h; docs/stability.md)'
 	@echo 'make lint      deps, then format, clippy and documentation, warnings refused'
+	@echo 'make deny      licences of the crates, and known faults in them (cargo-deny; asks the network)'
+	@echo 'make msrv      whether the oldest supported Rust compiles the solver (rustup)'
+	@echo 'make deb       build, then a Debian package in target/; as root, scripts/test-deb.sh tries it in a copy of the system'
 	@echo 'make install   the built solver with manual pages and shell completion, jobs, meshes and schemas to PREFIX=$(PREFIX)'
 	@echo 'make clean     remove everything that was compiled'
 	@echo 'DEPS=no skips the packages, for systems where PETSc, MPI, HDF5 and METIS come from elsewhere.'
@@ -124,6 +128,18 @@ lint: deps
 	cargo fmt --all --check
 	cargo clippy --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked
+
+# The crate advisories change without a change here: no part of `make lint`.
+deny:
+	@cargo deny --version >/dev/null 2>&1 || cargo install --locked cargo-deny
+	cargo deny check
+
+msrv: deps
+	rustup toolchain install $(msrv) --profile minimal
+	cargo +$(msrv) check --locked --target-dir target/msrv
+
+deb: build
+	scripts/make-deb.sh $(binary) target
 
 # Does not compile, so that `sudo make install` needs no Rust for root.
 install:
