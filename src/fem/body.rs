@@ -28,6 +28,9 @@ use crate::{
 };
 use std::cell::RefCell;
 
+/// The table of slips in checkpoints and field files.
+const SLIP: &str = "slip";
+
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
     /// This rank's part of the mesh.
@@ -289,7 +292,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// law bounds; `None` if it nowhere does.
     pub fn slip_pressure(&self, state: &State) -> Result<Option<f64>> {
         let mut weakening =
-            self.contacts.iter().filter(|contact| contact.decrease_per_pressure().is_some()).peekable();
+            self.contacts.iter().filter(|contact| contact.decrease_per_pressure(1.0).is_some()).peekable();
         if weakening.peek().is_none() {
             return Ok(None);
         }
@@ -450,7 +453,21 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The converged histories of nodes.
     pub fn node_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.surface_effects.iter().flat_map(|effect| effect.histories()).map(|store| store.history())
+        let of_effects = self.surface_effects.iter().flat_map(|effect| effect.histories());
+        of_effects.map(|store| store.history()).chain(self.slip())
+    }
+
+    /// The slip of nodes, if the bound of friction depends on it.
+    fn slip(&self) -> Option<History<'_>> {
+        let mut values = vec![0.0; self.mesh.owned];
+        let mut count = 0;
+        for (node, slip) in self.contacts.iter().flat_map(Contact::slips) {
+            values[node] = slip;
+            count += 1;
+        }
+        let follows = self.contacts.iter().filter_map(Contact::friction).any(|law| law.follows_slip());
+        let bytes = count * size_of::<f64>();
+        follows.then(|| History { name: SLIP, width: 1, points: 1, values: values.into(), bytes })
     }
 
     /// The histories of cells at all their points: the converged ones and, where they are kept, those before the last step.
@@ -460,12 +477,15 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The histories of nodes, likewise.
     pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.surface_effects.iter().flat_map(|effect| all_of(effect.histories()))
+        self.surface_effects.iter().flat_map(|effect| all_of(effect.histories())).chain(self.slip())
     }
 
     /// Restores the saved values of the history of this name.
     pub fn restore_history(&mut self, name: &str, values: &[f64]) {
         self.visit_histories(&mut |history| history.restore(name, values));
+        if name == SLIP {
+            self.contacts.iter_mut().for_each(|contact| contact.restore_slips(values));
+        }
     }
 
     /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.

@@ -58,6 +58,14 @@ pub trait FrictionBound {
         0.0
     }
 
+    /// Whether the bound depends on the slip, the length of the way that a point has slid.
+    fn follows_slip(&self) -> bool {
+        false
+    }
+
+    /// Sets the slip in m with which a step begins, and its length in s.
+    fn start_step(&mut self, _slip: f64, _length: f64) {}
+
     /// The faults of the parameters; keys are those of the table of the law.
     fn own_faults(&self) -> Vec<LawFault> {
         Vec::new()
@@ -135,8 +143,21 @@ macro_rules! friction_laws {
                 follows_pressure() -> bool;
                 steepest_decrease() -> f64;
                 corner_velocity() -> f64;
+                follows_slip() -> bool;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
+            }
+
+            /// See [`FrictionBound::start_step`].
+            #[inline]
+            pub fn start_step(&mut self, slip: f64, length: f64) {
+                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, slip, length));
+            }
+
+            /// The law at the start of a step of this length in s of a point that has not slid.
+            pub fn in_step(mut self, length: f64) -> Self {
+                self.start_step(0.0, length);
+                self
             }
 
             /// Its table in the job, relative to that of the contact.

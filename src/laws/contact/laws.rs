@@ -4,6 +4,7 @@ mod compliance;
 mod coulomb;
 mod damped_response;
 mod displacement_graph;
+mod distance_weakening;
 mod exponential_damper;
 mod graph;
 mod slip_weakening;
@@ -14,6 +15,7 @@ pub use compliance::Compliance;
 pub use coulomb::Coulomb;
 pub use damped_response::{DampedResponse, Symmetry};
 pub use displacement_graph::DisplacementGraph;
+pub use distance_weakening::{Decay, DistanceWeakening};
 pub use exponential_damper::ExponentialDamper;
 pub use graph::Graph;
 pub use slip_weakening::SlipWeakening;
@@ -56,6 +58,8 @@ friction_laws! {
     Coulomb = "coulomb",
     /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity).
     SlipWeakening = "slip_weakening",
+    /// A friction coefficient that decreases with the slip, the length of the way that a point has slid: the law of dynamic rupture.
+    DistanceWeakening = "distance_weakening",
 }
 
 impl NormalLaw {

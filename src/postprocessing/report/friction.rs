@@ -35,7 +35,8 @@ pub(super) fn picture(
 ) -> Result<Option<Picture>> {
     let touching: Vec<&Rubbing> =
         nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
-    if touching.is_empty() {
+    // Nodes with different slips have different graphs.
+    if touching.is_empty() || law.follows_slip() {
         return Ok(None);
     }
     let ordinate = |node: &Rubbing| node.traction / if law.follows_pressure() { node.pressure } else { 1.0 };

@@ -1,13 +1,14 @@
 //! Cases that the certificates do not cover.
 
 use super::Certificates;
-use crate::fem::{body::Body, effect::Contact};
+use crate::fem::body::Body;
 
 /// Descriptions of effects that depend on the unknown contact pressures, and of effects that may soften the body at the end of a
 /// step.
 pub(super) fn not_covered<const D: usize, const S: usize>(
     body: &Body<D, S>,
     &Certificates { theta_step, slip_pressure_bound, decrease_with_displacement, .. }: &Certificates,
+    step_length: f64,
 ) -> Vec<String> {
     let contacts = &body.contacts;
     let mut words = Vec::new();
@@ -26,7 +27,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
              continuous problem no certificate is known"
         ));
     }
-    for fall in contacts.iter().filter_map(Contact::decrease_per_pressure) {
+    for fall in contacts.iter().filter_map(|contact| contact.decrease_per_pressure(step_length)) {
         let covered = slip_pressure_bound.map_or_else(String::new, |bound| {
             // If no other graph decreases, theta is proportional to the pressure.
             let each = match theta_step {

@@ -72,8 +72,9 @@ impl Certificates {
         matrix: &mut MatrixOfStep<'_>,
         longest: f64,
     ) -> Result<Self> {
+        let length = matrix.length;
         let steepest = |constants: [f64; 2]| constants.into_iter().fold(0.0, f64::max);
-        let falls = body.contacts.iter().map(|c| steepest(c.monotonicity_constants(matrix.length)));
+        let falls = body.contacts.iter().map(|c| steepest(c.monotonicity_constants(length)));
         let decrease = body.contacts.iter().filter_map(Contact::decrease_with_displacement);
         let decrease = decrease.reduce(f64::max);
         let growth = growth(&body.contacts);
@@ -95,9 +96,9 @@ impl Certificates {
                 known.theta = Some(if falling { find(Supremum::Theta)? } else { 0.0 });
             }
             known.trace_norm_squared = Some(find(Supremum::TraceNorm)?)
-                .filter(|norm| *norm < RIGID * length(session, &body.mesh.nodes));
+                .filter(|norm| *norm < RIGID * extent(session, &body.mesh.nodes));
         }
-        if body.contacts.iter().any(|contact| contact.decrease_per_pressure().is_some()) {
+        if body.contacts.iter().any(|contact| contact.decrease_per_pressure(length).is_some()) {
             let bound = if known.steps_are_unique() {
                 (1.0 - Self::MARGIN) / find(Supremum::SlipPressure)?
             } else {
@@ -106,7 +107,7 @@ impl Certificates {
             known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite());
         }
         known.decrease_with_displacement = decrease;
-        known.not_covered = not_covered(body, &known);
+        known.not_covered = not_covered(body, &known, length);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
@@ -142,7 +143,7 @@ impl Certificates {
 }
 
 /// The longest side of the box around these nodes on all ranks. Collective.
-fn length<const D: usize>(session: &Session, nodes: &[[f64; D]]) -> f64 {
+fn extent<const D: usize>(session: &Session, nodes: &[[f64; D]]) -> f64 {
     let bound = |sign: f64| -> [f64; D] {
         let most = |i| nodes.iter().map(|node| sign * node[i]).fold(f64::NEG_INFINITY, f64::max);
         session.largest(std::array::from_fn(most))

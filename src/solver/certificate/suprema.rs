@@ -125,7 +125,7 @@ impl<const D: usize, const S: usize> Quotient for Pencil<'_, '_, D, S> {
                             (Supremum::Theta, _) => forms::add_trace(&body.mesh, contact, falls, x, y),
                             (Supremum::SlipPressure, 0) => {
                                 contact.add_squares(
-                                    [0.0, contact.decrease_per_pressure().unwrap_or(0.0)],
+                                    [0.0, contact.decrease_per_pressure(self.matrix.length).unwrap_or(0.0)],
                                     x,
                                     y,
                                 );

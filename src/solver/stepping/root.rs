@@ -1,7 +1,9 @@
 //! The root of an increasing function whose evaluation is expensive.
 
-/// Largest ratio of successive steps while no interval with a change of sign is known.
-const GROWTH: f64 = 10.0;
+/// Largest ratio of successive secant steps while no interval with a change of sign is known.
+const SECANT_GROWTH: f64 = 10.0;
+/// Ratio of successive steps where the function is constant.
+const GROWTH: f64 = 3.0;
 
 /// Secant steps, inside an interval with a change of sign as soon as one is known.
 #[derive(Debug, Default)]
@@ -22,17 +24,19 @@ impl IncreasingRoot {
     pub(super) fn next(&mut self, at: f64, value: f64, slope: f64) -> Option<f64> {
         let side = if value < 0.0 { &mut self.low } else { &mut self.high };
         *side = Some([at, value]);
-        let secant = self.last.and_then(|[before, earlier]| {
+        let before = self.last.replace([at, value]);
+        let secant = before.and_then(|[before, earlier]| {
             let step = -value * (at - before) / (value - earlier);
-            (step.is_finite() && step * value <= 0.0).then_some((step, (at - before).abs()))
+            (step.is_finite() && step * value <= 0.0).then_some(step)
         });
-        self.last = Some([at, value]);
         let (Some([low, _]), Some([high, _])) = (self.low, self.high) else {
-            let direction = -value.signum();
-            return Some(match secant {
-                Some((step, before)) => at + direction * step.abs().min(GROWTH * before),
-                None => at - value / slope,
-            });
+            let last = before.map(|[before, _]| (at - before).abs());
+            let step = match (secant, last) {
+                (Some(step), Some(last)) => step.abs().min(SECANT_GROWTH * last),
+                (None, Some(last)) => GROWTH * last,
+                _ => (value / slope).abs(),
+            };
+            return Some(at - value.signum() * step);
         };
         let (middle, width) = (0.5 * (low + high), high - low);
         if !(low < middle && middle < high) {
@@ -47,7 +51,7 @@ impl IncreasingRoot {
         if width <= 0.5 * self.width || is_slow {
             (self.width, self.count) = (width, 0);
         }
-        let next = secant.map_or(middle, |(step, _)| at + step);
+        let next = secant.map_or(middle, |step| at + step);
         Some(if !is_slow && low < next && next < high { next } else { middle })
     }
 }

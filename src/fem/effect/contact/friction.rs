@@ -90,6 +90,8 @@ impl<const D: usize> Friction<D> {
                 weight: point.weight,
                 tangents,
                 count,
+                law,
+                slip: 0.0,
                 pressure: 0.0,
                 traction: [0.0; D],
                 tangent: Tangent::free(),
@@ -120,6 +122,23 @@ impl<const D: usize> Friction<D> {
         }
     }
 
+    /// Starts a step of this length in s.
+    pub(super) fn start_step(&mut self, length: f64) {
+        if self.law.follows_slip() {
+            self.law.start_step(0.0, length);
+            self.points.iter_mut().for_each(|point| point.law.start_step(point.slip, length));
+        }
+    }
+
+    /// Adds to the slips the ways of a step of this length in s at these velocities, with ghosts.
+    pub(super) fn add_slip(&mut self, velocity: &[f64], length: f64) {
+        if self.law.follows_slip() {
+            let ways: Vec<f64> =
+                self.sliding(Body, velocity).map(|(_, sliding)| length * norm(&sliding)).collect();
+            self.points.iter_mut().zip(ways).for_each(|(point, way)| point.slip += way);
+        }
+    }
+
     /// Uses the pressures of `points` in the bounds.
     pub(super) fn update_pressures(&mut self, points: &[Point<D>]) {
         self.points.iter_mut().for_each(|point| point.pressure = points[point.at].pressure);
@@ -133,14 +152,14 @@ impl<const D: usize> Friction<D> {
 
     /// Converts unknowns into velocities, after `points` have computed their pressures.
     pub(super) fn map(&mut self, points: &[Point<D>], values: &mut [f64]) {
-        let (law, scale) = (self.law, self.scale);
+        let scale = self.scale;
         if self.follows {
             self.update_pressures(points);
         }
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = law.resolve(scale * length, scale, point.pressure);
+            let found = point.law.resolve(scale * length, scale, point.pressure);
             let shares = if found.traction == 0.0 {
                 // Without traction the velocity is bitwise equal to the unknown.
                 [1.0, 0.0]
@@ -179,11 +198,11 @@ impl<const D: usize> Friction<D> {
     /// A point without pressure whose normal graph is vertical is assumed to come under pressure: it sticks, which is one of the
     /// generalised derivatives at rest.
     pub(super) fn linearise(&mut self, points: &[Point<D>], values: &[f64]) {
-        let (law, scale, follows) = (self.law, self.scale, self.follows);
+        let (scale, follows) = (self.scale, self.follows);
         for point in &mut self.points {
             let unknown = point.along(Newton, values);
             let length = norm(&unknown);
-            let found = law.resolve(scale * length, scale, point.pressure);
+            let found = point.law.resolve(scale * length, scale, point.pressure);
             let at_rest = length == 0.0 || found.speed == 0.0;
             let touches = follows && points[point.at].theta == 0.0;
             point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
@@ -308,7 +327,7 @@ impl<const D: usize> Friction<D> {
                 return (Motion::Separated, point.weight);
             }
             let parameter: Vector<D> = std::array::from_fn(|i| self.scale * sliding[i] + point.traction[i]);
-            let found = self.law.resolve(norm(&parameter), self.scale, point.pressure);
+            let found = point.law.resolve(norm(&parameter), self.scale, point.pressure);
             (if found.derivative == 0.0 { Motion::Sticks } else { Motion::Slides }, point.weight)
         })
     }
@@ -342,7 +361,7 @@ impl<const D: usize> Friction<D> {
         let obstacle =
             self.obstacle_velocities.iter().fold(0.0, |most, obstacle| larger(most, norm(obstacle)));
         self.sliding(Newton, velocity).fold([ROUNDING * obstacle, 0.0], |[v, q], (point, sliding)| {
-            let bound = self.law.bound(0.0, points[point.at].pressure);
+            let bound = point.law.bound(0.0, points[point.at].pressure);
             [larger(v, norm(&sliding)), larger(larger(q, norm(&point.traction)), bound)]
         })
     }
@@ -365,12 +384,12 @@ impl<const D: usize> Friction<D> {
             let traction: Vector<D> = std::array::from_fn(|i| point.traction[i] - open[i] / point.weight);
             let pressure = points[point.at].pressure;
             let (speed, size) = (norm(&sliding), norm(&traction));
-            let beyond = (size - self.law.bound(0.0, pressure)).max(0.0);
+            let beyond = (size - point.law.bound(0.0, pressure)).max(0.0);
             let to_rest = (speed / speeds).hypot(beyond / tractions);
             if speed == 0.0 {
                 return to_rest;
             }
-            let bound = self.law.bound(speed, pressure) / speed;
+            let bound = point.law.bound(speed, pressure) / speed;
             let off: Vector<D> = std::array::from_fn(|i| traction[i] - bound * sliding[i]);
             to_rest.min(norm(&off) / tractions)
         };

@@ -17,6 +17,9 @@ impl<const D: usize> Contact<D> {
     /// Evaluates the gap and the obstacle's motion for a step of this length to `time`, from the displacement at its start (with
     /// ghosts).
     pub fn prepare(&mut self, time: f64, length: f64, displacement: &[f64]) -> Result<()> {
+        if let Some(friction) = &mut self.friction {
+            friction.start_step(length);
+        }
         if !self.law.depends_on_displacement() {
             return Ok(());
         }

@@ -54,6 +54,25 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Adds to the slips of points the ways of a step of this length in s, at its velocities with ghosts.
+    pub fn add_slip(&mut self, velocity: &[f64], length: f64) {
+        if let Some(friction) = &mut self.friction {
+            friction.add_slip(velocity, length);
+        }
+    }
+
+    /// The slip in m of each node with friction on this rank, if the law depends on it.
+    pub fn slips(&self) -> impl Iterator<Item = (usize, f64)> {
+        let friction = self.friction.iter().filter(|friction| friction.law.follows_slip());
+        friction.flat_map(|friction| &friction.points).map(|point| (point.node(), point.slip))
+    }
+
+    /// Sets the slips from values at the owned nodes of the body.
+    pub fn restore_slips(&mut self, nodal: &[f64]) {
+        let points = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
+        points.for_each(|point| point.slip = nodal[point.node()]);
+    }
+
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
     pub fn steepest_friction_decrease(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, Friction::steepest_decrease)
@@ -68,7 +87,7 @@ impl<const D: usize> Contact<D> {
     /// before it. Friction that depends on an unbounded pressure counts as not decreasing; see
     /// [`decrease_per_pressure`](Self::decrease_per_pressure).
     pub fn monotonicity_constants(&self, step_length: f64) -> [f64; 2] {
-        let friction = self.friction().map_or(0.0, |friction| friction.steepest_decrease());
+        let friction = self.friction().map_or(0.0, |law| law.in_step(step_length).steepest_decrease());
         let most = self.law.greatest_pressure();
         let tangential = if friction > 0.0 && most.is_finite() { friction * most.max(0.0) } else { 0.0 };
         [self.law.monotonicity_constant(step_length), tangential]
@@ -80,9 +99,10 @@ impl<const D: usize> Contact<D> {
         (self.law.depends_on_displacement() && decrease > 0.0).then_some(decrease)
     }
 
-    /// The steepest descent of the friction coefficient in s/m, where the pressure that multiplies it is unbounded.
-    pub fn decrease_per_pressure(&self) -> Option<f64> {
-        let fall = self.friction()?.steepest_decrease();
+    /// The steepest descent of the friction coefficient in s/m in a step of this length in s, where the pressure that multiplies it is
+    /// unbounded.
+    pub fn decrease_per_pressure(&self, step_length: f64) -> Option<f64> {
+        let fall = self.friction()?.in_step(step_length).steepest_decrease();
         (fall > 0.0 && self.law.greatest_pressure() == f64::INFINITY).then_some(fall)
     }
 

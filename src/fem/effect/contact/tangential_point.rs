@@ -1,7 +1,10 @@
 //! Tangential data of a contact point.
 
 use super::point::Vectors::{self, Body, Newton};
-use crate::linear_algebra::tensor::{Vector, dot, norm};
+use crate::{
+    laws::contact::FrictionLaw,
+    linear_algebra::tensor::{Vector, dot, norm},
+};
 
 /// A direction shorter than this is a rounding error.
 pub(super) const ROUNDING: f64 = 1e-9;
@@ -17,6 +20,10 @@ pub(super) struct TangentialPoint<const D: usize> {
     /// Orthonormal; `count` of them are used.
     pub tangents: [Vector<D>; D],
     pub count: usize,
+    /// The law in the current step.
+    pub law: FrictionLaw,
+    /// Length in m of the way that it has slid, if the law depends on it.
+    pub slip: f64,
     /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
     /// `q` in Pa at the last evaluation.

@@ -1,0 +1,148 @@
+//! Friction that weakens with the distance of sliding: the law of dynamic rupture (Ida 1972; Andrews 1976).
+//!
+//! The bound is `mu(s) p` with the positive part `p` of the contact pressure and the slip `s`, the length of the way that a point has
+//! slid relative to its obstacle since the start of the run:
+//!
+//! ```text
+//! linear        mu(s) = dynamic + (static - dynamic) max(1 - s / distance, 0)
+//! exponential   mu(s) = dynamic + (static - dynamic) exp(-s / distance)
+//! ```
+//!
+//! Within a step of length `k` that starts with the slip `s0`, the slip at the end is `s0 + k v`: a law of the sliding velocity whose
+//! steepest decrease is `k (static - dynamic) / distance p`.
+
+use crate::laws::{contact::friction_law::FrictionBound, law::LawFault};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The decrease of the coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Decay {
+    /// Linear, from `static` to `dynamic` over `distance`.
+    #[default]
+    Linear,
+    /// Exponential: at the slip `distance` the difference from `dynamic` is 1/e of that at the start.
+    Exponential,
+}
+
+/// Friction whose coefficient decreases from static to dynamic with the slip, the length of the way that a point has slid. Field files
+/// and checkpoints contain the slip as `slip`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DistanceWeakening {
+    /// Friction coefficient before any slip. At least `dynamic`.
+    #[serde(rename = "static")]
+    #[schemars(range(min = 0), example = 0.6)]
+    pub at_rest: f64,
+    /// Friction coefficient after long slip.
+    #[schemars(range(min = 0), example = 0.3)]
+    pub dynamic: f64,
+    /// Slip over which the coefficient decreases.
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 0.05)]
+    pub distance: f64,
+    /// The decrease of the coefficient.
+    #[serde(default)]
+    pub decay: Decay,
+    /// Slip in m at the start of the step, and length of the step in s.
+    #[serde(skip)]
+    pub step: [f64; 2],
+}
+
+impl DistanceWeakening {
+    /// The share of the difference between the coefficients that is left after a slip, and its derivative in 1/m.
+    fn remainder(&self, slip: f64) -> [f64; 2] {
+        match self.decay {
+            Decay::Linear if slip >= self.distance => [0.0; 2],
+            Decay::Linear => [1.0 - slip / self.distance, -1.0 / self.distance],
+            Decay::Exponential => {
+                let left = (-slip / self.distance).exp();
+                [left, -left / self.distance]
+            }
+        }
+    }
+
+    fn slip_at(&self, speed: f64) -> f64 {
+        let [before, length] = self.step;
+        before + length * speed
+    }
+}
+
+impl FrictionBound for DistanceWeakening {
+    fn coefficient(&self, speed: f64) -> f64 {
+        self.dynamic + (self.at_rest - self.dynamic) * self.remainder(self.slip_at(speed))[0]
+    }
+
+    fn slope(&self, speed: f64, pressure: f64) -> f64 {
+        let rate = self.step[1] * self.remainder(self.slip_at(speed))[1];
+        (self.at_rest - self.dynamic) * rate * pressure.max(0.0)
+    }
+
+    fn steepest_decrease(&self) -> f64 {
+        self.step[1] * (self.at_rest - self.dynamic) / self.distance
+    }
+
+    fn corner_velocity(&self) -> f64 {
+        if self.step[1] > 0.0 { self.distance / self.step[1] } else { 0.0 }
+    }
+
+    fn follows_slip(&self) -> bool {
+        true
+    }
+
+    fn start_step(&mut self, slip: f64, length: f64) {
+        self.step = [slip, length];
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        if self.at_rest >= self.dynamic {
+            return Vec::new();
+        }
+        let help = format!("it must be at least {}", self.dynamic);
+        vec![LawFault::at_value("static", "the static coefficient is below the dynamic one", help)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn law(decay: Decay, slip: f64, length: f64) -> DistanceWeakening {
+        let mut law = DistanceWeakening { at_rest: 0.6, dynamic: 0.2, distance: 0.5, decay, step: [0.0; 2] };
+        law.start_step(slip, length);
+        law
+    }
+
+    #[test]
+    fn the_coefficient_falls_by_hand() {
+        // 0.25 m of slip before the step, 0.1 s at 1 m/s: 0.35 m of 0.5 m.
+        let linear = law(Decay::Linear, 0.25, 0.1);
+        assert!((linear.bound(1.0, 10.0) - (2.0 + 4.0 * 0.3)).abs() < 1e-14);
+        assert!((linear.slope(1.0, 10.0) + 0.1 * 8.0).abs() < 1e-14);
+        assert_eq!((linear.bound(9.0, 10.0), linear.slope(9.0, 10.0)), (2.0, 0.0));
+        let exponential = law(Decay::Exponential, 0.5, 0.0);
+        assert!((exponential.bound(3.0, 10.0) - (2.0 + 4.0 / std::f64::consts::E)).abs() < 1e-14);
+        for law in [linear, law(Decay::Exponential, 0.0, 0.1)] {
+            assert!((law.steepest_decrease() - 0.08).abs() < 1e-16);
+        }
+        assert_eq!(linear.bound(1.0, -3.0), 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn parameters_lead_to_points_of_the_graph(
+            slip in 0.0f64..1.0, length in 0.001f64..1.0, pressure in 0.1f64..5.0, s in 0.0f64..20.0, linear in any::<bool>(),
+        ) {
+            let law = law(if linear { Decay::Linear } else { Decay::Exponential }, slip, length);
+            let c = 1.3 * law.steepest_decrease() * pressure + 0.1;
+            let found = law.resolve(s, c, pressure);
+            prop_assert!((c * found.speed + found.traction - s).abs() < 1e-13 * (1.0 + s));
+            if found.speed > 0.0 {
+                prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+            } else {
+                prop_assert!(found.traction <= law.bound(0.0, pressure));
+            }
+        }
+    }
+}
