@@ -238,7 +238,7 @@ fn manual(folder: &Path) -> Result<Exit> {
     on_one_process(|| {
         let written =
             std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
-        written.map_err(|error| Error::unwritable(folder, error))?;
+        written.map_err(|error| Error::Refused(Error::unwritable(folder, error).to_string()))?;
         print(&format!("manual pages: {}", folder.display()));
         Ok(Exit::Done)
     })
