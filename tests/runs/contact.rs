@@ -87,7 +87,7 @@ fn quadratic_cells_press_on_a_plane_with_a_uniform_pressure() {
             .set("material", &format!("{{{hypothesis}{elasticity}}}"))
             .set("support", sides)
             .set("traction", &format!("[{{on = ['top'], value = {up}}}]"))
-            .set("contact", "[{on = ['bottom'], normal = {unilateral = {gap = 0.0}}, friction = {coulomb = {coefficient = 0.1}}}]")
+            .set("contact", "[{on = ['bottom'], normal = {unilateral = {gap = 0.0}}}]")
             .without("body_force")
             .without("initial")
             .set("time", "{end = 1.0, step = 1.0, scheme = 'implicit_euler'}")
@@ -102,21 +102,24 @@ fn quadratic_cells_press_on_a_plane_with_a_uniform_pressure() {
     }
 }
 
-/// A mass falls on an elastic block and bounces back: half a period of an oscillator.
-#[test]
-fn a_mass_that_hits_a_spring_turns_back_after_half_a_period() {
-    let case = Case::square(2)
-        .set(
-            "material",
-            "{hypothesis = 'plane_strain', elasticity = {youngs_modulus = 1000.0, poisson_ratio = 0.0}}",
-        )
+/// A block without mass, whose stiffness is 1000 N/m; the contact on top has no obstacle.
+fn on_a_spring() -> Case {
+    let elasticity = "{youngs_modulus = 1000.0, poisson_ratio = 0.0}";
+    Case::square(2)
+        .set("material", &format!("{{hypothesis = 'plane_strain', elasticity = {elasticity}}}"))
         .set("support", "[{on = ['left'], fix = ['x']}, {on = ['bottom'], fix = ['y']}]")
         .set("contact", "[{on = ['top'], normal = {unilateral = {}}}]")
-        .set("contact.0.obstacle", "{plane = {point = [0, 1], normal = [0, -1]}}")
-        .set("contact.0.obstacle_load", "{direction = [0, -3], force = 0, mass = 10, velocity = 1}")
         .without("traction")
         .without("body_force")
         .without("initial")
+}
+
+/// A mass falls on an elastic block and bounces back: half a period of an oscillator.
+#[test]
+fn a_mass_that_hits_a_spring_turns_back_after_half_a_period() {
+    let case = on_a_spring()
+        .set("contact.0.obstacle", "{plane = {point = [0, 1], normal = [0, -1]}}")
+        .set("contact.0.obstacle_load", "{direction = [0, -3], force = 0, mass = 10, velocity = 1}")
         .set("time", "{end = 0.4, step = 0.001, scheme = 'bdf2'}");
     let mut first: Option<Vec<f64>> = None;
     for ranks in 1..=3 {
@@ -138,5 +141,22 @@ fn a_mass_that_hits_a_spring_turns_back_after_half_a_period() {
         }
         let alone = first.get_or_insert_with(|| displacements.clone());
         assert!(alone.iter().zip(&displacements).all(|(a, b)| (a - b).abs() < 1e-9), "{ranks} ranks");
+    }
+}
+
+/// A body without mass is pressed by an obstacle that goes away again: it is free of forces afterwards.
+#[test]
+fn a_body_that_its_obstacle_releases_rests() {
+    for scheme in ["implicit_euler", "bdf2"] {
+        let case = on_a_spring()
+            .set("contact.0.obstacle", "{plane = {point = [0, '1 - 0.1*sin(10*t)'], normal = [0, -1]}}")
+            .set("time", &format!("{{end = 0.4, step = 0.001, scheme = '{scheme}'}}"));
+        for ranks in [1, 2] {
+            let forces =
+                case.run(ranks).table("resultants.csv").only("source", "contact top").numbers("force_y");
+            let deepest = forces.iter().copied().fold(0.0, |most, force| larger(most, -force));
+            assert!((deepest - 100.0).abs() < 1e-3, "{scheme}: {deepest} N");
+            assert!(forces[320..].iter().all(|force| force.abs() < 1e-9), "{scheme}: {forces:?}");
+        }
     }
 }

@@ -184,7 +184,8 @@ fn a_restarted_run_with_an_obstacle_that_a_force_moves_is_the_straight_run_to_th
         };
         compare_with_straight(make, 1, scheme);
         compare_with_straight(make, 2, scheme);
-        let results = make().run_and_keep(1).results();
+        let case = make().run_and_keep(1);
+        let results = case.results();
         let path =
             results.table("resultants.csv").only("source", "contact bottom").numbers("obstacle_velocity");
         assert!(path.windows(2).all(|pair| pair[0] != pair[1]), "{path:?}");

@@ -26,6 +26,8 @@ pub(super) struct Lengths {
     pub cached: f64,
 }
 
+/// The least force in N by which equations are measured: the square of a smaller one underflows.
+const LEAST_FORCE: f64 = 1e-150;
 /// Share of the rounding errors of the forces to which a step is solved. At rest, steps start from velocities that leave about these
 /// errors; solved to all of them, velocity and pressure may be off their graph by more than the accuracy of pressures.
 const ROUNDING_SHARE: f64 = 0.1;
@@ -355,11 +357,6 @@ impl StepSolver {
             return Err(problem.failed("the forces are not finite", remedy));
         }
         let StepProblem { session, body, rounding, .. } = problem;
-        // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and the
-        // accuracy of pressures is limited by the rounding errors of the forces.
-        let size = norm.max(*rounding / self.settings.inclusion_tolerance);
-        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
-        body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
         // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
         // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;
@@ -368,10 +365,13 @@ impl StepSolver {
             motion += session.sum([mine])[0].sqrt();
         }
         let product = f64::EPSILON * self.matrix_norm * motion;
-        Ok((self.settings.tolerance * norm)
-            .max(f64::MIN_POSITIVE)
-            .max(ROUNDING_SHARE * *rounding)
-            .max(product))
+        // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and a body that
+        // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
+        let noise = rounding.max(product).max(LEAST_FORCE);
+        let size = norm.max(noise / self.settings.inclusion_tolerance);
+        let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
+        body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
+        Ok((self.settings.tolerance * norm).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product))
     }
 
     /// The precision of the factor in use, if steps are condensed to the contact.
