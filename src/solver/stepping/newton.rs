@@ -92,7 +92,8 @@ impl Newton {
             branches_after: Vec::new(),
             scales: Vec::new(),
             steepest_decreases: Vec::new(),
-            counts: SolveCounts::default(),
+            // Longer solutions enlarge the list.
+            counts: SolveCounts { sets: Vec::with_capacity(128), ..SolveCounts::default() },
             start: like.like()?,
             has_user_search: has_option("snes_linesearch_type")?,
             flow: None,

@@ -367,8 +367,9 @@ impl StepSolver {
         let product = f64::EPSILON * self.matrix_norm * motion;
         // An estimate of the forces as if they were equal in all unknowns. At rest under steady loads the forces cancel, and a body that
         // its obstacle has released has none: the accuracy of pressures is then limited by rounding errors.
-        let noise = rounding.max(product).max(LEAST_FORCE);
-        let size = norm.max(noise / self.settings.inclusion_tolerance);
+        let accuracy = self.settings.inclusion_tolerance;
+        let size = norm.max(rounding.max(product) / accuracy);
+        let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
         Ok((self.settings.tolerance * norm).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product))

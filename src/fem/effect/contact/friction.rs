@@ -132,10 +132,14 @@ impl<const D: usize> Friction<D> {
 
     /// Adds to the slips the ways of a step of this length in s at these velocities, with ghosts.
     pub(super) fn add_slip(&mut self, velocity: &[f64], length: f64) {
-        if self.law.follows_slip() {
-            let ways: Vec<f64> =
-                self.sliding(Body, velocity).map(|(_, sliding)| length * norm(&sliding)).collect();
-            self.points.iter_mut().zip(ways).for_each(|(point, way)| point.slip += way);
+        if !self.law.follows_slip() {
+            return;
+        }
+        let Self { points, obstacle_velocities, .. } = self;
+        for (at, point) in points.iter_mut().enumerate() {
+            let along = point.along(Body, velocity);
+            let obstacle = obstacle_velocities.get(at).map_or([0.0; D], |obstacle| *obstacle);
+            point.slip += length * norm(&add_scaled(&along, -1.0, &obstacle));
         }
     }
 
