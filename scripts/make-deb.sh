@@ -32,7 +32,7 @@ cat >"$root/DEBIAN/control" <<CONTROL
 Package: clarke
 Version: $version
 Architecture: $architecture
-Maintainer: The authors of Clarke <maintainers@users.noreply.h-seed-f7759448.example>
+Maintainer: The Clarke developers <clarke@localhost>
 Installed-Size: $(du -sk "$root/usr" | cut -f 1)
 Depends: $libraries, openmpi-bin
 Section: science
