@@ -85,7 +85,8 @@ impl Petsc {
 /// The communicator of new handles.
 pub(super) fn communicator() -> sys::MPI_Comm {
     // SAFETY: written by the thread that starts PETSc, which is the only one with handles.
-    OF_GROUP.get().unwrap_or_else(|| unsafe { sys::PETSC_COMM_WORLD })
+    let of_all = unsafe { sys::PETSC_COMM_WORLD };
+    OF_GROUP.get().unwrap_or(of_all)
 }
 
 /// Calls `work`, during which new handles belong to the ranks of this communicator. No handle made in it may remain.
