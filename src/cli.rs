@@ -13,7 +13,7 @@ use crate::{
         agreement::Agreed,
         session::{Mpi, Session},
     },
-    postprocessing::{report::report, study},
+    postprocessing::{report, study},
     run::{self, Clock, Start},
 };
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -121,6 +121,14 @@ enum Command {
     Report {
         /// Output folder of a run or a study.
         folder: PathBuf,
+        /// Output folder of another run: the page has both side by side.
+        other: Option<PathBuf>,
+        /// Give each cell one colour, instead of averaging values of cells at the nodes.
+        #[arg(long)]
+        cells: bool,
+        /// Draw contour lines on the body.
+        #[arg(long)]
+        contours: bool,
     },
     /// Print a script with which a shell completes commands, options and files.
     Completion {
@@ -194,7 +202,9 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Study { study, overrides, ablate, part }) => {
             run_study(&study, &overrides, ablate, part)
         }
-        Some(Command::Report { folder }) => report_on(&folder),
+        Some(Command::Report { folder, other, cells, contours }) => {
+            report_on(&folder, other.as_deref(), report::Options { per_cell: cells, contours })
+        }
         Some(Command::Completion { shell }) => completion(shell),
         Some(Command::Man { folder }) => manual(&folder),
         None => match &cli.run {
@@ -344,9 +354,12 @@ fn print(text: &str) {
 }
 
 /// Writes a report on one process.
-fn report_on(folder: &Path) -> Result<Exit> {
+fn report_on(folder: &Path, other: Option<&Path>, options: report::Options) -> Result<Exit> {
     on_one_process(|| {
-        let made = report(folder)?;
+        let made = match other {
+            None => report::report(folder, options)?,
+            Some(other) => report::compare([folder, other], options)?,
+        };
         for missing in &made.missing {
             let _ = writeln!(std::io::stderr(), "missing: {}", missing.trim_end());
         }

@@ -244,3 +244,16 @@ fn names_that_are_not_there_are_found() {
     assert_eq!(fault("run/nothing.rs"), Some("`run/nothing.rs`: no such file".into()));
     assert_eq!(fault("mpirun -n 2"), None);
 }
+
+#[test]
+fn the_tutorial_of_laws_quotes_the_source() {
+    let page = read("docs/adding-a-law.md");
+    let mut quoted = 0;
+    for part in page.split("<!-- from ").skip(1) {
+        let (path, rest) = part.split_once(" -->\n```rust\n").expect("a file and a block");
+        let (block, _) = rest.split_once("```").expect("the end of the block");
+        assert!(read(path).contains(block), "{path} does not contain:\n{block}");
+        quoted += 1;
+    }
+    assert!(quoted >= 6 && page.matches("```rust").count() == quoted, "{quoted} quotations");
+}

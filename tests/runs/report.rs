@@ -20,14 +20,14 @@ fn elements<'a, 'i>(page: &'a Document<'i>, tag: &str) -> Vec<Node<'a, 'i>> {
     page.descendants().filter(|node| node.tag_name().name() == tag).collect()
 }
 
-fn words(node: Node) -> String {
+fn words_of(node: Node) -> String {
     node.descendants().filter_map(|inner| inner.text().filter(|_| inner.is_text())).collect()
 }
 
 /// The cell after the one with this text.
 fn fact(page: &Document, name: &str) -> String {
-    let header = elements(page, "th").into_iter().find(|th| words(*th) == name).expect(name);
-    words(header.next_sibling_element().expect("value"))
+    let header = elements(page, "th").into_iter().find(|th| words_of(*th) == name).expect(name);
+    words_of(header.next_sibling_element().expect("value"))
 }
 
 fn files(folder: &Path, ending: &str) -> Vec<String> {
@@ -55,7 +55,7 @@ fn check_page(page: &Path) -> Vec<String> {
         let drawing = figure.first_element_child().expect("drawing");
         assert_eq!(drawing.attribute("role"), Some("img"), "{name}");
         assert!(drawing.attribute("aria-label").is_some_and(|alt| alt.len() > 10), "{name}");
-        assert!(words(figure.last_element_child().expect("caption")).len() > 10, "{name}");
+        assert!(words_of(figure.last_element_child().expect("caption")).len() > 10, "{name}");
         let shapes = drawing
             .descendants()
             .filter(|n| ["path", "polyline", "rect", "image"].contains(&n.tag_name().name()));
@@ -134,7 +134,7 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
     let html = std::fs::read_to_string(&page).expect("page");
     let document = parsed(&html);
     assert_eq!(
-        words(elements(&document, "h1")[0]),
+        words_of(elements(&document, "h1")[0]),
         "Dynamic viscoplastic contact with normal damped response"
     );
     assert_eq!(fact(&document, "status"), "completed");
@@ -143,7 +143,7 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
     let caption = |name: &str| {
         let figure =
             elements(&document, "figure").into_iter().find(|f| f.attribute("id") == Some(name)).expect(name);
-        words(figure.last_element_child().expect("caption"))
+        words_of(figure.last_element_child().expect("caption"))
     };
     assert!(
         caption("bottom_normal_velocity").contains("from 0 to 0.0060276 m/s"),
@@ -175,8 +175,8 @@ fn each_node_of_the_contact_boundary_is_counted_on_the_branch_it_sits_on() {
     let between = |low: f64, high: f64| velocities.iter().filter(|v| (low..high).contains(*v)).count();
     let counted: Vec<String> = elements(&document, "tr")
         .into_iter()
-        .filter(|row| row.first_element_child().is_some_and(|cell| words(cell).starts_with('S')))
-        .map(|row| words(row.children().filter(Node::is_element).nth(3).expect("nodes")))
+        .filter(|row| row.first_element_child().is_some_and(|cell| words_of(cell).starts_with('S')))
+        .map(|row| words_of(row.children().filter(Node::is_element).nth(3).expect("nodes")))
         .collect();
     let known = [0, 0, 0, between(0.0, 0.003), between(0.003, 0.005), between(0.005, 1.0)];
     assert_eq!(counted, known.map(|count| count.to_string()));
@@ -184,14 +184,93 @@ fn each_node_of_the_contact_boundary_is_counted_on_the_branch_it_sits_on() {
 
 #[test]
 fn the_page_of_a_solid_run_shows_its_surface_and_maps_of_its_contact_boundary() {
-    let case = Case::cube(3).set("output.profile", "[{on = 'bottom'}]");
+    let case = Case::cube(3)
+        .set("output.profile", "[{on = 'bottom'}]")
+        .set("output.also", "['contact_status', 'pressure']");
     case.run(2);
     let names = check_page(&report(&case.folder().join("out")));
-    for name in
-        ["speed", "von_mises", "bottom_contact_pressure", "bottom_on_law", "probes_velocity_z", "energies"]
-    {
+    for name in [
+        "speed",
+        "von_mises",
+        "von_mises_contact_side",
+        "pressure",
+        "bottom_contact_pressure",
+        "bottom_contact_status",
+        "bottom_on_law",
+        "probes_velocity_z",
+        "energies",
+    ] {
         assert!(names.iter().any(|other| other == name), "{name} is not in {names:?}");
     }
+}
+
+/// A plate that tears, on its mesh of the repository.
+fn plate() -> Case {
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/notched_plate.msh");
+    Case::of("tearing_plate").set("mesh.file", &format!("{mesh:?}"))
+}
+
+#[test]
+fn histories_are_drawn_and_what_is_the_same_everywhere_is_named() {
+    let case = plate();
+    case.run(1);
+    let out = case.folder().join("out");
+    let names = check_page(&report(&out));
+    assert!(names.iter().any(|name| name == "damage"), "{names:?}");
+    let intact = plate().set("material.damage.threshold", "1e9");
+    intact.run(1);
+    let page = report(&intact.folder().join("out"));
+    assert!(!check_page(&page).iter().any(|name| name == "damage"));
+    let html = std::fs::read_to_string(page).expect("page");
+    assert!(html.contains("Not drawn, because the same everywhere: damage (0)."));
+}
+
+#[test]
+fn cells_of_one_colour_and_contour_lines_on_request() {
+    let case = square();
+    case.run(1);
+    let out = case.folder().join("out");
+    let drawn = |option: Option<&str>| {
+        let words = ["report", out.to_str().expect("text")].into_iter().chain(option);
+        launch::run_alone(&words.map(<str as AsRef<std::ffi::OsStr>>::as_ref).collect::<Vec<_>>()).expect(0);
+        let html = std::fs::read_to_string(out.join("report/index.html")).expect("page");
+        (
+            html.contains("drawn as means at the nodes"),
+            std::fs::read(out.join("report/von_mises.png")).expect("PNG"),
+        )
+    };
+    let [(is_mean, smooth), (is_mean_of_cells, cells), (_, contours)] =
+        [None, Some("--cells"), Some("--contours")].map(drawn);
+    assert!(is_mean && !is_mean_of_cells);
+    assert!(smooth != cells && smooth != contours && cells != contours);
+}
+
+#[test]
+fn two_runs_stand_side_by_side() {
+    let cases = [square(), plate()];
+    cases.iter().for_each(|case| drop(case.run(1)));
+    let folders = [0, 1].map(|at| cases[at].folder().join("out"));
+    let words = ["report".as_ref(), folders[0].as_os_str(), folders[1].as_os_str()];
+    let outcome = launch::run_alone(&words).expect(0);
+    assert!(outcome.stdout.contains("report/comparison.html with"), "{}", outcome.stdout);
+    let page = folders[0].join("report/comparison.html");
+    let html = std::fs::read_to_string(&page).expect("page");
+    let document = parsed(&html);
+    let is_side =
+        |node: &Node| node.attribute("class").is_some_and(|class| ["left", "right"].contains(&class));
+    let figures: Vec<Node> = document.descendants().filter(is_side).collect();
+    let sides: Vec<&str> = figures.iter().filter_map(|figure| figure.attribute("class")).collect();
+    assert!(sides.len() > 20 && sides.chunks(2).all(|pair| *pair == ["left", "right"]), "{sides:?}");
+    let captions: Vec<String> = figures.iter().map(|figure| words_of(*figure)).collect();
+    let pair = captions.chunks(2).find(|pair| pair[0].contains("von Mises")).expect("stress");
+    assert!(pair[1].contains("von Mises") && pair[0] != pair[1], "{pair:?}");
+    assert!(captions.iter().any(|words| words == "The run on the left does not have this picture."));
+    let cells =
+        elements(&document, "tr").into_iter().find(|row| words_of(*row).starts_with("cells")).expect("cells");
+    let numbers: Vec<String> = cells.children().filter(Node::is_element).map(words_of).collect();
+    assert_eq!(numbers[..2], ["cells", "128"]);
+    assert!(numbers[2].parse::<u64>().is_ok_and(|count| count != 128), "{numbers:?}");
+    assert_fits(&page, cases[0].folder());
 }
 
 #[test]
@@ -237,7 +316,7 @@ fn check_missing(out: &Path, name: &str, why: &str) {
     assert!(check_page(&page).len() > 3, "without {name}");
     let html = std::fs::read_to_string(page).expect("page");
     let document = parsed(&html);
-    let said: Vec<String> = elements(&document, "li").into_iter().map(words).collect();
+    let said: Vec<String> = elements(&document, "li").into_iter().map(words_of).collect();
     assert!(
         said.iter().any(|line| line.starts_with(&format!("{name}: ")) && line.contains(why)),
         "{name}: {said:?}"

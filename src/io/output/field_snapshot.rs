@@ -1,7 +1,7 @@
 //! The mesh and the newest fields of a `fields.vtkhdf`, read in one process, without MPI.
 
 use super::{
-    field::{Place, Shape},
+    field::{Place, Shape, place_word, shape_word},
     field_list::FIELDS,
     output_field::OutputField,
 };
@@ -25,6 +25,19 @@ pub struct Snapshot {
     pub parts: usize,
     /// Values at that time of the fields that runs write, as files hold them, by their names; tensors are left out.
     pub fields: BTreeMap<&'static str, Vec<f64>>,
+    /// Histories with one number a node or cell, at that time.
+    pub histories: Vec<History>,
+}
+
+/// A history that effects keep, with one number a node or cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    /// Its name.
+    pub name: String,
+    /// Whether nodes or cells have it.
+    pub place: Place,
+    /// Its values, one a node or cell; zero where no such history is kept.
+    pub values: Vec<f64>,
 }
 
 impl Snapshot {
@@ -50,7 +63,7 @@ impl Snapshot {
 
     /// The body without its fields.
     pub fn without_fields(self) -> Self {
-        Self { fields: BTreeMap::new(), ..self }
+        Self { fields: BTreeMap::new(), histories: Vec::new(), ..self }
     }
 
     /// Values of a field, if the file has it: three numbers a node or cell of vectors.
@@ -70,18 +83,19 @@ impl Snapshot {
 
     fn is_sound(&self) -> bool {
         let nodes = self.nodes.len();
+        let rows = |place: Place| match place {
+            Place::Node => nodes,
+            Place::Cell => self.cells.len() / self.corners,
+        };
         let fits = |field: &OutputField| {
-            let rows = match field.place {
-                Place::Node => nodes,
-                Place::Cell => self.cells.len() / self.corners,
-            };
-            self.values(field).is_none_or(|values| values.len() == rows * field.width())
+            self.values(field).is_none_or(|values| values.len() == rows(field.place) * field.width())
         };
         matches!(self.corners, 3 | 4)
             && !self.cells.is_empty()
             && self.cells.len().is_multiple_of(self.corners)
             && self.cells.iter().all(|node| (*node as usize) < nodes)
             && FIELDS.iter().all(fits)
+            && self.histories.iter().all(|history| history.values.len() == rows(history.place))
     }
 }
 
@@ -115,6 +129,20 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
             let values = values.chunks(field.width()).flat_map(|row| row.repeat(repeated)).collect();
             snapshot.fields.insert(name, values);
         }
+    }
+    for name in file.group("Fields")?.member_names()? {
+        let group = file.group(&format!("Fields/{name}"))?;
+        let text = |attribute: &str| -> hdf5::Result<String> {
+            Ok(group.attr(attribute)?.read_scalar::<hdf5::types::FixedAscii<256>>()?.to_string())
+        };
+        if FIELDS.iter().any(|field| field.name == name) || text("shape")? != shape_word(Shape::Scalar) {
+            continue;
+        }
+        let is_nodal = text("place")? == place_word(Place::Node);
+        let (place, repeated) = if is_nodal { (Place::Node, 1) } else { (Place::Cell, parts) };
+        let values = group.dataset(&(steps - 1).to_string())?.read_raw::<f64>()?;
+        let values = values.iter().flat_map(|value| std::iter::repeat_n(*value, repeated)).collect();
+        snapshot.histories.push(History { name, place, values });
     }
     Ok(snapshot)
 }

@@ -27,11 +27,14 @@ macro_rules! asked_for {
 pub(super) const REGION: OutputField = asked_for!(Region, "region", Cell, Scalar, "");
 pub(super) const STRAIN: OutputField = asked_for!(Strain, "strain", Cell, Tensor, "");
 pub(super) const PRINCIPAL_STRESSES: [OutputField; 3] = [
-    asked_for!(PrincipalStress, "principal_stress_1", Cell, Scalar, "Pa"),
+    asked_for!(PrincipalStress, "principal_stress_1", Cell, Scalar, "Pa")
+        .with_picture("principal_stress_1", "largest principal stress"),
     asked_for!(PrincipalStress, "principal_stress_2", Cell, Scalar, "Pa"),
-    asked_for!(PrincipalStress, "principal_stress_3", Cell, Scalar, "Pa"),
+    asked_for!(PrincipalStress, "principal_stress_3", Cell, Scalar, "Pa")
+        .with_picture("principal_stress_3", "smallest principal stress"),
 ];
-pub(super) const PRESSURE: OutputField = asked_for!(Pressure, "pressure", Cell, Scalar, "Pa");
+pub(super) const PRESSURE: OutputField =
+    asked_for!(Pressure, "pressure", Cell, Scalar, "Pa").with_picture("pressure", "pressure");
 pub(super) const CONTACT_PRESSURE: OutputField =
     asked_for!(ContactPressure, "contact_pressure", Node, Scalar, "Pa");
 pub(super) const GAP: OutputField = asked_for!(Gap, "gap", Node, Scalar, "m");

@@ -66,13 +66,13 @@ impl Adhesion {
 
     /// The faults of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
     /// obstacle at rest. Keys are those of the table of the contact.
-    pub fn faults(beside: &Interface) -> Vec<LawFault> {
-        let help = format!("delete it, or [{}.adhesion]", beside.path);
-        let gap = beside.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
+    pub fn faults(interface: &Interface) -> Vec<LawFault> {
+        let help = format!("delete it, or [{}.adhesion]", interface.path);
+        let gap = interface.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
             let message = "adhesion requires contact from the start: no gap is allowed";
             LawFault::at_value(gap, message, help.as_str())
         });
-        let obstacle = beside.obstacle_moves.then(|| {
+        let obstacle = interface.obstacle_moves.then(|| {
             let message =
                 "adhesion requires an obstacle at rest: bonds depend on the displacement of the body only";
             LawFault::at_key("obstacle", message, format!("keep the obstacle at rest, or {help}"))

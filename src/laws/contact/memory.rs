@@ -34,23 +34,23 @@ pub struct Memory {
 impl Memory {
     /// The faults of tables that memory cannot be combined with. Memory depends on the indentation of a foundation that touches the
     /// body from the start; friction uses the pressure of the normal law only. Keys are those of the table of the contact.
-    pub fn faults(beside: &Interface) -> Vec<LawFault> {
+    pub fn faults(interface: &Interface) -> Vec<LawFault> {
         let mut faults = Vec::new();
         let mut refuse = |key: String, message: &str, other: &str| {
-            let help = format!("delete it, or [{}.memory]{other}", beside.path);
+            let help = format!("delete it, or [{}.memory]{other}", interface.path);
             faults.push(LawFault::at_key(key, message, help));
         };
-        if let Some(wall) = beside.normal.as_ref().filter(|law| law.is_bound()) {
+        if let Some(wall) = interface.normal.as_ref().filter(|law| law.is_bound()) {
             let message = "memory requires a foundation that can be indented: a rigid obstacle has no memory";
             refuse(wall.table(), message, "");
-        } else if let Some(gap) = beside.normal.as_ref().and_then(NormalLaw::gap_key) {
+        } else if let Some(gap) = interface.normal.as_ref().and_then(NormalLaw::gap_key) {
             refuse(gap, "memory requires contact from the start: no gap is allowed", "");
         }
-        if beside.has_obstacle {
+        if interface.has_obstacle {
             let message = "memory requires a foundation at rest: no obstacle is allowed";
             refuse("obstacle".into(), message, "");
         }
-        if let Some(friction) = beside.friction.as_ref().filter(|law| law.follows_pressure()) {
+        if let Some(friction) = interface.friction.as_ref().filter(|law| law.follows_pressure()) {
             let message = "this friction law depends on the pressure of the normal law, which does not include that of memory";
             refuse(friction.table().into(), message, ", or use tresca");
         }

@@ -1,38 +1,53 @@
 //! Pictures of the deformed body: coloured by its fields, and with arrows along its contact boundary.
 
 use super::{
-    colour::{Colour, Shades, VIRIDIS, dimmed, hex},
+    colour::{Colour, Shades, VIRIDIS, hex},
     frame::{Frame, colour_bar},
-    paint::{Edges, Triangle, paint},
+    paint::{Style, Triangle, paint},
     picture::{Picture, open_svg, text},
-    scale::{Scale, extent, number},
+    scale::{Scale, extent, number, percentiles, unit_by_name},
     view::{Face, View, faces, outline},
 };
 use crate::{
     error::Result,
     io::output::{
-        field_list::DISPLACEMENT,
-        field_snapshot::Snapshot,
+        field_list::{DISPLACEMENT, REGION},
+        field_snapshot::{History, Snapshot},
         fields::{Place, Shape},
         output_field::{OutputField, Shading},
     },
 };
-use std::fmt::Write;
+use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
 
 /// Lower limit of drawn errors, as a share of the largest error.
 const DECADES: f64 = 1e-4;
 /// Largest drawn displacement, as a share of the size of the body.
 const VISIBLE: f64 = 0.12;
+/// The smallest drawn size of a cell, as a share of its undeformed size.
+const THINNEST: f64 = 0.2;
 
 /// The drawing of a body.
+#[derive(Clone)]
 pub struct Body<'a> {
     snapshot: &'a Snapshot,
+    look: Look,
     /// Magnification factor of displacements.
     pub magnification: f64,
     view: View,
     axes: [&'static str; 2],
     faces: Vec<Face>,
     places: Vec<[f64; 3]>,
+}
+
+/// Options of the drawing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Look {
+    /// Whether each cell has one colour. Otherwise values of cells are averaged at the nodes, within each region.
+    pub per_cell: bool,
+    /// Whether contour lines are drawn.
+    pub contours: bool,
+    /// Whether there are several materials, between which no mean is taken.
+    pub several_materials: bool,
 }
 
 /// A quantity that determines the colours of faces.
@@ -48,18 +63,33 @@ pub struct Coloured<'a> {
     pub shades: Shades,
 }
 
+/// The drawing of a field.
+#[derive(Debug, Clone)]
+pub enum Drawn {
+    /// A picture.
+    Picture(Picture),
+    /// No picture, because the value is the same everywhere: the quantity and its value, in words.
+    Uniform(String),
+}
+
+/// Values to be drawn.
+struct Values<'a> {
+    values: Cow<'a, [f64]>,
+    place: Place,
+    scale: Scale,
+    /// Whether the scale leaves out the extreme values.
+    is_clipped: bool,
+    is_averaged: bool,
+}
+
 impl<'a> Body<'a> {
     /// Prepares the drawing of a body.
     pub fn new(snapshot: &'a Snapshot) -> Self {
         let magnification = magnification(snapshot);
         let view = View::of(snapshot);
-        let displacement = snapshot.vectors(&DISPLACEMENT);
-        let moved = |(n, x): (usize, &[f64; 3])| {
-            let u = displacement.map_or([0.0; 3], |field| field[n]);
-            std::array::from_fn(|i| x[i] + magnification * u[i])
-        };
-        let places = snapshot.nodes.iter().enumerate().map(moved).collect();
-        Self { snapshot, magnification, view, axes: ["x", "y"], faces: faces(snapshot), places }
+        let places = places(snapshot, magnification);
+        let look = Look::default();
+        Self { snapshot, look, magnification, view, axes: ["x", "y"], faces: faces(snapshot), places }
     }
 
     /// The same with other names of axes.
@@ -67,49 +97,72 @@ impl<'a> Body<'a> {
         Self { axes, ..self }
     }
 
+    /// The same with other options.
+    pub fn with_look(self, look: Look) -> Self {
+        Self { look, ..self }
+    }
+
+    /// The same body from another direction, if this drawing does not show its side with this outward normal.
+    pub fn hidden_side(&self, normal: [f64; 3]) -> Option<Self> {
+        self.view.of_hidden_side(normal).map(|view| Self { view, ..self.clone() })
+    }
+
     /// Coloured by a field, if the field has a picture and the file contains it.
-    pub fn of_field(&self, field: &OutputField) -> Result<Option<Picture>> {
+    pub fn of_field(&self, field: &OutputField) -> Result<Option<Drawn>> {
         let (Some(picture), Some(values)) = (field.picture, self.snapshot.values(field)) else {
             return Ok(None);
         };
-        let lengths: Vec<f64>;
-        let values = match field.shape {
-            Shape::Scalar => values,
-            Shape::Vector | Shape::Tensor => {
-                lengths = values.chunks_exact(field.width()).map(length).collect();
-                &lengths
-            }
+        let values: Cow<[f64]> = match field.shape {
+            Shape::Scalar => values.into(),
+            Shape::Vector | Shape::Tensor => values.chunks_exact(field.width()).map(length).collect(),
         };
         let unit = field.unit(self.snapshot.dimension());
         let look = Coloured { name: picture.name, quantity: picture.quantity, unit, shades: VIRIDIS };
-        let of_face = |face: &Face| match field.place {
-            Place::Node => mean(face, values),
-            Place::Cell => values[face.cell as usize],
-        };
+        if let Some(uniform) = uniform(look, &values) {
+            return Ok(Some(uniform));
+        }
         let drawn = match picture.shading {
-            Shading::Linear => self.field(look, linear(extent(values.iter().copied())), of_face)?,
+            Shading::Linear => self.linear(look, field.place, values)?,
             Shading::Errors => {
-                let mut drawn = self.field(look, of_errors(values), of_face)?;
                 // Each part of a divided cell has the error of the cell.
-                let total = length(values) / (self.snapshot.parts.max(1) as f64).sqrt();
+                let total = length(&values) / (self.snapshot.parts.max(1) as f64).sqrt();
+                let scale = of_errors(&values);
+                let shown =
+                    Values { values, place: Place::Cell, scale, is_clipped: false, is_averaged: false };
+                let mut drawn = self.picture(look, &shown)?;
                 drawn.caption += &format!(" Of all cells together: {} {unit}.", number(total));
                 drawn
             }
         };
-        Ok(Some(drawn))
+        Ok(Some(Drawn::Picture(drawn)))
+    }
+
+    /// Coloured by a history of the material.
+    pub fn of_history(&self, history: &History) -> Result<Drawn> {
+        let quantity = history.name.replace('_', " ");
+        let unit = unit_by_name(&history.name);
+        let look = Coloured { name: &history.name, quantity: &quantity, unit, shades: VIRIDIS };
+        if let Some(uniform) = uniform(look, &history.values) {
+            return Ok(uniform);
+        }
+        self.linear(look, history.place, history.values.as_slice().into()).map(Drawn::Picture)
     }
 
     /// Coloured by a quantity at the nodes.
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
-        self.field(look, linear(extent(values.iter().copied())), |face| mean(face, values))
+        let scale = linear(extent(values.iter().copied()));
+        let (place, values) = (Place::Node, values.into());
+        self.picture(look, &Values { values, place, scale, is_clipped: false, is_averaged: false })
     }
 
     /// Coloured by the logarithms of the errors of the cells.
     pub fn errors(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let largest = extent(values.iter().copied()).map_or(1.0, |range| range.1);
-        let shown = values.iter().map(|value| value.max(DECADES * largest));
+        let scale = Scale::logarithmic(values.iter().map(|value| value.max(DECADES * largest)));
         let parts = self.snapshot.parts.max(1);
-        self.field(look, Scale::logarithmic(shown), |face| values[face.cell as usize / parts])
+        let of_parts = values.iter().flat_map(|value| std::iter::repeat_n(*value, parts));
+        let (place, values) = (Place::Cell, of_parts.collect());
+        self.picture(look, &Values { values, place, scale, is_clipped: false, is_averaged: false })
     }
 
     /// A description of the magnification of the displacement.
@@ -121,41 +174,79 @@ impl<'a> Body<'a> {
         }
     }
 
-    fn field(
-        &self,
-        Coloured { name, quantity, unit, shades }: Coloured,
-        scale: Scale,
-        value: impl Fn(&Face) -> f64,
-    ) -> Result<Picture> {
-        let (low, high) = extent(self.faces.iter().map(&value)).unwrap_or((0.0, 0.0));
-        let share = |face: &Face| {
-            let place = scale.place(value(face)).unwrap_or(scale.low);
-            (place - scale.low) / (scale.high - scale.low)
+    fn linear(&self, look: Coloured, place: Place, values: Cow<[f64]>) -> Result<Picture> {
+        let is_averaged = place == Place::Cell && !self.look.per_cell && self.regions().is_some();
+        let shown = percentiles(&values);
+        let full = extent(values.iter().copied());
+        let is_clipped = match (shown, full) {
+            (Some((low, high)), Some((least, most))) => most - least > 1.05 * (high - low),
+            _ => false,
         };
+        let scale = linear(if is_clipped { shown } else { full });
+        self.picture(look, &Values { values, place, scale, is_clipped, is_averaged })
+    }
+
+    /// The regions within which values of cells may be averaged; `None` if they are not known.
+    fn regions(&self) -> Option<Cow<'_, [f64]>> {
+        let regions = self.snapshot.values(&REGION).map(Cow::from);
+        let one = || Cow::from(vec![0.0; self.snapshot.cells.len() / self.snapshot.corners]);
+        regions.or_else(|| (!self.look.several_materials).then(one))
+    }
+
+    /// The values at the corners of each face.
+    fn at_corners(&self, shown: &Values) -> Vec<[f64; 3]> {
+        let regions = if shown.is_averaged { self.regions() } else { None };
+        match (shown.place, regions) {
+            (Place::Node, _) => {
+                self.faces.iter().map(|face| face.nodes.map(|node| shown.values[node as usize])).collect()
+            }
+            (Place::Cell, None) => {
+                self.faces.iter().map(|face| [shown.values[face.cell as usize]; 3]).collect()
+            }
+            (Place::Cell, Some(regions)) => {
+                let means = means_at_nodes(self.snapshot, &regions, &shown.values);
+                let of_face = |face: &Face| {
+                    let means = &means[&regions[face.cell as usize].to_bits()];
+                    face.nodes.map(|node| means[node as usize])
+                };
+                self.faces.iter().map(of_face).collect()
+            }
+        }
+    }
+
+    fn picture(&self, look: Coloured, shown: &Values) -> Result<Picture> {
+        let Coloured { name, quantity, unit, shades } = look;
+        let scale = &shown.scale;
+        let share = |value: f64| {
+            let place = scale.place(value).unwrap_or(scale.low);
+            ((place - scale.low) / (scale.high - scale.low)).clamp(0.0, 1.0)
+        };
+        let corners: Vec<[f64; 3]> =
+            self.at_corners(shown).into_iter().map(|values| values.map(share)).collect();
         let frame = self.frame(122.0, &[]);
-        let triangles = self.triangles(&frame, |face| shades.at(share(face)));
+        let contours: Vec<f64> = if self.look.contours {
+            scale.ticks.iter().map(|(tick, _)| (tick - scale.low) / (scale.high - scale.low)).collect()
+        } else {
+            Vec::new()
+        };
+        let style = Style { colour: &|share| shades.at(share), contours: &contours };
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
         svg += &text(6.0, 18.0, "start", &heading);
-        svg += &paint(&triangles, self.edges(), frame.height)?;
+        svg += &paint(&self.triangles(&frame, &corners), &style, frame.height)?;
         svg += &self.surroundings(&frame);
-        svg += &colour_bar(name, shades, &scale, &scale.words(quantity, unit), &frame);
+        svg += &colour_bar(name, shades, (scale, shown.is_clipped), &scale.words(quantity, unit), &frame);
         svg += "</svg>";
-        let seen = match self.view {
-            View::Plane => String::new(),
-            View::Oblique => {
-                " The surface is seen from the front right and above (x right, y back, z up); darker \
-                              faces have less light."
-                    .into()
-            }
-        };
-        let figures = format!("from {} to {} {unit}", number(low), number(high));
-        let figures = figures.trim_end();
+        let (figures, colours) = words_of(shown, unit);
+        let seen = self
+            .view
+            .words()
+            .map_or_else(String::new, |from| format!(" Seen from {from}; darker faces have less light."));
         Ok(Picture::new(
             name,
-            format!("Mesh coloured by {quantity}, {figures}, at {} s", number(self.snapshot.time)),
+            format!("Body coloured by {quantity}, {figures}, at {} s", number(self.snapshot.time)),
             format!(
-                "Mesh ({}) at t = {} s, coloured by {quantity}: {figures}.{seen}",
+                "Body ({}) at t = {} s, coloured by {quantity}: {figures}{colours}.{seen}",
                 self.magnified(),
                 number(self.snapshot.time)
             ),
@@ -169,7 +260,9 @@ impl<'a> Body<'a> {
         let frame = self.frame(24.0, &ends);
         let mut svg = open_svg(frame.height);
         svg += &text(6.0, 18.0, "start", heading);
-        svg += &paint(&self.triangles(&frame, |_| [0xee; 3]), self.edges(), frame.height)?;
+        let style = Style { colour: &|_| [0xee; 3], contours: &[] };
+        let blank = vec![[0.0; 3]; self.faces.len()];
+        svg += &paint(&self.triangles(&frame, &blank), &style, frame.height)?;
         svg += &self.surroundings(&frame);
         let _ = writeln!(svg, "<g stroke=\"{0}\" fill=\"{0}\" stroke-width=\"1.6\">", hex(colour));
         for arrow in arrows {
@@ -201,26 +294,19 @@ impl<'a> Body<'a> {
         size(self.snapshot)
     }
 
-    fn edges(&self) -> Edges {
-        if self.view == View::Plane { Edges::AboveAll } else { Edges::OfEach }
-    }
-
-    fn triangles(&self, frame: &Frame, colour: impl Fn(&Face) -> Colour) -> Vec<Triangle> {
+    fn triangles(&self, frame: &Frame, shares: &[[f64; 3]]) -> Vec<Triangle> {
         let mut seen = Vec::with_capacity(self.faces.len());
-        for face in &self.faces {
+        for (face, &shares) in self.faces.iter().zip(shares) {
             let corners = face.nodes.map(|n| self.places[n as usize]);
             let Some(light) = self.view.light(corners) else { continue };
-            let projected = corners.map(|corner| self.view.project(corner));
-            let depth = projected.iter().map(|p| p[2]).sum::<f64>();
-            let corners = projected.map(|p| frame.place([p[0], p[1]]));
-            let colour = dimmed(colour(face), light);
-            seen.push((depth, Triangle { corners, colour, is_inside: face.is_inside }));
+            let corners = corners.map(|corner| {
+                let [right, up, toward] = self.view.project(corner);
+                let [x, y] = frame.place([right, up]);
+                [x, y, if self.view == View::Plane { 0.0 } else { toward }]
+            });
+            seen.push(Triangle { corners, shares, light, is_inside: face.is_inside });
         }
-        match self.view {
-            View::Plane => seen.sort_by_key(|(_, triangle)| triangle.colour),
-            View::Oblique => seen.sort_by(|a, b| a.0.total_cmp(&b.0)),
-        }
-        seen.into_iter().map(|(_, triangle)| triangle).collect()
+        seen
     }
 
     /// Fits the deformed body, the undeformed one and these points into the drawing, with space on the right.
@@ -239,7 +325,7 @@ impl<'a> Body<'a> {
 
     /// Axes and the undeformed outline of a 2D body; directions of the axes in 3D.
     fn surroundings(&self, frame: &Frame) -> String {
-        if self.view == View::Oblique {
+        if self.view != View::Plane {
             return self.directions(frame);
         }
         let mut out = String::new();
@@ -292,11 +378,6 @@ fn of_errors(values: &[f64]) -> Scale {
     }
 }
 
-/// The mean of nodal values on a face.
-fn mean(face: &Face, nodal: &[f64]) -> f64 {
-    face.nodes.iter().map(|n| nodal[*n as usize]).sum::<f64>() / 3.0
-}
-
 /// The root of the sum of the squares.
 fn length(values: &[f64]) -> f64 {
     values.iter().map(|x| x * x).sum::<f64>().sqrt()
@@ -308,12 +389,90 @@ fn size(snapshot: &Snapshot) -> f64 {
     (0..3).map(|axis| length(axis).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A round factor that makes displacements visible, at least 1.
+/// If the values are the same everywhere, in words.
+fn uniform(look: Coloured, values: &[f64]) -> Option<Drawn> {
+    let (low, high) = extent(values.iter().copied())?;
+    let is_uniform = high - low <= 1e-12 * low.abs().max(high.abs());
+    let words = format!("{} ({} {}", look.quantity, number(low), look.unit);
+    is_uniform.then(|| Drawn::Uniform(format!("{})", words.trim_end())))
+}
+
+/// The range of the values and that of their colours, in words.
+fn words_of(shown: &Values, unit: &str) -> (String, String) {
+    let (low, high) = extent(shown.values.iter().copied()).unwrap_or((0.0, 0.0));
+    let range = |low: f64, high: f64| format!("from {} to {} {unit}", number(low), number(high));
+    let mut figures = range(low, high).trim_end().to_owned();
+    if shown.is_averaged {
+        figures += " in the cells";
+    }
+    let mut colours = String::new();
+    if shown.is_averaged {
+        colours += ", drawn as means at the nodes";
+    }
+    if shown.is_clipped {
+        let Scale { low, high, factor, .. } = shown.scale;
+        let ends = range(low / factor, high / factor);
+        colours += &format!("; colours {}, the 1st to the 99th percentile", ends.trim_end());
+    }
+    (figures, colours)
+}
+
+/// Means of values of cells at the nodes, weighted by the measures of the cells, for each region.
+fn means_at_nodes(snapshot: &Snapshot, regions: &[f64], values: &[f64]) -> BTreeMap<u64, Vec<f64>> {
+    let nodes = snapshot.nodes.len();
+    let mut sums: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
+    for ((cell, region), value) in snapshot.cells().zip(regions).zip(values) {
+        let sums = sums.entry(region.to_bits()).or_insert_with(|| vec![[0.0; 2]; nodes]);
+        let measure = measure(cell, &snapshot.nodes).abs();
+        for node in cell {
+            let [sum, weight] = &mut sums[*node as usize];
+            (*sum, *weight) = (*sum + measure * value, *weight + measure);
+        }
+    }
+    let mean = |[sum, weight]: [f64; 2]| sum / weight;
+    sums.into_iter().map(|(region, sums)| (region, sums.into_iter().map(mean).collect())).collect()
+}
+
+/// A multiple of the area or volume of a cell whose nodes are at these places; its sign is that of its orientation.
+fn measure(cell: &[u32], places: &[[f64; 3]]) -> f64 {
+    let first = places[cell[0] as usize];
+    let edge = |n: usize| -> [f64; 3] { std::array::from_fn(|i| places[cell[n] as usize][i] - first[i]) };
+    let (a, b) = (edge(1), edge(2));
+    let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    if cell.len() == 3 {
+        return normal[2];
+    }
+    edge(3).iter().zip(normal).map(|(c, n)| c * n).sum()
+}
+
+/// The places of the nodes with displacements magnified by this factor.
+fn places(snapshot: &Snapshot, magnification: f64) -> Vec<[f64; 3]> {
+    let displacement = snapshot.vectors(&DISPLACEMENT);
+    let moved = |(n, x): (usize, &[f64; 3])| {
+        let u = displacement.map_or([0.0; 3], |field| field[n]);
+        std::array::from_fn(|i| x[i] + magnification * u[i])
+    };
+    snapshot.nodes.iter().enumerate().map(moved).collect()
+}
+
+/// A round factor that makes displacements visible, at least 1, and no larger than one at which cells are drawn folded.
 fn magnification(snapshot: &Snapshot) -> f64 {
     let lengths = snapshot.vectors(&DISPLACEMENT).into_iter().flatten().map(|u| length(u));
     let largest = extent(lengths).map_or(0.0, |range| range.1);
-    let wanted = VISIBLE * size(snapshot) / largest;
-    if wanted.is_finite() && wanted > 1.0 { leading_digit(wanted) } else { 1.0 }
+    let mut factor = VISIBLE * size(snapshot) / largest;
+    if !factor.is_finite() {
+        return 1.0;
+    }
+    while factor > 1.0 {
+        factor = leading_digit(factor);
+        let moved = places(snapshot, factor);
+        let ratio = |cell: &[u32]| measure(cell, &moved) / measure(cell, &snapshot.nodes);
+        if snapshot.cells().all(|cell| ratio(cell) >= THINNEST) {
+            return factor;
+        }
+        factor *= 0.7;
+    }
+    1.0
 }
 
 /// The number rounded down to one significant digit.
@@ -326,7 +485,6 @@ fn leading_digit(size: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::io::output::field_list::{FIELDS, VELOCITY, VON_MISES};
-    use std::collections::BTreeMap;
 
     fn square(displacement: f64) -> Snapshot {
         Snapshot {
@@ -336,10 +494,18 @@ mod tests {
             time: 0.5,
             fields: BTreeMap::from([
                 ("displacement", [displacement, 0.0, 0.0].repeat(4)),
-                ("velocity", [0.0, 3.0, 4.0].repeat(4)),
+                ("velocity", [[0.0; 3], [0.0, 3.0, 4.0], [0.0; 3], [0.0; 3]].concat()),
                 ("von_mises", vec![1.0, 2.5]),
             ]),
             ..Snapshot::default()
+        }
+    }
+
+    #[track_caller]
+    fn picture(body: &Body, field: &OutputField) -> Picture {
+        match body.of_field(field).expect("drawn").expect(field.name) {
+            Drawn::Picture(picture) => picture,
+            Drawn::Uniform(words) => panic!("{words}"),
         }
     }
 
@@ -354,10 +520,29 @@ mod tests {
             let snapshot = square(displacement);
             let body = Body::new(&snapshot);
             assert_eq!(body.magnification, factor);
-            let picture = body.of_field(&VELOCITY).expect("drawn").expect("velocity");
+            let picture = picture(&body, &VELOCITY);
             assert!(picture.svg.contains(words) && picture.caption.contains(words), "{}", picture.caption);
-            assert!(picture.caption.contains("from 5 to 5 m/s"), "{}", picture.caption);
+            assert!(picture.caption.contains("from 0 to 5 m/s"), "{}", picture.caption);
         }
+    }
+
+    #[test]
+    fn no_cell_is_drawn_folded() {
+        let mut snapshot = square(0.0);
+        // The right side moves to the left by 0.01 m: the body would be flat at a factor of 100, and 0.16 m are visible at 16.
+        let moved = |x: &[f64; 3]| [if x[0] == 1.0 { -0.01 } else { 0.0 }, 0.0, 0.0];
+        snapshot.fields.insert("displacement", snapshot.nodes.iter().flat_map(moved).collect());
+        assert_eq!(Body::new(&snapshot).magnification, 10.0);
+        let large = |x: &[f64; 3]| [if x[0] == 1.0 { -0.5 } else { 5e-3 * x[1] }, 0.0, 0.0];
+        snapshot.fields.insert("displacement", snapshot.nodes.iter().flat_map(large).collect());
+        assert_eq!(Body::new(&snapshot).magnification, 1.0);
+        // A cell of a hundredth of the size that is halved: at a factor of 2 it would be flat.
+        snapshot.nodes.extend([[1.01, 0.0, 0.0]]);
+        snapshot.cells.extend([1, 4, 2]);
+        let mut few = vec![[0.0; 3]; 5];
+        few[4][0] = -0.005;
+        snapshot.fields.insert("displacement", few.concat());
+        assert_eq!(Body::new(&snapshot).magnification, 1.0);
     }
 
     #[test]
@@ -369,12 +554,56 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_different_stress_have_different_shades() {
-        let snapshot = square(0.01);
-        let svg = Body::new(&snapshot).of_field(&VON_MISES).expect("drawn").expect("stress").svg;
-        for shade in [VIRIDIS.at(0.0), VIRIDIS.at(1.0)] {
-            assert!(svg.contains(&format!("<path fill=\"{}\"", hex(shade))));
+    fn what_is_the_same_everywhere_is_named_instead_of_drawn() {
+        let mut snapshot = square(0.0);
+        snapshot.fields.insert("von_mises", vec![3.0; 2]);
+        snapshot.fields.insert("velocity", vec![0.0; 12]);
+        let body = Body::new(&snapshot);
+        for (field, expected) in [(&VON_MISES, "von Mises stress (3 Pa)"), (&VELOCITY, "speed (0 m/s)")] {
+            match body.of_field(field).expect("drawn") {
+                Some(Drawn::Uniform(words)) => assert_eq!(words, expected),
+                other => panic!("{other:?}"),
+            }
         }
-        assert!(svg.contains("von Mises stress / Pa") && svg.contains("x / m"));
+    }
+
+    /// The values that are drawn at the corners of each face.
+    fn corners(snapshot: &Snapshot, look: Look) -> Vec<[f64; 3]> {
+        let body = Body::new(snapshot).with_look(look);
+        let values = snapshot.values(&VON_MISES).expect("stress").into();
+        let is_averaged = !look.per_cell && body.regions().is_some();
+        let scale = linear(None);
+        body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, is_averaged })
+    }
+
+    #[test]
+    fn values_of_cells_are_averaged_at_the_nodes_but_not_across_regions_or_on_request() {
+        let mut snapshot = square(0.01);
+        let cells = [[1.0; 3], [2.5; 3]];
+        assert_eq!(corners(&snapshot, Look::default()), [[1.75, 1.0, 1.75], [1.75, 1.75, 2.5]]);
+        assert_eq!(corners(&snapshot, Look { per_cell: true, ..Look::default() }), cells);
+        let several = Look { several_materials: true, ..Look::default() };
+        assert_eq!(corners(&snapshot, several), cells, "regions are not known");
+        snapshot.fields.insert("region", vec![1.0, 2.0]);
+        assert_eq!(corners(&snapshot, several), cells);
+        snapshot.fields.insert("region", vec![2.0, 2.0]);
+        assert_eq!(corners(&snapshot, several)[0], [1.75, 1.0, 1.75]);
+        let picture = picture(&Body::new(&snapshot), &VON_MISES);
+        let words = "from 1 to 2.5 Pa in the cells, drawn as means at the nodes.";
+        assert!(picture.caption.contains(words), "{}", picture.caption);
+        assert!(picture.svg.contains("von Mises stress / Pa") && picture.svg.contains("x / m"));
+    }
+
+    #[test]
+    fn a_few_extreme_values_do_not_rule_the_colours_and_the_caption_says_so() {
+        let mut snapshot = square(0.0);
+        snapshot.cells = [0, 1, 2].repeat(400);
+        let mut values: Vec<f64> = (0..400).map(|n| f64::from(n) / 399.0).collect();
+        values[399] = 1e6;
+        snapshot.fields.insert("von_mises", values);
+        let picture = picture(&Body::new(&snapshot), &VON_MISES);
+        let words = "from 0 to 1 × 10⁶ Pa in the cells, drawn as means at the nodes; colours from 0.010025 to 0.98997 Pa, the 1st to \
+                     the 99th percentile.";
+        assert!(picture.caption.contains(words), "{}", picture.caption);
     }
 }

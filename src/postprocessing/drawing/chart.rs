@@ -96,6 +96,8 @@ pub struct Chart<'a> {
     pub bands: Vec<Band>,
     /// Horizontal lines with their names.
     pub levels: Vec<(f64, String)>,
+    /// Orders `p` whose decrease `y ~ x^-p` triangles in the lower left corner show; for logarithmic axes.
+    pub orders: &'static [u8],
 }
 
 type Axes = Cartesian2d<Marked, Marked>;
@@ -146,6 +148,7 @@ impl<'a> Chart<'a> {
             series,
             bands: vec![],
             levels: vec![],
+            orders: &[],
         }
     }
 
@@ -191,10 +194,11 @@ impl<'a> Chart<'a> {
             .map_err(words)?;
         let plane = chart.plotting_area().clone();
         self.draw_bands(&plane, &x, &y)?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .light_line_style(TRANSPARENT)
+        let mut mesh = chart.configure_mesh();
+        if !self.logarithmic_x {
+            mesh.disable_x_mesh();
+        }
+        mesh.light_line_style(TRANSPARENT)
             .bold_line_style(rgb([0xd9; 3]).stroke_width(FINE as u32))
             .axis_style(rgb([0x55; 3]).stroke_width(FINE as u32))
             .label_style(letters())
@@ -204,6 +208,7 @@ impl<'a> Chart<'a> {
             .draw()
             .map_err(words)?;
         self.draw_levels(&plane, &x, &y)?;
+        self.draw_orders(&plane, &x, &y)?;
         for series in &self.series {
             draw_series(&plane, series, &x, &y)?;
         }
@@ -263,6 +268,24 @@ impl<'a> Chart<'a> {
             plane
                 .draw(&(EmptyElement::at(place) + Text::new(name.clone(), fine(4.0, 3.0), letters())))
                 .map_err(words)?;
+        }
+        Ok(())
+    }
+
+    /// Triangles over the same horizontal leg, each with its order beside its upper end.
+    fn draw_orders(&self, plane: &Area<Axes>, x: &Scale, y: &Scale) -> std::result::Result<(), String> {
+        let Some(&steepest) = self.orders.iter().max() else { return Ok(()) };
+        // As wide as a fifth of the chart, or as the steepest triangle fits into a third of its height.
+        let width = (0.2 * (x.high - x.low)).min((y.high - y.low) / 3.0 / f64::from(steepest));
+        let foot = (x.low + 0.05 * (x.high - x.low), y.low + 0.04 * (y.high - y.low));
+        let grey = rgb([0x55; 3]).stroke_width(FINE as u32);
+        for order in self.orders {
+            let top = (foot.0, foot.1 + f64::from(*order) * width);
+            let corners = vec![foot, (foot.0 + width, foot.1), top, foot];
+            plane.draw(&PathElement::new(corners, grey)).map_err(words)?;
+            let style = letters().pos(Pos::new(HPos::Right, VPos::Center));
+            let name = Text::new(order.to_string(), fine(-4.0, 0.0), style);
+            plane.draw(&(EmptyElement::at(top) + name)).map_err(words)?;
         }
         Ok(())
     }

@@ -77,7 +77,14 @@ impl Frame {
 
 /// The colour bar on the right of a drawing. The name of the picture makes the names of gradients unique, because a page contains
 /// many drawings.
-pub(super) fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str, frame: &Frame) -> String {
+/// The ends of the bar of a clipped scale are arrows, because there are values beyond them.
+pub(super) fn colour_bar(
+    name: &str,
+    shades: Shades,
+    (scale, is_clipped): (&Scale, bool),
+    words: &str,
+    frame: &Frame,
+) -> String {
     let name = plain_name(name);
     let (x, top, bottom) = (WIDTH - 94.0, TOP + 10.0, frame.height - 3.2 * LETTERS);
     let mut out = format!("<defs><linearGradient id=\"{name}-shades\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
@@ -91,6 +98,17 @@ pub(super) fn colour_bar(name: &str, shades: Shades, scale: &Scale, words: &str,
          fill=\"url(#{name}-shades)\"/>",
         bottom - top
     );
+    for (share, edge, tip) in
+        [(1.0, top, top - 9.0), (0.0, bottom, bottom + 9.0)].iter().filter(|_| is_clipped)
+    {
+        let _ = writeln!(
+            out,
+            "<path stroke=\"#555\" fill=\"{}\" d=\"M{x} {edge:.1}H{}L{} {tip:.1}Z\"/>",
+            hex(shades.at(*share)),
+            x + 20.0,
+            x + 10.0
+        );
+    }
     for (value, word) in &scale.ticks {
         let y = bottom - (bottom - top) * (value - scale.low) / (scale.high - scale.low);
         let _ = writeln!(out, "<path stroke=\"#555\" d=\"M{} {y:.1}h5\"/>", x + 20.0);

@@ -1,146 +1,196 @@
-//! Coloured triangles in a drawing, in the order in which they cover each other: polygons if they are few, otherwise an
-//! image, because many polygons would make the page large.
+//! Shaded triangles as an image in a drawing: nearer triangles cover those behind them.
 
 use super::{
-    colour::{Colour, dimmed, hex},
+    colour::{Colour, dimmed},
     picture::WIDTH,
 };
 use crate::error::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::tiny_skia::{Pixmap, PremultipliedColorU8};
-use std::fmt::Write;
 
-/// Number of triangles above which an image is drawn.
-const POLYGONS: usize = 6000;
-/// Number of triangles above which their edges would hide the colours.
-const EDGES: usize = 5000;
 /// Pixels of an image per unit of the drawing.
-const RESOLUTION: f64 = 2.0;
+const RESOLUTION: usize = 2;
+/// Samples in a pixel, in each direction.
+const SAMPLES: usize = 2;
+/// Samples per unit of the drawing.
+const FINE: f64 = (RESOLUTION * SAMPLES) as f64;
+/// Half the width of a mesh line or contour line, in samples.
+const LINE: f64 = 1.1;
+/// Opacity of the mesh lines of large cells.
+const OPACITY: f64 = 0.35;
+/// Edge lengths, in units of the drawing, between which mesh lines appear.
+const FADING: [f64; 2] = [2.0, 12.0];
 
 /// A triangle of the drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Triangle {
-    /// Its corners.
-    pub corners: [[f64; 2]; 3],
-    /// Its fill colour.
-    pub colour: Colour,
-    /// Edges, from a corner to the next, that are not drawn above the triangles.
+    /// Its corners: to the right and downwards in units of the drawing, and toward the viewer.
+    pub corners: [[f64; 3]; 3],
+    /// The values at its corners as shares of the colour scale.
+    pub shares: [f64; 3],
+    /// Intensity of light, from 0 to 1.
+    pub light: f64,
+    /// Edges, from a corner to the next, that are not drawn.
     pub is_inside: [bool; 3],
 }
 
-/// Drawing of edges, for a small number of triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Edges {
-    /// With each triangle, so that later triangles cover them.
-    OfEach,
-    /// On top of all triangles, for triangles that do not cover each other.
-    AboveAll,
+/// How values become colours.
+pub(super) struct Style<'a> {
+    /// The colour of a share of the scale.
+    pub colour: &'a dyn Fn(f64) -> Colour,
+    /// Shares at which contour lines are drawn.
+    pub contours: &'a [f64],
 }
 
-/// The triangles as SVG elements; later ones cover earlier ones. `height` is the height of the drawing.
-pub(super) fn paint(triangles: &[Triangle], edges: Edges, height: f64) -> Result<String> {
-    if triangles.len() > POLYGONS { image(triangles, height) } else { Ok(polygons(triangles, edges)) }
-}
-
-/// One path for each sequence of triangles of the same colour.
-fn polygons(triangles: &[Triangle], edges: Edges) -> String {
-    let mut out = String::from("<g stroke-width=\"0.5\" stroke-linejoin=\"round\">\n");
-    let edges = (triangles.len() <= EDGES).then_some(edges);
-    for run in triangles.chunk_by(|a, b| a.colour == b.colour) {
-        let fill = run[0].colour;
-        let stroke = if edges == Some(Edges::OfEach) { dimmed(fill, 0.75) } else { fill };
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "<path fill=\"{}\" stroke=\"{}\" d=\"{}\"/>",
-            hex(fill),
-            hex(stroke),
-            outlines(run)
-        );
-    }
-    if edges == Some(Edges::AboveAll) {
-        let _ = writeln!(
-            out,
-            "<path fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.3\" d=\"{}\"/>",
-            drawn_edges(triangles)
-        );
-    }
-    out + "</g>\n"
-}
-
-fn drawn_edges(triangles: &[Triangle]) -> String {
-    let mut path = String::new();
-    for triangle in triangles {
-        if triangle.is_inside == [false; 3] {
-            path += &outlines(std::slice::from_ref(triangle));
-            continue;
-        }
-        for at in (0..3).filter(|&at| !triangle.is_inside[at]) {
-            let [a, b] = [at, (at + 1) % 3].map(|at| triangle.corners[at]);
-            let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a[0], a[1], b[0], b[1]);
-        }
-    }
-    path
-}
-
-fn outlines(triangles: &[Triangle]) -> String {
-    let mut path = String::new();
-    for Triangle { corners: [a, b, c], .. } in triangles {
-        let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1} {:.1} {:.1}Z", a[0], a[1], b[0], b[1], c[0], c[1]);
-    }
-    path
-}
-
-fn image(triangles: &[Triangle], height: f64) -> Result<String> {
+/// The triangles as an SVG element. `height` is the height of the drawing.
+pub(super) fn paint(triangles: &[Triangle], style: &Style, height: f64) -> Result<String> {
     let fault = |words: String| Error::Internal(format!("the mesh cannot be drawn: {words}"));
-    let (wide, high) = ((WIDTH * RESOLUTION) as u32, (height * RESOLUTION) as u32);
-    let mut pixels = Pixmap::new(wide, high).ok_or_else(|| fault("no size".into()))?;
-    let canvas = pixels.pixels_mut();
+    let size = [WIDTH, height].map(|length| length.ceil() as usize * RESOLUTION);
+    let mut canvas = Canvas::new(size.map(|pixels| pixels * SAMPLES));
+    let opacity = opacity(triangles);
     for triangle in triangles {
-        fill(triangle, canvas, wide as usize, high as usize);
+        canvas.draw(triangle, style, opacity);
+    }
+    let mut pixels = Pixmap::new(size[0] as u32, size[1] as u32).ok_or_else(|| fault("no size".into()))?;
+    for (at, pixel) in pixels.pixels_mut().iter_mut().enumerate() {
+        *pixel = canvas.pixel([at % size[0], at / size[0]]);
     }
     let png = pixels.encode_png().map_err(|error| fault(error.to_string()))?;
+    let [wide, high] = size.map(|pixels| pixels / RESOLUTION);
     Ok(format!(
-        "<image x=\"0\" y=\"0\" width=\"{WIDTH}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>\n",
+        "<image x=\"0\" y=\"0\" width=\"{wide}\" height=\"{high}\" href=\"data:image/png;base64,{}\"/>\n",
         STANDARD.encode(png)
     ))
 }
 
-/// Fills the pixels whose centre is in the triangle; if there is none, the pixel that contains the centre of the triangle.
-fn fill(triangle: &Triangle, canvas: &mut [PremultipliedColorU8], wide: usize, high: usize) {
-    let [red, green, blue] = triangle.colour;
-    let Some(colour) = PremultipliedColorU8::from_rgba(red, green, blue, 255) else { return };
-    let corners = triangle.corners.map(|corner| corner.map(|x| x * RESOLUTION - 0.5));
-    if corners.iter().flatten().any(|x| !x.is_finite()) {
-        return;
-    }
-    let bounds = |axis: usize, size: usize| {
-        let along = corners.map(|corner| corner[axis]);
-        let low = along.iter().fold(f64::MAX, |m, x| m.min(*x)).ceil().max(0.0);
-        let high = along.iter().fold(f64::MIN, |m, x| m.max(*x)).floor().min(size as f64 - 1.0);
-        (low, high)
+/// Opacity of mesh lines: the smaller the cells, the less, because lines would hide the colours.
+fn opacity(triangles: &[Triangle]) -> f64 {
+    let area = |triangle: &Triangle| {
+        let [a, b, c] = triangle.corners;
+        0.5 * side(a, b, c[0], c[1]).abs()
     };
-    let (rows, columns) = (bounds(1, high), bounds(0, wide));
-    let side =
-        |a: [f64; 2], b: [f64; 2], x: f64, y: f64| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
-    let [a, b, c] = corners;
-    let turn = side(a, b, c[0], c[1]).signum();
-    let mut empty = true;
-    let mut y = rows.0;
-    while y <= rows.1 {
-        let mut x = columns.0;
-        while x <= columns.1 {
-            if [(a, b), (b, c), (c, a)].iter().all(|(from, to)| turn * side(*from, *to, x, y) >= 0.0) {
-                canvas[y as usize * wide + x as usize] = colour;
-                empty = false;
-            }
-            x += 1.0;
-        }
-        y += 1.0;
+    let length = (2.0 * triangles.iter().map(area).sum::<f64>() / triangles.len().max(1) as f64).sqrt();
+    let [none, all] = FADING;
+    OPACITY * ((length - none) / (all - none)).clamp(0.0, 1.0)
+}
+
+/// Twice the area of the triangle of an edge and a point, with the sign of its turn.
+fn side(a: [f64; 3], b: [f64; 3], x: f64, y: f64) -> f64 {
+    (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+}
+
+/// Samples: the colour, if any triangle covers the sample, and how near that is.
+struct Canvas {
+    size: [usize; 2],
+    colours: Vec<Option<Colour>>,
+    depths: Vec<f64>,
+}
+
+impl Canvas {
+    fn new(size: [usize; 2]) -> Self {
+        let count = size[0] * size[1];
+        Self { size, colours: vec![None; count], depths: vec![f64::NEG_INFINITY; count] }
     }
-    let centre = [0, 1].map(|axis| ((a[axis] + b[axis] + c[axis]) / 3.0).round());
-    if empty && (0.0..wide as f64).contains(&centre[0]) && (0.0..high as f64).contains(&centre[1]) {
-        canvas[centre[1] as usize * wide + centre[0] as usize] = colour;
+
+    /// Draws the samples whose centre is in the triangle; if there is none, the sample that contains the centre of the triangle.
+    fn draw(&mut self, triangle: &Triangle, style: &Style, opacity: f64) {
+        let [a, b, c] = triangle.corners.map(|[x, y, z]| [x * FINE - 0.5, y * FINE - 0.5, z]);
+        let corners = [a, b, c];
+        if corners.iter().flatten().any(|x| !x.is_finite()) {
+            return;
+        }
+        let twice_area = side(a, b, c[0], c[1]);
+        let edges = [(b, c), (c, a), (a, b)];
+        let lengths = edges.map(|(from, to)| (to[0] - from[0]).hypot(to[1] - from[1]));
+        let steepness = steepness(corners, triangle.shares, twice_area);
+        let bounds = |axis: usize| {
+            let along = corners.map(|corner| corner[axis]);
+            let low = along.iter().fold(f64::MAX, |m, x| m.min(*x)).ceil().max(0.0);
+            let high = along.iter().fold(f64::MIN, |m, x| m.max(*x)).floor();
+            (low, high.min(self.size[axis] as f64 - 1.0))
+        };
+        let (columns, rows) = (bounds(0), bounds(1));
+        let mut is_empty = true;
+        let mut y = rows.0;
+        while y <= rows.1 {
+            let mut x = columns.0;
+            while x <= columns.1 {
+                let weights = edges.map(|(from, to)| side(from, to, x, y) / twice_area);
+                if weights.iter().all(|weight| *weight >= 0.0) {
+                    is_empty = false;
+                    let lines = Lines { twice_area, lengths, steepness, opacity };
+                    self.set([x, y], triangle, style, weights, Some(&lines));
+                }
+                x += 1.0;
+            }
+            y += 1.0;
+        }
+        let centre = [0, 1].map(|axis| ((a[axis] + b[axis] + c[axis]) / 3.0).round());
+        if is_empty && [0, 1].iter().all(|&axis| (0.0..self.size[axis] as f64).contains(&centre[axis])) {
+            self.set(centre, triangle, style, [1.0 / 3.0; 3], None);
+        }
+    }
+
+    fn set(
+        &mut self,
+        [x, y]: [f64; 2],
+        triangle: &Triangle,
+        style: &Style,
+        weights: [f64; 3],
+        lines: Option<&Lines>,
+    ) {
+        let at = y as usize * self.size[0] + x as usize;
+        let depth = (0..3).map(|n| weights[n] * triangle.corners[n][2]).sum::<f64>();
+        if depth < self.depths[at] {
+            return;
+        }
+        let share = (0..3).map(|n| weights[n] * triangle.shares[n]).sum();
+        let covered = lines.map_or(0.0, |lines| lines.cover(triangle, style, weights, share));
+        self.depths[at] = depth;
+        self.colours[at] = Some(dimmed((style.colour)(share), triangle.light * (1.0 - covered)));
+    }
+
+    /// The mean colour of the samples of a pixel.
+    fn pixel(&self, [column, row]: [usize; 2]) -> PremultipliedColorU8 {
+        let mut sums = [0; 4];
+        for y in row * SAMPLES..(row + 1) * SAMPLES {
+            for x in column * SAMPLES..(column + 1) * SAMPLES {
+                if let Some(colour) = self.colours[y * self.size[0] + x] {
+                    (0..3).for_each(|channel| sums[channel] += usize::from(colour[channel]));
+                    sums[3] += 255;
+                }
+            }
+        }
+        let [red, green, blue, alpha] = sums.map(|sum| (sum / (SAMPLES * SAMPLES)) as u8);
+        PremultipliedColorU8::from_rgba(red, green, blue, alpha).unwrap_or(PremultipliedColorU8::TRANSPARENT)
+    }
+}
+
+/// The change of shares over a sample.
+fn steepness([a, b, c]: [[f64; 3]; 3], shares: [f64; 3], twice_area: f64) -> f64 {
+    let [first, second] = [shares[1] - shares[0], shares[2] - shares[0]];
+    let along_x = first * (c[1] - a[1]) - second * (b[1] - a[1]);
+    let along_y = second * (b[0] - a[0]) - first * (c[0] - a[0]);
+    along_x.hypot(along_y) / twice_area.abs()
+}
+
+/// Mesh lines and contour lines in a triangle.
+struct Lines {
+    twice_area: f64,
+    /// Of the edges opposite to the corners, in samples.
+    lengths: [f64; 3],
+    steepness: f64,
+    opacity: f64,
+}
+
+impl Lines {
+    /// How much a line darkens a sample.
+    fn cover(&self, triangle: &Triangle, style: &Style, weights: [f64; 3], share: f64) -> f64 {
+        let drawn = (0..3).filter(|n| !triangle.is_inside[(n + 1) % 3]);
+        let is_edge = |n: usize| weights[n] * self.twice_area.abs() < LINE * self.lengths[n];
+        let edge = if drawn.into_iter().any(is_edge) { self.opacity } else { 0.0 };
+        let is_contour = |at: &f64| (share - at).abs() < LINE * self.steepness;
+        if style.contours.iter().any(is_contour) { edge.max(0.6) } else { edge }
     }
 }
 
@@ -149,41 +199,67 @@ mod tests {
     use super::*;
     use crate::postprocessing::drawing::picture::{Picture, open_svg};
 
-    /// Half of the drawing, and many very small triangles in its corner.
-    fn half(colour: Colour, count: usize) -> Vec<Triangle> {
-        let speck = Triangle { corners: [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]], colour, is_inside: [false; 3] };
-        let mut all = vec![speck; count];
-        all[0] =
-            Triangle { corners: [[0.0, 0.0], [560.0, 0.0], [0.0, 100.0]], colour, is_inside: [false; 3] };
-        all
+    const GREY: fn(f64) -> Colour = |share| [(255.0 * share).round() as u8; 3];
+
+    /// A triangle over half of a drawing of height 100.
+    fn half(shares: [f64; 3], depth: f64) -> Triangle {
+        let corners = [[0.0, 0.0, depth], [560.0, 0.0, depth], [0.0, 100.0, depth]];
+        Triangle { corners, shares, light: 1.0, is_inside: [true; 3] }
     }
 
-    fn drawn(triangles: &[Triangle]) -> (String, Vec<[u8; 3]>) {
-        let body = paint(triangles, Edges::OfEach, 100.0).expect("drawing");
+    /// The colours at points of the drawing.
+    fn drawn(triangles: &[Triangle], style: &Style, points: &[[u32; 2]]) -> Vec<[u8; 3]> {
+        let body = paint(triangles, style, 100.0).expect("drawing");
         let png = Picture::new("p", "", "", format!("{}{body}</svg>", open_svg(100.0))).png().expect("PNG");
         let pixels = Pixmap::decode_png(&png).expect("PNG");
-        let at = |x, y| pixels.pixel(x, y).map(|p| [p.red(), p.green(), p.blue()]).expect("inside");
-        (body, vec![at(300, 40), at(1000, 180)])
+        let zoom = pixels.width() / 560;
+        let at = |[x, y]: &[u32; 2]| pixels.pixel(x * zoom, y * zoom).map(|p| [p.red(), p.green(), p.blue()]);
+        points.iter().map(|point| at(point).expect("inside")).collect()
+    }
+
+    const SMOOTH: Style<'static> = Style { colour: &GREY, contours: &[] };
+
+    #[test]
+    fn values_are_interpolated_between_the_corners() {
+        let triangle = half([0.0, 1.0, 0.0], 0.0);
+        let points = [[140, 20], [280, 20], [500, 90]];
+        let [quarter, middle, outside] = drawn(&[triangle], &SMOOTH, &points)[..] else { panic!("three") };
+        assert!(quarter[0].abs_diff(64) <= 2 && middle[0].abs_diff(128) <= 2, "{quarter:?} {middle:?}");
+        assert_eq!(outside, [255; 3]);
     }
 
     #[test]
-    fn few_triangles_are_polygons_many_an_image_and_both_look_the_same() {
-        let orange = [230, 120, 10];
-        let (few, seen) = drawn(&half(orange, 3));
-        assert!(few.contains("<path") && !few.contains("<image"));
-        assert_eq!(seen, [orange, [255; 3]]);
-        let (many, seen) = drawn(&half(orange, POLYGONS + 1));
-        assert!(many.contains("<image") && !many.contains("<path"));
-        assert_eq!(seen, [orange, [255; 3]]);
-    }
-
-    #[test]
-    fn later_triangles_cover_earlier_ones() {
-        let (below, above) = ([10, 20, 30], [200, 210, 220]);
-        for count in [1, POLYGONS] {
-            let mut both = half(below, count);
-            both.extend(half(above, 1));
-            assert_eq!(drawn(&both).1[0], above);
+    fn what_is_nearer_to_the_viewer_covers_the_rest_in_whatever_order() {
+        let (behind, before) = (half([0.2; 3], -1.0), half([0.8; 3], 1.0));
+        for order in [[behind, before], [before, behind]] {
+            assert_eq!(drawn(&order, &SMOOTH, &[[100, 20]]), [[204; 3]]);
         }
+    }
+
+    #[test]
+    fn large_cells_have_lines_and_small_ones_do_not() {
+        let lined = Triangle { is_inside: [false; 3], ..half([1.0; 3], 0.0) };
+        assert_eq!(opacity(&[lined]), OPACITY);
+        let [line, inside] = drawn(&[lined], &SMOOTH, &[[200, 0], [200, 20]])[..] else { panic!("two") };
+        assert!(line[0] < 230 && inside == [255; 3], "{line:?} {inside:?}");
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(opacity(&[Triangle { corners, ..lined }]), 0.0);
+        let hidden = Triangle { is_inside: [true, false, false], ..lined };
+        assert_eq!(drawn(&[hidden], &SMOOTH, &[[200, 0]]), [[255; 3]], "the first edge is inside a cell");
+    }
+
+    #[test]
+    fn contours_are_where_the_value_is_theirs() {
+        let contoured = Style { contours: &[0.5], ..SMOOTH };
+        let triangle = half([0.0, 1.0, 0.0], 0.0);
+        let [on, off] = drawn(&[triangle], &contoured, &[[280, 20], [290, 20]])[..] else { panic!("two") };
+        assert!(on[0] < 110 && off[0] > 125, "{on:?} {off:?}");
+    }
+
+    #[test]
+    fn a_triangle_smaller_than_a_sample_is_still_there() {
+        let corners = [[10.01, 10.01, 0.0], [10.02, 10.01, 0.0], [10.01, 10.02, 0.0]];
+        let speck = Triangle { corners, ..half([0.0; 3], 0.0) };
+        assert!(drawn(&[speck], &SMOOTH, &[[10, 10]])[0][0] < 255);
     }
 }

@@ -34,6 +34,15 @@ impl Picture {
         Self { name, alt: alt.into(), caption: caption.into(), svg }
     }
 
+    /// The same with another name.
+    pub fn renamed(self, name: &str) -> Self {
+        Self {
+            svg: self.svg.replace(&format!("{}-shades", self.name), &format!("{name}-shades")),
+            name: plain_name(name),
+            ..self
+        }
+    }
+
     /// The drawing for an HTML page: labelled for screen readers, without the XML namespace, which only files need.
     pub fn inline(&self) -> String {
         let words = format!("<svg role=\"img\" aria-label=\"{}\" ", escape(&self.alt));

@@ -79,6 +79,28 @@ pub fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
+/// The 1st and the 99th percentile of the finite values.
+pub(super) fn percentiles(values: &[f64]) -> Option<(f64, f64)> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let left_out = sorted.len() / 100;
+    let low = *sorted.get(left_out)?;
+    Some((low, sorted[sorted.len() - 1 - left_out]))
+}
+
+/// The unit of a quantity, by the word for it in the name of a field or a column.
+pub fn unit_by_name(name: &str) -> &'static str {
+    let known = [
+        ("displacement", "m"),
+        ("velocity", "m/s"),
+        ("pressure", "Pa"),
+        ("traction", "Pa"),
+        ("gap", "m"),
+        ("slip", "m"),
+    ];
+    known.iter().find(|(word, _)| name.contains(word)).map_or("", |(_, unit)| unit)
+}
+
 /// The largest of 1, 2 and 5 times a power of ten that is at most `size`, which is positive.
 fn round_below(size: f64) -> f64 {
     let power = 10f64.powf(size.log10().floor());
@@ -193,6 +215,15 @@ mod tests {
         }
         assert_eq!(number(-2.7003e-8), "−2.7 × 10⁻⁸");
         assert_eq!([7.0702, 0.012345, 123456.0].map(size), ["7.07", "0.0123", "123000"]);
+    }
+
+    #[test]
+    fn a_hundredth_of_the_values_is_left_out_at_either_end() {
+        let mut values: Vec<f64> = (0..200).map(f64::from).collect();
+        (values[7], values[100]) = (-1e9, f64::NAN);
+        assert_eq!(percentiles(&values), Some((0.0, 198.0)));
+        assert_eq!(percentiles(&[3.0, 1.0, 2.0]), Some((1.0, 3.0)));
+        assert_eq!(percentiles(&[f64::NAN]), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::io::output::field_snapshot::Snapshot;
 use std::collections::BTreeMap;
 
-/// Direction toward the viewer of a solid: from the front right and above (x to the right, y away, z up).
+/// Direction toward the viewer of a solid from the front right and above (x to the right, y away, z up).
 const TOWARD_VIEWER: [f64; 3] = [0.48, -0.74, 0.47];
 /// Direction toward the light.
 const TOWARD_LIGHT: [f64; 3] = [0.35, -0.6, 0.72];
@@ -141,26 +141,36 @@ pub fn widest_along(points: &[[f64; 3]], faces: &[u32]) -> usize {
 }
 
 /// Projection of points of the body into the picture plane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum View {
     /// x to the right, y up.
     Plane,
-    /// Oblique, without perspective.
-    Oblique,
+    /// Oblique, without perspective: the unit vector toward the viewer.
+    Oblique([f64; 3]),
 }
 
 impl View {
-    /// The view of a body of this dimension.
+    /// The view of a body of this dimension: of a solid from the front right and above.
     pub(super) fn of(snapshot: &Snapshot) -> Self {
-        if snapshot.dimension() == 2 { Self::Plane } else { Self::Oblique }
+        if snapshot.dimension() == 2 { Self::Plane } else { Self::Oblique(unit(TOWARD_VIEWER)) }
+    }
+
+    /// The view that shows a side with this outward normal, if this view does not.
+    pub(super) fn of_hidden_side(self, normal: [f64; 3]) -> Option<Self> {
+        let Self::Oblique(toward) = self else { return None };
+        let seen = dot(toward, normal);
+        (seen < 0.2).then(|| {
+            // The mirror image where it sees the side well, otherwise more from its front.
+            let along = if seen < -0.4 { -2.0 * seen } else { 0.6 - seen };
+            Self::Oblique(unit(std::array::from_fn(|i| toward[i] + along * normal[i])))
+        })
     }
 
     /// Coordinates to the right, upwards, and toward the viewer.
     pub(super) fn project(self, point: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Plane => point,
-            Self::Oblique => {
-                let toward = unit(TOWARD_VIEWER);
+            Self::Oblique(toward) => {
                 let right = unit(cross([0.0, 0.0, 1.0], toward));
                 [dot(right, point), dot(cross(toward, right), point), dot(toward, point)]
             }
@@ -169,13 +179,29 @@ impl View {
 
     /// Intensity of light on a face with these corners, from 0 to 1; none if it faces away from the viewer.
     pub(super) fn light(self, [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
-        if self == Self::Plane {
-            return Some(1.0);
-        }
+        let Self::Oblique(toward) = self else { return Some(1.0) };
         let normal = unit(cross(minus(b, a), minus(c, a)));
-        let seen = dot(normal, unit(TOWARD_VIEWER)) > 0.0;
-        seen.then(|| 0.78 + 0.22 * dot(normal, unit(TOWARD_LIGHT)).max(0.0))
+        let is_seen = dot(normal, toward) > 0.0;
+        // The light moves with the viewer.
+        let lit = if toward[2] < 0.0 { [1.0, 1.0, -1.0] } else { [1.0; 3] };
+        let light: [f64; 3] = std::array::from_fn(|i| lit[i] * TOWARD_LIGHT[i]);
+        is_seen.then(|| 0.78 + 0.22 * dot(normal, unit(light)).max(0.0))
     }
+
+    /// From where a solid is seen, in words.
+    pub(super) fn words(self) -> Option<String> {
+        let Self::Oblique(toward) = self else { return None };
+        let sides = [["the left", "the right"], ["the front", "the back"], ["below", "above"]];
+        let seen = (0..3).filter(|&axis| toward[axis].abs() > 0.2);
+        let words: Vec<&str> = seen.map(|axis| sides[axis][usize::from(toward[axis] > 0.0)]).collect();
+        Some(words.join(", "))
+    }
+}
+
+/// The unit vector of the mean of these vectors; none if they cancel each other.
+pub fn mean_direction(vectors: &[[f64; 3]]) -> Option<[f64; 3]> {
+    let sum: [f64; 3] = std::array::from_fn(|i| vectors.iter().map(|vector| vector[i]).sum());
+    (dot(sum, sum).sqrt() > 0.2 * vectors.len() as f64).then(|| unit(sum))
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -233,13 +259,32 @@ mod tests {
 
     #[test]
     fn the_oblique_view_shows_the_front_right_and_top_and_keeps_up_upwards() {
-        let face = |a: [f64; 3], b: [f64; 3]| View::Oblique.light([[0.0; 3], a, b]);
+        let view = View::of(&pair());
+        let face = |a: [f64; 3], b: [f64; 3]| view.light([[0.0; 3], a, b]);
         let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
         assert!(face(x, y).is_some() && face(y, z).is_some() && face(x, z).is_some(), "top, right, front");
         assert!(face(y, x).is_none() && face(z, y).is_none() && face(z, x).is_none(), "bottom, left, back");
-        let [right, up, _] = View::Oblique.project(z);
+        let [right, up, _] = view.project(z);
         assert!(right.abs() < 1e-12 && up > 0.5);
-        assert!(View::Oblique.project(x)[0] > 0.5);
+        assert!(view.project(x)[0] > 0.5);
+        assert_eq!(view.words().expect("words"), "the right, the front, above");
+    }
+
+    #[test]
+    fn a_hidden_side_is_seen_in_a_view_of_its_own_with_up_upwards() {
+        let view = View::of(&pair());
+        for normal in [[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+            let other = view.of_hidden_side(normal).expect("hidden");
+            let View::Oblique(toward) = other else { panic!("oblique") };
+            assert!(dot(toward, normal) > 0.35, "{normal:?} {toward:?}");
+            assert!(other.project([0.0, 0.0, 1.0])[1] > 0.3);
+        }
+        for normal in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]] {
+            assert_eq!(view.of_hidden_side(normal), None);
+        }
+        assert_eq!(View::Plane.of_hidden_side([0.0, -1.0, 0.0]), None);
+        assert_eq!(mean_direction(&[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), None);
+        assert_eq!(mean_direction(&[[2.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), Some([1.0, 0.0, 0.0]));
     }
 
     #[test]

@@ -9,12 +9,17 @@ use super::{
     law::Law,
     markup::table,
     picture::Picture,
-    scale::{extent, number},
+    scale::{extent, number, unit_by_name},
     table::Table,
 };
 use crate::{
     error::Result,
-    io::output::{field_list::VELOCITY, field_snapshot::Snapshot},
+    io::output::{
+        field_list::{CONTACT_STATUS, FIELDS, VELOCITY},
+        field_snapshot::Snapshot,
+        fields::{Place, Shape},
+        output_field::OutputField,
+    },
     laws::contact::FrictionLaw,
 };
 use std::collections::HashMap;
@@ -113,9 +118,31 @@ impl<'a> Boundary<'a> {
         for column in columns.into_iter().filter(|name| !first.contains(&name.as_str())) {
             out.extend(self.quantity(column, snapshot)?);
         }
+        for (name, values) in self.fields_of_nodes() {
+            if let Some(mut picture) = self.drawn(name, &values, snapshot)? {
+                if name == CONTACT_STATUS.name {
+                    picture.caption += " 1: open, 2: touching, without friction, 3: sticking, 4: sliding.";
+                }
+                out.push(picture);
+            }
+        }
         out.extend(self.on_law()?);
         out.extend(self.on_friction()?);
         Ok(out)
+    }
+
+    /// Fields and histories with a number at each node that only nodes of contacts have, where the profile does not have them.
+    fn fields_of_nodes(&self) -> Vec<(&str, Vec<f64>)> {
+        let Some(Behind { snapshot, nodes, .. }) = &self.behind else { return Vec::new() };
+        let is_meant =
+            |field: &&OutputField| field.place == Place::Node && matches!(field.shape, Shape::Scalar);
+        let fields = FIELDS.iter().filter(is_meant);
+        let fields = fields.filter_map(|field| Some((field.name, snapshot.values(field)?)));
+        let histories = snapshot.histories.iter().filter(|history| history.place == Place::Node);
+        let histories = histories.map(|history| (history.name.as_str(), history.values.as_slice()));
+        let is_new = |(name, _): &(&str, &[f64])| !self.table.header().iter().any(|column| column == name);
+        let here = |values: &[f64]| nodes.iter().map(|node| values[*node]).collect();
+        fields.chain(histories).filter(is_new).map(|(name, values)| (name, here(values))).collect()
     }
 
     /// The number of nodes on each branch of the law, as a table.
@@ -145,13 +172,20 @@ impl<'a> Boundary<'a> {
     }
 
     fn quantity(&self, column: &str, snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
-        let values = self.table.column(column).unwrap_or_default();
-        let (quantity, unit) = (column.replace('_', " "), unit_of(column));
+        self.drawn(column, &self.table.column(column).unwrap_or_default(), snapshot)
+    }
+
+    /// Values at the nodes along the boundary; no picture of what is zero everywhere.
+    fn drawn(&self, column: &str, values: &[f64], snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
+        if values.iter().all(|value| *value == 0.0) {
+            return Ok(None);
+        }
+        let (quantity, unit) = (column.replace('_', " "), unit_by_name(column));
         let name = format!("{}_{column}", self.name);
         if self.dimension == 3 {
-            return self.map(&name, &quantity, unit, &values, snapshot);
+            return self.map(&name, &quantity, unit, values, snapshot);
         }
-        let points: Vec<[f64; 2]> = self.arc.iter().zip(&values).map(|(s, v)| [*s, *v]).collect();
+        let points: Vec<[f64; 2]> = self.arc.iter().zip(values).map(|(s, v)| [*s, *v]).collect();
         let place =
             ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
         let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
@@ -159,7 +193,7 @@ impl<'a> Boundary<'a> {
         let x = Axis { quantity: "arc length", unit: "m" };
         let mut chart = Chart::new(x, Axis { quantity: &quantity, unit }, vec![series]);
         chart.bands = self.bands();
-        let (low, high) = extent(values.into_iter()).unwrap_or((0.0, 0.0));
+        let (low, high) = extent(values.iter().copied()).unwrap_or((0.0, 0.0));
         let figures = format!("from {} to {} {unit}", number(low), number(high));
         let bands = if chart.bands.is_empty() { "" } else { " Backgrounds: branches of the contact law." };
         Ok(Some(Picture::new(
@@ -324,6 +358,11 @@ impl<'a> Boundary<'a> {
         friction::picture(self.name, self.time, law, &rubbing)
     }
 
+    /// The mean outward normal, if the normals have one.
+    pub(super) fn direction(&self) -> Option<[f64; 3]> {
+        super::view::mean_direction(&self.behind.as_ref()?.normals)
+    }
+
     /// The deformed mesh of a 2D body with the boundary's normal velocity and contact pressure as arrows.
     pub(super) fn arrows(&self, body: &Body) -> Result<Vec<Picture>> {
         let Some(Behind { nodes, normals, .. }) =
@@ -353,7 +392,7 @@ impl<'a> Boundary<'a> {
             };
             let arrows: Vec<[[f64; 2]; 2]> =
                 (0..feet.len()).step_by(feet.len().div_ceil(MOST_ARROWS)).map(arrow).collect();
-            let unit = unit_of(column);
+            let unit = unit_by_name(column);
             let heading = format!("longest arrow {} {unit}, {}", number(largest), body.magnified());
             let time = number(self.time);
             out.push(Picture::new(
@@ -379,13 +418,6 @@ fn branch_colour(branch: usize) -> Colour {
 
 fn is_quantity(column: &str) -> bool {
     !["time", "profile", "x", "y", "z"].contains(&column)
-}
-
-/// The unit of a column, by its name.
-pub(super) fn unit_of(column: &str) -> &'static str {
-    let known =
-        [("displacement", "m"), ("velocity", "m/s"), ("pressure", "Pa"), ("traction", "Pa"), ("gap", "m")];
-    known.iter().find(|(word, _)| column.contains(word)).map_or("", |(_, unit)| unit)
 }
 
 /// With an initial capital letter.

@@ -42,8 +42,13 @@ const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("petsc_version", "version of PETSc", ""),
 ];
 
-/// The status in one sentence, and a table of the contents of `summary.json`.
+/// A table of the contents of `summary.json`.
 pub(super) fn summary(summary: &Value) -> String {
+    facts("The run", &rows(summary))
+}
+
+/// The members of `summary.json`: what each is, and its value.
+pub(super) fn rows(summary: &Value) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.shown);
     for &(member, words, unit) in MEMBERS.iter().chain(figures).chain(&MORE_MEMBERS) {
@@ -65,7 +70,7 @@ pub(super) fn summary(summary: &Value) -> String {
     if let Some(most) = partition.and_then(|p| p.get("imbalance")).and_then(Value::as_f64) {
         rows.push(("cells of the largest rank relative to the mean".into(), number(most)));
     }
-    facts("The run", &rows)
+    rows
 }
 
 /// The outcome of the run in a sentence.

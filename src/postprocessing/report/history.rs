@@ -1,10 +1,10 @@
 //! Pictures of quantities over time: probes, energies, steps.
 
 use super::{
-    boundary::{capital, unit_of},
+    boundary::capital,
     chart::{Axis, Chart, Look, Series},
     picture::Picture,
-    scale::{extent, number},
+    scale::{extent, number, unit_by_name},
     table::Table,
 };
 use crate::{
@@ -27,7 +27,7 @@ pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
         });
         let (vector, axis) = column.rsplit_once('_').unwrap_or((column, ""));
         let quantity = format!("{} {axis}", vector.replace('_', " "));
-        let unit = unit_of(column);
+        let unit = unit_by_name(column);
         let ends = names.iter().zip(&tables).map(|(name, table)| {
             let last = table.column(column).and_then(|values| values.last().copied()).unwrap_or(0.0);
             format!("{name} {} {unit}", number(last))

@@ -2,6 +2,7 @@
 
 mod arc;
 mod boundary;
+mod comparison;
 mod facts;
 mod artifacts;
 mod friction;
@@ -14,16 +15,20 @@ mod table;
 use crate::{
     error::{Error, Result},
     fem::effect::Energy,
-    io::output::field_list::FIELDS,
+    io::output::{
+        field_list::{FIELDS, REGION, VON_MISES},
+        fields::Place,
+    },
     postprocessing::drawing::{body, chart, colour, markup, picture, scale, view},
     run::VERSION,
 };
 use artifacts::{Found, Gap};
-use body::Body;
+use body::{Body, Drawn};
 use boundary::{Boundary, Laws};
 use law::Law;
 use markup::{escape, paragraph};
 use page::Page;
+use picture::Picture;
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
@@ -40,22 +45,48 @@ pub struct Made {
     pub missing: Vec<String>,
 }
 
+/// What a report draws.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Whether each cell has one colour, instead of means at the nodes.
+    pub per_cell: bool,
+    /// Whether pictures of the body have contour lines.
+    pub contours: bool,
+}
+
 /// Writes `report/index.html` and the pictures beside it in the output folder of a run, or of a study.
-pub fn report(folder: &Path) -> Result<Made> {
+pub fn report(folder: &Path, options: Options) -> Result<Made> {
     let (page, missing) = if study::is_study(folder) {
         (study::page(folder)?, Vec::new())
     } else {
         let found = Found::read(folder)?;
-        let missing = found.gaps.iter().map(|gap| format!("{}: {}", gap.file, gap.why)).collect();
-        (page_of(&found)?, missing)
+        (page_of(&found, options)?, missing(&found))
     };
-    let target = folder.join("report");
-    std::fs::create_dir_all(&target).map_err(|error| Error::unwritable(&target, error))?;
+    write_page(&page, &folder.join("report"), "index.html", missing)
+}
+
+/// Writes `report/comparison.html` in the first folder: a page with two runs side by side.
+pub fn compare(folders: [&Path; 2], options: Options) -> Result<Made> {
+    let found = [Found::read(folders[0])?, Found::read(folders[1])?];
+    let page = comparison::page(&found, options)?;
+    let missing = found.iter().flat_map(|found| {
+        missing(found).into_iter().map(|words| format!("{}: {words}", found.folder.display()))
+    });
+    write_page(&page, &folders[0].join("report"), "comparison.html", missing.collect())
+}
+
+/// Descriptions of the files that are missing or unreadable.
+fn missing(found: &Found) -> Vec<String> {
+    found.gaps.iter().map(|gap| format!("{}: {}", gap.file, gap.why)).collect()
+}
+
+fn write_page(page: &Page, folder: &Path, name: &str, missing: Vec<String>) -> Result<Made> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
     for picture in page.pictures() {
-        write(&target.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
-        write(&target.join(format!("{}.png", picture.name)), &picture.png()?)?;
+        write(&folder.join(format!("{}.svg", picture.name)), picture.file().as_bytes())?;
+        write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
     }
-    let path = target.join("index.html");
+    let path = folder.join(name);
     let made_by = format!(
         "Made by solver report, version {VERSION}. All quantities in SI units. The folder of this page contains the pictures as SVG and PNG files."
     );
@@ -68,30 +99,47 @@ fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     std::fs::write(path, bytes).map_err(|error| Error::unwritable(path, error))
 }
 
-fn page_of(found: &Found) -> Result<Page> {
+/// The title of a run: that of its job, or the name of its folder.
+fn title(found: &Found) -> String {
     let about = found.job.as_ref().and_then(|job| job.about.as_ref());
     let name =
         found.folder.file_name().map_or_else(|| "Run".into(), |name| name.to_string_lossy().into_owned());
-    let title = about.and_then(|about| about.title.clone()).unwrap_or(name);
-    let mut page = Page::new(&title, head(found));
+    about.and_then(|about| about.title.clone()).unwrap_or(name)
+}
+
+fn page_of(found: &Found, options: Options) -> Result<Page> {
+    let mut page = Page::new(&title(found), head(found));
+    for (heading, words, pictures) in drawn_sections(found, options)? {
+        page.section(&heading, &words, pictures);
+    }
     if let Some(summary) = &found.summary {
         page.section("Summary", &facts::summary(summary), vec![]);
     }
-    page.section("Certificates", &facts::certificates(found), vec![]);
-    body_section(&mut page, found)?;
-    boundary_sections(&mut page, found)?;
-    time_sections(&mut page, found)?;
+    let certificates = facts::certificates(found);
+    page.section("Certificates", &folded("Uniqueness and growth of solutions", &certificates), vec![]);
     if let Some(phases) = found.summary.as_ref().and_then(facts::phases) {
         page.section("Wall time", "", vec![phases]);
     }
     if let Some(text) = &found.text {
-        let job = format!(
-            "<details>\n<summary>job.toml with all defaults</summary>\n<pre>{}</pre>\n</details>\n",
-            escape(text)
-        );
+        let job = folded("job.toml with all defaults", &format!("<pre>{}</pre>\n", escape(text)));
         page.section("Effective job", &job, vec![]);
     }
     Ok(page)
+}
+
+/// Sections with pictures: heading, HTML, pictures.
+type Sections = Vec<(String, String, Vec<Picture>)>;
+
+fn drawn_sections(found: &Found, options: Options) -> Result<Sections> {
+    let mut sections = Sections::new();
+    sections.extend(body_section(found, options)?);
+    boundary_sections(&mut sections, found)?;
+    time_sections(&mut sections, found)?;
+    Ok(sections)
+}
+
+fn folded(summary: &str, html: &str) -> String {
+    format!("<details>\n<summary>{}</summary>\n{html}</details>\n", escape(summary))
 }
 
 fn head(found: &Found) -> String {
@@ -122,21 +170,58 @@ fn head(found: &Found) -> String {
     head
 }
 
-fn body_section(page: &mut Page, found: &Found) -> Result<()> {
-    let Some(snapshot) = &found.snapshot else { return Ok(()) };
-    let body = Body::new(snapshot);
-    let drawn = FIELDS.iter().filter_map(|field| body.of_field(field).transpose());
-    let pictures = drawn.collect::<Result<Vec<_>>>()?;
-    let words = if pictures.is_empty() {
-        paragraph("fields.vtkhdf contains a mesh, but no fields yet.")
-    } else {
-        String::new()
-    };
-    page.section("Body", &words, pictures);
-    Ok(())
+fn body_section(found: &Found, options: Options) -> Result<Option<(String, String, Vec<Picture>)>> {
+    let Some(snapshot) = &found.snapshot else { return Ok(None) };
+    let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
+    let Options { per_cell, contours } = options;
+    let body = Body::new(snapshot).with_look(body::Look { per_cell, contours, several_materials });
+    let mut drawn = Vec::new();
+    for field in &FIELDS {
+        drawn.extend(body.of_field(field)?);
+    }
+    for history in snapshot.histories.iter().filter(|history| history.place == Place::Cell) {
+        drawn.push(body.of_history(history)?);
+    }
+    for direction in contact_directions(found)? {
+        let Some(side) = body.hidden_side(direction) else { continue };
+        if let Some(Drawn::Picture(picture)) = side.of_field(&VON_MISES)? {
+            drawn.push(Drawn::Picture(picture.renamed("von_mises_contact_side")));
+            break;
+        }
+    }
+    let (mut pictures, mut uniform) = (Vec::new(), Vec::new());
+    for drawn in drawn {
+        match drawn {
+            Drawn::Picture(picture) => pictures.push(picture),
+            Drawn::Uniform(words) => uniform.push(words),
+        }
+    }
+    let mut words = String::new();
+    if pictures.is_empty() && uniform.is_empty() {
+        words += &paragraph("fields.vtkhdf contains a mesh, but no fields yet.");
+    }
+    if !uniform.is_empty() {
+        words += &paragraph(&format!("Not drawn, because the same everywhere: {}.", uniform.join(", ")));
+    }
+    if several_materials && !per_cell && snapshot.values(&REGION).is_none() {
+        words += &paragraph(
+            "Each cell has one colour: [output] also = [\"region\"] in the job would tell the regions apart, within which \
+             values are averaged at the nodes.",
+        );
+    }
+    Ok(Some(("Body".into(), words, pictures)))
 }
 
-fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
+/// The mean outward normals of the contact boundaries that have a profile.
+fn contact_directions(found: &Found) -> Result<Vec<[f64; 3]>> {
+    let (Some(profiles), Some(job)) = (&found.profiles, &found.job) else { return Ok(Vec::new()) };
+    let names = profiles.names();
+    let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
+    let boundaries = touching.map(|name| Boundary::new(profiles, name, None, found.snapshot.as_ref()));
+    Ok(boundaries.filter_map(|boundary| boundary.direction()).collect())
+}
+
+fn boundary_sections(sections: &mut Sections, found: &Found) -> Result<()> {
     let mut contacts: Vec<(&[String], Laws)> = Vec::new();
     for contact in found.job.iter().flat_map(|job| &job.contact) {
         let friction = contact.friction;
@@ -159,7 +244,7 @@ fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
             }
             let heading =
                 format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });
-            page.section(&heading, &boundary.branch_table(), pictures);
+            sections.push((heading, boundary.branch_table(), pictures));
         }
     }
     let unseen: Vec<&String> =
@@ -173,28 +258,29 @@ fn boundary_sections(page: &mut Page, found: &Found) -> Result<()> {
                 ))
             })
             .collect();
-        page.section("Contact boundaries without profile", &words, vec![]);
+        sections.push(("Contact boundaries without profile".into(), words, vec![]));
     }
     Ok(())
 }
 
-fn time_sections(page: &mut Page, found: &Found) -> Result<()> {
+fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
     if let Some(probes) = found.probes.as_ref().filter(|probes| !probes.is_empty()) {
-        page.section("Probes", "", history::probes(probes)?);
+        sections.push(("Probes".into(), String::new(), history::probes(probes)?));
     }
     let dimension = found.dimension().unwrap_or(3);
     if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
         let words = "Forces on the body. In every step they add up to the rate of momentum.";
-        page.section("Resultants", &paragraph(words), history::resultants(resultants, dimension)?);
+        let pictures = history::resultants(resultants, dimension)?;
+        sections.push(("Resultants".into(), paragraph(words), pictures));
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
-        page.section("Energy", &paragraph("history.csv contains no steps yet."), vec![]);
+        sections.push(("Energy".into(), paragraph("history.csv contains no steps yet."), vec![]));
         return Ok(());
     }
     let unit = Energy::unit(dimension);
-    page.section("Energy", "", history::energies(history, unit)?);
+    sections.push(("Energy".into(), String::new(), history::energies(history, unit)?));
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
-    page.section("Steps", "", history::steps(history, tolerance)?);
+    sections.push(("Steps".into(), String::new(), history::steps(history, tolerance)?));
     Ok(())
 }

@@ -39,9 +39,9 @@ struct Curve {
 pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     let mut pictures = Vec::new();
     for (at, norm) in results.norms.iter().enumerate() {
-        pictures.extend(costs(results, at, norm)?);
-        pictures.extend(tolerances(results, at, norm)?);
         let of = plan.study.norm.get(at).map(|norm| (norm.of, norm.space));
+        pictures.extend(costs(results, at, norm, unit(of))?);
+        pictures.extend(tolerances(results, at, norm)?);
         pictures.extend(over_time(plan, results, at, norm, of)?);
         pictures.extend(on_the_body(plan, results, at, norm, of)?);
     }
@@ -50,7 +50,7 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
 }
 
 /// Errors against cost, for a norm that is known for at least two runs.
-fn costs(results: &Results, norm: usize, shown: &NormResult) -> Result<Vec<Picture>> {
+fn costs(results: &Results, norm: usize, shown: &NormResult, unit: &str) -> Result<Vec<Picture>> {
     let seconds = |run: &RunResult| run.seconds.map(|seconds| seconds.computing);
     let work = |run: &RunResult| Some(run.counts.work() as f64);
     let by_time = curves(results, norm, seconds);
@@ -60,12 +60,13 @@ fn costs(results: &Results, norm: usize, shown: &NormResult) -> Result<Vec<Pictu
     let time = Axis { quantity: "computing time", unit: "s" };
     let unknowns = Axis { quantity: "unknowns × steps", unit: "" };
     Ok(vec![
-        cost(shown, &by_time, time, "time")?,
-        cost(shown, &curves(results, norm, work), unknowns, "work")?,
+        cost((shown, unit), &by_time, time, "time")?,
+        cost((shown, unit), &curves(results, norm, work), unknowns, "work")?,
     ])
 }
 
-fn cost(norm: &NormResult, curves: &[Curve], axis: Axis, ending: &str) -> Result<Picture> {
+fn cost((norm, unit): (&NormResult, &str), curves: &[Curve], axis: Axis, ending: &str) -> Result<Picture> {
+    let quantity = format!("error {}", norm.name);
     let mut series = Vec::new();
     for (place, curve) in curves.iter().enumerate() {
         let front = front(&curve.points);
@@ -76,7 +77,8 @@ fn cost(norm: &NormResult, curves: &[Curve], axis: Axis, ending: &str) -> Result
     let chart = Chart {
         logarithmic: true,
         logarithmic_x: true,
-        ..Chart::new(axis, Axis { quantity: "error", unit: "" }, series)
+        orders: &[1, 2],
+        ..Chart::new(axis, Axis { quantity: &quantity, unit }, series)
     };
     let best = curves.iter().map(|curve| {
         let error = curve.points.iter().map(|point| point[1]).fold(f64::INFINITY, f64::min);
@@ -338,8 +340,8 @@ mod tests {
             Curve { name: "bdf2".into(), points: vec![[0.03, 0.1]] },
         ];
         let norm = NormResult { name: "v_max".into(), meaning: "max ||v||_H".into(), is_published: false };
-        let picture =
-            cost(&norm, &curves, Axis { quantity: "computing time", unit: "s" }, "time").expect("picture");
+        let picture = cost((&norm, "m/s"), &curves, Axis { quantity: "computing time", unit: "s" }, "time")
+            .expect("picture");
         for words in ["<svg", "lagged_euler", "bdf2", "computing time / s", "10⁻²"] {
             assert!(picture.svg.contains(words), "{words}");
         }

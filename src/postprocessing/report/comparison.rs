@@ -1,0 +1,93 @@
+//! The page of two runs side by side.
+
+use super::{
+    Options, Sections,
+    artifacts::Found,
+    drawn_sections, facts,
+    markup::{escape, paragraph, table},
+    page::Page,
+    picture::Picture,
+    title,
+};
+use crate::error::Result;
+use base64::{Engine, engine::general_purpose::STANDARD};
+
+/// Pictures of the same name beside each other, and the members of both summaries in one table.
+pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
+    let names = [0, 1].map(|run| found[run].folder.display().to_string());
+    let titles = [0, 1].map(|run| title(&found[run]));
+    let mut page =
+        Page::new(&titles.join(" and "), paragraph(&format!("Left: {}. Right: {}.", names[0], names[1])));
+    let [left, right] = [drawn_sections(&found[0], options)?, drawn_sections(&found[1], options)?];
+    for (heading, pairs) in paired(left, right) {
+        let mut html = String::from("<div class=\"pairs\">\n");
+        for pair in pairs {
+            for (side, picture) in pair.into_iter().enumerate() {
+                html += &figure(side, picture);
+            }
+        }
+        page.section(&heading, &(html + "</div>\n"), vec![]);
+    }
+    let rows = [0, 1].map(|run| found[run].summary.as_ref().map(facts::rows).unwrap_or_default());
+    page.section("Summary", &summaries(&names, rows), vec![]);
+    Ok(page)
+}
+
+/// Sections with the same heading, and in them pictures with the same name, in the order of the first run, then of the second.
+fn paired(left: Sections, right: Sections) -> Vec<(String, Vec<[Option<Picture>; 2]>)> {
+    let mut out: Vec<(String, Vec<[Option<Picture>; 2]>)> = Vec::new();
+    for (side, sections) in [left, right].into_iter().enumerate() {
+        for (heading, _, pictures) in sections.into_iter().filter(|(_, _, pictures)| !pictures.is_empty()) {
+            let at = out.iter().position(|(known, _)| *known == heading).unwrap_or_else(|| {
+                out.push((heading, Vec::new()));
+                out.len() - 1
+            });
+            let pairs = &mut out[at].1;
+            for picture in pictures {
+                let partner = pairs.iter_mut().find(|pair| {
+                    pair[side].is_none() && pair.iter().flatten().any(|known| known.name == picture.name)
+                });
+                match partner {
+                    Some(pair) => pair[side] = Some(picture),
+                    None => {
+                        let mut pair = [None, None];
+                        pair[side] = Some(picture);
+                        pairs.push(pair);
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// As an image: names inside a drawing stay apart from those of the other run.
+fn figure(side: usize, picture: Option<Picture>) -> String {
+    let place = ["left", "right"][side];
+    let Some(picture) = picture else {
+        return format!("<p class=\"{place}\">The run on the {place} does not have this picture.</p>\n");
+    };
+    format!(
+        "<figure class=\"{place}\"><img alt=\"{}\" src=\"data:image/svg+xml;base64,{}\"/><figcaption>{}</figcaption></figure>\n",
+        escape(&picture.alt),
+        STANDARD.encode(picture.file()),
+        escape(&picture.caption)
+    )
+}
+
+fn summaries(names: &[String; 2], rows: [Vec<(String, String)>; 2]) -> String {
+    let mut lines: Vec<Vec<String>> = Vec::new();
+    for (side, rows) in rows.into_iter().enumerate() {
+        for (what, value) in rows {
+            match lines.iter_mut().find(|line| line[0] == what) {
+                Some(line) => line[side + 1] = value,
+                None => {
+                    let mut line = vec![what, String::new(), String::new()];
+                    line[side + 1] = value;
+                    lines.push(line);
+                }
+            }
+        }
+    }
+    table("The runs", &["", &names[0], &names[1]], &lines)
+}
