@@ -3,7 +3,7 @@ use super::{
     supernodal::SupernodalFactor,
 };
 use crate::error::{Error, Result};
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 /// Cholesky factorisation `L L^T` of a matrix that is whole on this rank, with chosen unknowns eliminated last, or not at all: in
 /// double or single precision after CHOLMOD's symbolic analysis.
@@ -65,43 +65,52 @@ impl Cholesky {
         known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Option<Self>> {
-        Self::of(block, rows, last, known, (precision, false))
+        Self::of(block, || Cow::Borrowed(rows), last, known, (precision, false))
     }
 
     /// As [`new`](Self::new) for all unknowns but the last ones, which are not eliminated. Of the entries between two of these only
-    /// the diagonal is used, as a scale: it must be positive.
+    /// the diagonal is used, as a scale: it must be positive. The rows are made when they are needed, and freed before the factor takes
+    /// its memory.
     pub fn partial(
         block: usize,
-        rows: &BlockRows,
+        rows: impl Fn() -> BlockRows,
         last: &[usize],
         known: Option<&[u32]>,
         precision: Precision,
     ) -> Result<Self> {
         let moved =
             || Error::Internal("unknowns of an interface are not last in the order of elimination".into());
-        Self::of(block, rows, last, known, (precision, true))?.ok_or_else(moved)
+        Self::of(block, || Cow::Owned(rows()), last, known, (precision, true))?.ok_or_else(moved)
     }
 
-    fn of(
+    fn of<'a>(
         block: usize,
-        rows: &BlockRows,
+        make_rows: impl Fn() -> Cow<'a, BlockRows>,
         last: &[usize],
         known: Option<&[u32]>,
         (precision, partial): (Precision, bool),
     ) -> Result<Option<Self>> {
+        let rows = make_rows();
         rows.check(block, rows.offsets.len().saturating_sub(1))?;
-        let stored = if partial { couplings(block, rows, last) } else { Vec::new() };
-        let mut lower = Lower::of(block, rows, &stored)?;
-        let analysed = Analysis::new(block, rows, &mut lower.view(), last, known)?;
+        let stored = if partial { couplings(block, &rows, last) } else { Vec::new() };
+        let mut lower = Lower::of(block, &rows, &stored)?;
+        let analysed = Analysis::new(block, &rows, &mut lower.view(), last, known)?;
         let Some(analysis) = analysed else { return Ok(None) };
+        drop(rows);
         let single = match precision {
-            Precision::Single => SupernodalFactor::new(&analysis, &lower, last.len(), partial)?,
+            Precision::Single => {
+                let matrix = std::mem::take(&mut lower);
+                SupernodalFactor::new(&analysis, matrix, last.len(), partial)?
+            }
             Precision::Double => None,
         };
         let numbers = match single {
             Some(single) => Numbers::Single(single),
             None => {
-                let double = SupernodalFactor::new(&analysis, &lower, last.len(), partial)?;
+                if precision == Precision::Single {
+                    lower = Lower::of(block, &make_rows(), &stored)?;
+                }
+                let double = SupernodalFactor::new(&analysis, lower, last.len(), partial)?;
                 Numbers::Double(double.ok_or_else(not_positive_definite)?)
             }
         };
@@ -480,7 +489,7 @@ mod tests {
         let last: Vec<usize> = vec![0, 1, 7, 21, 22, 23, 24, 25, 49 + 3, 49 + 10, 49 + 17, 97];
         let b: Vec<f64> = (0..size).map(|i| (i % 5) as f64 - 2.0).collect();
         for (precision, error) in [(Double, 1e-13), (Single, 1e-5)] {
-            let mut factor = Cholesky::partial(1, &rows, &last, None, precision).unwrap();
+            let mut factor = Cholesky::partial(1, || rows.clone(), &last, None, precision).unwrap();
             assert_eq!(factor.precision(), precision);
             let (mut reduced, mut left) = (dense(&rows), b.clone());
             eliminate(&mut reduced, &mut left, &last);
@@ -489,6 +498,9 @@ mod tests {
             let mut entries = factor.last_block().into_iter();
             assert_eq!(factor.last_columns(3..5), factor.last_block()[12 + 11 + 10..][..9 + 8]);
             factor.drop_last_block();
+            let [entries, _] = of_numbers!(&factor.numbers, numbers => numbers.counts(&factor.analysis));
+            let stored = of_numbers!(&factor.numbers, numbers => numbers.values.capacity()) as u64;
+            assert!(entries <= stored && stored < 2 * entries, "{stored} for {entries} entries");
             for (at, &column) in order.iter().enumerate() {
                 for &row in &order[at..] {
                     let known = reduced[row][column] - whole[row][column];
@@ -519,8 +531,8 @@ mod tests {
     fn a_known_order_is_kept() {
         let rows = grids(6);
         let last = [3, 9, 15, 40];
-        let order = Cholesky::partial(1, &rows, &last, None, Double).unwrap().order().to_vec();
-        let again = Cholesky::partial(1, &rows, &last, Some(&order), Double).unwrap();
+        let order = Cholesky::partial(1, || rows.clone(), &last, None, Double).unwrap().order().to_vec();
+        let again = Cholesky::partial(1, || rows.clone(), &last, Some(&order), Double).unwrap();
         assert_eq!(again.order(), order);
     }
 
@@ -529,7 +541,7 @@ mod tests {
         let mut rows = grids(3);
         rows.values[0] = -2.0;
         for precision in [Double, Single] {
-            let error = Cholesky::partial(1, &rows, &[8], None, precision).unwrap_err();
+            let error = Cholesky::partial(1, || rows.clone(), &[8], None, precision).unwrap_err();
             assert!(error.to_string().contains("not positive definite"));
         }
     }

@@ -3,6 +3,7 @@ use crate::error::{Error, Result};
 use std::{ffi::c_int, ptr};
 
 /// The lower half of a matrix by columns.
+#[derive(Default)]
 pub(super) struct Lower {
     starts: Vec<sys::PetscInt>,
     indices: Vec<sys::PetscInt>,

@@ -38,16 +38,12 @@ const NONE: u32 = u32::MAX;
 impl<R: Real> SupernodalFactor<R> {
     /// Factors the matrix that was analysed; `None` where it is not positive definite in this precision. With `partial`, the last
     /// unknowns are not eliminated, and the entries between two of them count as zero: their panels hold `-K_lf K_ff^-1 K_fl`, the
-    /// contribution of the other unknowns to their Schur complement.
-    pub(super) fn new(
-        analysis: &Analysis,
-        lower: &Lower,
-        last: usize,
-        partial: bool,
-    ) -> Result<Option<Self>> {
+    /// contribution of the other unknowns to their Schur complement. The matrix is freed before the factor takes its memory.
+    pub(super) fn new(analysis: &Analysis, lower: Lower, last: usize, partial: bool) -> Result<Option<Self>> {
         let (order, nodes) = (&analysis.order, analysis.supernodes());
         let end = if partial { order.len() - last } else { order.len() };
-        let Some(columns) = Columns::<R>::of(order, lower) else { return Ok(None) };
+        let Some(columns) = Columns::<R>::of(order, &lower) else { return Ok(None) };
+        drop(lower);
         let count = (0..nodes.len()).map(|node| nodes.panel(node).len()).sum();
         let no_memory = |_| {
             Error::Failed(
@@ -116,8 +112,10 @@ impl<R: Real> SupernodalFactor<R> {
     /// Frees the memory of the columns of the last unknowns that were not eliminated.
     pub(super) fn drop_last_columns(&mut self, analysis: &Analysis) {
         let nodes = analysis.supernodes();
-        if let Some(node) = (0..nodes.len()).find(|&node| nodes.columns(node).start >= self.end) {
-            self.values.truncate(nodes.panel(node).start);
+        // A supernode may have columns of both kinds: those that were eliminated come first.
+        if let Some(node) = (0..nodes.len()).find(|&node| nodes.columns(node).end > self.end) {
+            let kept = eliminated(nodes.columns(node), self.end).len() * nodes.rows(node).len();
+            self.values.truncate(nodes.panel(node).start + kept);
             self.values.shrink_to_fit();
         }
     }
@@ -140,7 +138,7 @@ impl<R: Real> SupernodalFactor<R> {
             own.copy_from_slice(&self.vector[columns.clone()]);
             below.fill(R::default());
             let there = &mut self.values_there[..rows.len()];
-            let panel = &self.values[nodes.panel(node)][..columns.len() * rows.len()];
+            let panel = &self.values[nodes.panel(node).start..][..columns.len() * rows.len()];
             R::forward(panel, columns.len(), there);
             let (own, below) = there.split_at(columns.len());
             self.vector[columns.clone()].copy_from_slice(own);
@@ -183,7 +181,7 @@ impl<R: Real> SupernodalFactor<R> {
             }
             let there = &mut self.values_there[..rows.len()];
             there.iter_mut().zip(rows).for_each(|(value, &row)| *value = self.vector[row as usize]);
-            let panel = &self.values[nodes.panel(node)][..columns.len() * rows.len()];
+            let panel = &self.values[nodes.panel(node).start..][..columns.len() * rows.len()];
             R::backward(panel, columns.len(), there);
             self.vector[columns.clone()].copy_from_slice(&there[..columns.len()]);
         }
@@ -324,18 +322,17 @@ fn factor<R: Real>(nodes: Supernodes<'_>, columns: &Columns<R>, end: usize, valu
             continue;
         }
         R::factor(&mut panel[..width * height], width)?;
-        let rest = own.len() - width;
-        if rest > 0 {
-            let (panel, last) = panel.split_at_mut(width * height);
-            let below = height - width;
-            update.resize(usize::max(update.len(), rest * below), R::default());
-            R::own_product(panel, height, width, rest, &mut update);
-            let updates = update[..rest * below].chunks_exact(below).enumerate();
-            for ((at, update), column) in updates.zip(last.chunks_exact_mut(height)) {
-                column[width + at..]
-                    .iter_mut()
-                    .zip(&update[at..])
-                    .for_each(|(value, update)| *value -= *update);
+        let (panel, last) = panel.split_at_mut(width * height);
+        for start in (width..own.len()).step_by(MAX_UPDATED) {
+            let (count, below) = ((own.len() - start).min(MAX_UPDATED), height - start);
+            update.resize(usize::max(update.len(), below * count), R::default());
+            R::own_product(panel, height, start, count, &mut update);
+            let updates = update[..below * count].chunks_exact(below).enumerate();
+            for ((at, update), column) in
+                updates.zip(last[(start - width) * height..].chunks_exact_mut(height))
+            {
+                let values = column[start + at..].iter_mut().zip(&update[at..]);
+                values.for_each(|(value, update)| *value -= *update);
             }
         }
         lists.insert(node, rows, own.len());

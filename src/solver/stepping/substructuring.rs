@@ -330,8 +330,8 @@ impl Factors {
             return Ok(agree(world, factor)?.map(Self::Whole));
         }
         let skeleton = substructures.skeleton(world, rows)?;
-        let local = substructures.local_rows(rows, &skeleton);
-        let factor = |precision| Cholesky::partial(d, &local, &substructures.last, known, precision);
+        let local = || substructures.local_rows(rows, &skeleton);
+        let factor = |precision| Cholesky::partial(d, local, &substructures.last, known, precision);
         let mut interior = agree(world, factor(precision))?;
         // The choice may differ between processors.
         let is_double = gather(world, &[u8::from(interior.precision() == Precision::Double)])?;
@@ -342,7 +342,6 @@ impl Factors {
             };
             interior = agree(world, interior_factor)?;
         }
-        drop(local);
         Shared::new(world, substructures, interior, &skeleton)
             .map(|shared| Some(Self::Shared(Box::new(shared))))
     }
