@@ -498,9 +498,9 @@ mod tests {
             let mut entries = factor.last_block().into_iter();
             assert_eq!(factor.last_columns(3..5), factor.last_block()[12 + 11 + 10..][..9 + 8]);
             factor.drop_last_block();
-            let [entries, _] = of_numbers!(&factor.numbers, numbers => numbers.counts(&factor.analysis));
+            let [read, _] = of_numbers!(&factor.numbers, numbers => numbers.counts(&factor.analysis));
             let stored = of_numbers!(&factor.numbers, numbers => numbers.values.capacity()) as u64;
-            assert!(entries <= stored && stored < 2 * entries, "{stored} for {entries} entries");
+            assert!(read <= stored && stored < 2 * read, "{stored} for {read} entries");
             for (at, &column) in order.iter().enumerate() {
                 for &row in &order[at..] {
                     let known = reduced[row][column] - whole[row][column];
