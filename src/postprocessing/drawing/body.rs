@@ -539,7 +539,7 @@ mod tests {
         // A cell of a hundredth of the size that is halved: at a factor of 2 it would be flat.
         snapshot.nodes.extend([[1.01, 0.0, 0.0]]);
         snapshot.cells.extend([1, 4, 2]);
-        let mut few = vec![[0.0; 3]; 5];
+        let mut few = [[0.0; 3]; 5];
         few[4][0] = -0.005;
         snapshot.fields.insert("displacement", few.concat());
         assert_eq!(Body::new(&snapshot).magnification, 1.0);

@@ -1,13 +1,12 @@
 //! The page of two runs side by side.
 
 use super::{
-    Options, Sections,
     artifacts::Found,
-    drawn_sections, facts,
+    facts,
     markup::{escape, paragraph, table},
     page::Page,
     picture::Picture,
-    title,
+    run::{Options, Sections, drawn_sections, title},
 };
 use crate::error::Result;
 use base64::{Engine, engine::general_purpose::STANDARD};

@@ -1,0 +1,218 @@
+//! The page of a run.
+
+use super::{
+    artifacts::{Found, Gap},
+    body::{self, Body, Drawn},
+    boundary::{Boundary, Laws},
+    facts, history,
+    law::Law,
+    markup::{escape, paragraph},
+    page::Page,
+    picture::Picture,
+};
+use crate::{
+    error::Result,
+    fem::effect::Energy,
+    io::output::{
+        field_list::{FIELDS, REGION, VON_MISES},
+        fields::Place,
+    },
+};
+use std::fmt::Write;
+
+/// What a report draws.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Whether each cell has one colour, instead of means at the nodes.
+    pub per_cell: bool,
+    /// Whether pictures of the body have contour lines.
+    pub contours: bool,
+}
+
+/// The title of a run: that of its job, or the name of its folder.
+pub(super) fn title(found: &Found) -> String {
+    let about = found.job.as_ref().and_then(|job| job.about.as_ref());
+    let name =
+        found.folder.file_name().map_or_else(|| "Run".into(), |name| name.to_string_lossy().into_owned());
+    about.and_then(|about| about.title.clone()).unwrap_or(name)
+}
+
+/// The page of a run.
+pub(super) fn page(found: &Found, options: Options) -> Result<Page> {
+    let mut page = Page::new(&title(found), head(found));
+    for (heading, words, pictures) in drawn_sections(found, options)? {
+        page.section(&heading, &words, pictures);
+    }
+    if let Some(summary) = &found.summary {
+        page.section("Summary", &facts::summary(summary), vec![]);
+    }
+    let certificates = facts::certificates(found);
+    page.section("Certificates", &folded("Uniqueness and growth of solutions", &certificates), vec![]);
+    if let Some(phases) = found.summary.as_ref().and_then(facts::phases) {
+        page.section("Wall time", "", vec![phases]);
+    }
+    if let Some(text) = &found.text {
+        let job = folded("job.toml with all defaults", &format!("<pre>{}</pre>\n", escape(text)));
+        page.section("Effective job", &job, vec![]);
+    }
+    Ok(page)
+}
+
+/// Sections with pictures: heading, HTML, pictures.
+pub(super) type Sections = Vec<(String, String, Vec<Picture>)>;
+
+/// The sections of the body, the boundaries and the quantities over time.
+pub(super) fn drawn_sections(found: &Found, options: Options) -> Result<Sections> {
+    let mut sections = Sections::new();
+    sections.extend(body_section(found, options)?);
+    boundary_sections(&mut sections, found)?;
+    time_sections(&mut sections, found)?;
+    Ok(sections)
+}
+
+fn folded(summary: &str, html: &str) -> String {
+    format!("<details>\n<summary>{}</summary>\n{html}</details>\n", escape(summary))
+}
+
+fn head(found: &Found) -> String {
+    let mut head = String::new();
+    let about = found.job.as_ref().and_then(|job| job.about.as_ref());
+    if let Some(reference) = about.and_then(|about| about.reference.as_ref()) {
+        head += &paragraph(reference);
+    }
+    if let Some(authors) = about.map(|about| about.authors.join(", ")).filter(|authors| !authors.is_empty()) {
+        head += &paragraph(&authors);
+    }
+    if let Some(summary) = &found.summary {
+        head += &paragraph(&facts::ending(summary));
+        head += &facts::warnings(summary);
+    }
+    if !found.gaps.is_empty() {
+        head.push_str("<div class=\"missing\">\n<h2>Missing</h2>\n<ul>\n");
+        for Gap { file, why, lacking } in &found.gaps {
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                head,
+                "<li><code>{file}</code>: {}. Without it this page lacks {lacking}.</li>",
+                escape(why.trim_end().trim_end_matches('.'))
+            );
+        }
+        head.push_str("</ul>\n</div>\n");
+    }
+    head
+}
+
+fn body_section(found: &Found, options: Options) -> Result<Option<(String, String, Vec<Picture>)>> {
+    let Some(snapshot) = &found.snapshot else { return Ok(None) };
+    let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
+    let Options { per_cell, contours } = options;
+    let body = Body::new(snapshot).with_look(body::Look { per_cell, contours, several_materials });
+    let mut drawn = Vec::new();
+    for field in &FIELDS {
+        drawn.extend(body.of_field(field)?);
+    }
+    for history in snapshot.histories.iter().filter(|history| history.place == Place::Cell) {
+        drawn.push(body.of_history(history)?);
+    }
+    for direction in contact_directions(found)? {
+        let Some(side) = body.hidden_side(direction) else { continue };
+        if let Some(Drawn::Picture(picture)) = side.of_field(&VON_MISES)? {
+            drawn.push(Drawn::Picture(picture.renamed("von_mises_contact_side")));
+            break;
+        }
+    }
+    let (mut pictures, mut uniform) = (Vec::new(), Vec::new());
+    for drawn in drawn {
+        match drawn {
+            Drawn::Picture(picture) => pictures.push(picture),
+            Drawn::Uniform(words) => uniform.push(words),
+        }
+    }
+    let mut words = String::new();
+    if pictures.is_empty() && uniform.is_empty() {
+        words += &paragraph("fields.vtkhdf contains a mesh, but no fields yet.");
+    }
+    if !uniform.is_empty() {
+        words += &paragraph(&format!("Not drawn, because the same everywhere: {}.", uniform.join(", ")));
+    }
+    if several_materials && !per_cell && snapshot.values(&REGION).is_none() {
+        words += &paragraph(
+            "Each cell has one colour: [output] also = [\"region\"] in the job would tell the regions apart, within which \
+             values are averaged at the nodes.",
+        );
+    }
+    Ok(Some(("Body".into(), words, pictures)))
+}
+
+/// The mean outward normals of the contact boundaries that have a profile.
+fn contact_directions(found: &Found) -> Result<Vec<[f64; 3]>> {
+    let (Some(profiles), Some(job)) = (&found.profiles, &found.job) else { return Ok(Vec::new()) };
+    let names = profiles.names();
+    let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
+    let boundaries = touching.map(|name| Boundary::new(profiles, name, None, found.snapshot.as_ref()));
+    Ok(boundaries.filter_map(|boundary| boundary.direction()).collect())
+}
+
+fn boundary_sections(sections: &mut Sections, found: &Found) -> Result<()> {
+    let mut contacts: Vec<(&[String], Laws)> = Vec::new();
+    for contact in found.job.iter().flat_map(|job| &job.contact) {
+        let friction = contact.friction;
+        let steps = match (&found.history, &contact.obstacle) {
+            (Some(history), Some(_)) => history.curve("time", "dt"),
+            _ => Vec::new(),
+        };
+        contacts.push((&contact.on, Laws { normal: Law::of(contact)?, friction, steps }));
+    }
+    let mut seen = Vec::new();
+    if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
+        seen = profiles.names();
+        for name in &seen {
+            let contact = contacts.iter().find(|(on, _)| on.contains(name));
+            let snapshot = found.snapshot.as_ref();
+            let boundary = Boundary::new(profiles, name, contact.map(|(_, laws)| laws), snapshot);
+            let mut pictures = boundary.pictures(snapshot)?;
+            if let Some(snapshot) = snapshot.filter(|_| contact.is_some()) {
+                pictures.extend(boundary.arrows(&Body::new(snapshot))?);
+            }
+            let heading =
+                format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });
+            sections.push((heading, boundary.branch_table(), pictures));
+        }
+    }
+    let unseen: Vec<&String> =
+        contacts.iter().flat_map(|(on, _)| on.iter()).filter(|name| !seen.contains(name)).collect();
+    if !unseen.is_empty() {
+        let words: String = unseen
+            .iter()
+            .map(|name| {
+                paragraph(&format!(
+                    "No profile along {name}: [[output.profile]] on = \"{name}\" in the job writes one."
+                ))
+            })
+            .collect();
+        sections.push(("Contact boundaries without profile".into(), words, vec![]));
+    }
+    Ok(())
+}
+
+fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
+    if let Some(probes) = found.probes.as_ref().filter(|probes| !probes.is_empty()) {
+        sections.push(("Probes".into(), String::new(), history::probes(probes)?));
+    }
+    let dimension = found.dimension().unwrap_or(3);
+    if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
+        let words = "Forces on the body. In every step they add up to the rate of momentum.";
+        let pictures = history::resultants(resultants, dimension)?;
+        sections.push(("Resultants".into(), paragraph(words), pictures));
+    }
+    let Some(history) = found.history.as_ref() else { return Ok(()) };
+    if history.is_empty() {
+        sections.push(("Energy".into(), paragraph("history.csv contains no steps yet."), vec![]));
+        return Ok(());
+    }
+    let unit = Energy::unit(dimension);
+    sections.push(("Energy".into(), String::new(), history::energies(history, unit)?));
+    let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
+    sections.push(("Steps".into(), String::new(), history::steps(history, tolerance)?));
+    Ok(())
+}
