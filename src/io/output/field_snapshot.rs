@@ -4,6 +4,7 @@ use super::{
     field::{Place, Shape, place_word, shape_word},
     field_list::FIELDS,
     output_field::OutputField,
+    parallel_file::LONGEST_TEXT,
 };
 use crate::error::{Error, Result};
 use std::{collections::BTreeMap, path::Path};
@@ -133,7 +134,7 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     for name in file.group("Fields")?.member_names()? {
         let group = file.group(&format!("Fields/{name}"))?;
         let text = |attribute: &str| -> hdf5::Result<String> {
-            Ok(group.attr(attribute)?.read_scalar::<hdf5::types::FixedAscii<256>>()?.to_string())
+            Ok(group.attr(attribute)?.read_scalar::<hdf5::types::FixedAscii<LONGEST_TEXT>>()?.to_string())
         };
         if FIELDS.iter().any(|field| field.name == name) || text("shape")? != shape_word(Shape::Scalar) {
             continue;

@@ -40,7 +40,7 @@ pub fn was_abandoned() -> bool {
 }
 
 /// The longest text an attribute holds, in bytes.
-const LONGEST_TEXT: usize = 256;
+pub(super) const LONGEST_TEXT: usize = 256;
 
 /// A number that the files store in the machine's own representation.
 pub trait Element: hdf5::H5Type + Copy + Default {}

@@ -528,6 +528,20 @@ mod tests {
     }
 
     #[test]
+    fn columns_that_are_not_eliminated_are_freed_also_within_a_supernode() {
+        let columns = vec![0, 1, 2, 0, 1, 2, 0, 1, 2];
+        let values = vec![4.0, 1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 4.0];
+        let rows = BlockRows { offsets: vec![0, 3, 6, 9], columns, values };
+        for precision in [Double, Single] {
+            let mut factor = Cholesky::partial(1, || rows.clone(), &[2], None, precision).unwrap();
+            let stored = |factor: &Cholesky| of_numbers!(&factor.numbers, numbers => numbers.values.len());
+            assert_eq!(stored(&factor), 9, "one supernode of three columns");
+            factor.drop_last_block();
+            assert_eq!(stored(&factor), 6, "two columns are eliminated");
+        }
+    }
+
+    #[test]
     fn a_known_order_is_kept() {
         let rows = grids(6);
         let last = [3, 9, 15, 40];

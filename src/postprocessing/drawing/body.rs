@@ -6,7 +6,7 @@ use super::{
     paint::{Style, Triangle, paint},
     picture::{Picture, open_svg, text},
     scale::{Scale, extent, number, percentiles, unit_by_name},
-    view::{Face, View, faces, outline},
+    view::{Face, View, cross, dot, faces, minus, outline},
 };
 use crate::{
     error::Result,
@@ -79,7 +79,8 @@ struct Values<'a> {
     scale: Scale,
     /// Whether the scale leaves out the extreme values.
     is_clipped: bool,
-    is_averaged: bool,
+    /// The region of each cell, if values of cells are averaged at the nodes within regions.
+    regions: Option<Cow<'a, [f64]>>,
 }
 
 impl<'a> Body<'a> {
@@ -127,8 +128,7 @@ impl<'a> Body<'a> {
                 // Each part of a divided cell has the error of the cell.
                 let total = length(&values) / (self.snapshot.parts.max(1) as f64).sqrt();
                 let scale = of_errors(&values);
-                let shown =
-                    Values { values, place: Place::Cell, scale, is_clipped: false, is_averaged: false };
+                let shown = Values { values, place: Place::Cell, scale, is_clipped: false, regions: None };
                 let mut drawn = self.picture(look, &shown)?;
                 drawn.caption += &format!(" Of all cells together: {} {unit}.", number(total));
                 drawn
@@ -152,7 +152,7 @@ impl<'a> Body<'a> {
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let scale = linear(extent(values.iter().copied()));
         let (place, values) = (Place::Node, values.into());
-        self.picture(look, &Values { values, place, scale, is_clipped: false, is_averaged: false })
+        self.picture(look, &Values { values, place, scale, is_clipped: false, regions: None })
     }
 
     /// Coloured by the logarithms of the errors of the cells.
@@ -162,7 +162,7 @@ impl<'a> Body<'a> {
         let parts = self.snapshot.parts.max(1);
         let of_parts = values.iter().flat_map(|value| std::iter::repeat_n(*value, parts));
         let (place, values) = (Place::Cell, of_parts.collect());
-        self.picture(look, &Values { values, place, scale, is_clipped: false, is_averaged: false })
+        self.picture(look, &Values { values, place, scale, is_clipped: false, regions: None })
     }
 
     /// A description of the magnification of the displacement.
@@ -175,7 +175,7 @@ impl<'a> Body<'a> {
     }
 
     fn linear(&self, look: Coloured, place: Place, values: Cow<[f64]>) -> Result<Picture> {
-        let is_averaged = place == Place::Cell && !self.look.per_cell && self.regions().is_some();
+        let regions = if place == Place::Cell { self.regions() } else { None };
         let shown = percentiles(&values);
         let full = extent(values.iter().copied());
         let is_clipped = match (shown, full) {
@@ -183,20 +183,27 @@ impl<'a> Body<'a> {
             _ => false,
         };
         let scale = linear(if is_clipped { shown } else { full });
-        self.picture(look, &Values { values, place, scale, is_clipped, is_averaged })
+        self.picture(look, &Values { values, place, scale, is_clipped, regions })
     }
 
-    /// The regions within which values of cells may be averaged; `None` if they are not known.
+    /// The regions within which values of cells are averaged; `None` if they are not known, or no mean is wanted.
     fn regions(&self) -> Option<Cow<'_, [f64]>> {
+        if self.look.per_cell {
+            return None;
+        }
         let regions = self.snapshot.values(&REGION).map(Cow::from);
         let one = || Cow::from(vec![0.0; self.snapshot.cells.len() / self.snapshot.corners]);
         regions.or_else(|| (!self.look.several_materials).then(one))
     }
 
+    /// Whether cells have one colour only because the regions are not known.
+    pub fn lacks_regions(&self) -> bool {
+        !self.look.per_cell && self.regions().is_none()
+    }
+
     /// The values at the corners of each face.
     fn at_corners(&self, shown: &Values) -> Vec<[f64; 3]> {
-        let regions = if shown.is_averaged { self.regions() } else { None };
-        match (shown.place, regions) {
+        match (shown.place, &shown.regions) {
             (Place::Node, _) => {
                 self.faces.iter().map(|face| face.nodes.map(|node| shown.values[node as usize])).collect()
             }
@@ -204,7 +211,7 @@ impl<'a> Body<'a> {
                 self.faces.iter().map(|face| [shown.values[face.cell as usize]; 3]).collect()
             }
             (Place::Cell, Some(regions)) => {
-                let means = means_at_nodes(self.snapshot, &regions, &shown.values);
+                let means = means_at_nodes(self.snapshot, regions, &shown.values);
                 let of_face = |face: &Face| {
                     let means = &means[&regions[face.cell as usize].to_bits()];
                     face.nodes.map(|node| means[node as usize])
@@ -402,11 +409,11 @@ fn words_of(shown: &Values, unit: &str) -> (String, String) {
     let (low, high) = extent(shown.values.iter().copied()).unwrap_or((0.0, 0.0));
     let range = |low: f64, high: f64| format!("from {} to {} {unit}", number(low), number(high));
     let mut figures = range(low, high).trim_end().to_owned();
-    if shown.is_averaged {
+    if shown.regions.is_some() {
         figures += " in the cells";
     }
     let mut colours = String::new();
-    if shown.is_averaged {
+    if shown.regions.is_some() {
         colours += ", drawn as means at the nodes";
     }
     if shown.is_clipped {
@@ -435,14 +442,9 @@ fn means_at_nodes(snapshot: &Snapshot, regions: &[f64], values: &[f64]) -> BTree
 
 /// A multiple of the area or volume of a cell whose nodes are at these places; its sign is that of its orientation.
 fn measure(cell: &[u32], places: &[[f64; 3]]) -> f64 {
-    let first = places[cell[0] as usize];
-    let edge = |n: usize| -> [f64; 3] { std::array::from_fn(|i| places[cell[n] as usize][i] - first[i]) };
-    let (a, b) = (edge(1), edge(2));
-    let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    if cell.len() == 3 {
-        return normal[2];
-    }
-    edge(3).iter().zip(normal).map(|(c, n)| c * n).sum()
+    let edge = |n: usize| minus(places[cell[n] as usize], places[cell[0] as usize]);
+    let normal = cross(edge(1), edge(2));
+    if cell.len() == 3 { normal[2] } else { dot(normal, edge(3)) }
 }
 
 /// The places of the nodes with displacements magnified by this factor.
@@ -571,9 +573,8 @@ mod tests {
     fn corners(snapshot: &Snapshot, look: Look) -> Vec<[f64; 3]> {
         let body = Body::new(snapshot).with_look(look);
         let values = snapshot.values(&VON_MISES).expect("stress").into();
-        let is_averaged = !look.per_cell && body.regions().is_some();
-        let scale = linear(None);
-        body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, is_averaged })
+        let (scale, regions) = (linear(None), body.regions());
+        body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, regions })
     }
 
     #[test]

@@ -67,9 +67,10 @@ fn write_page(page: &Page, folder: &Path, name: &str, missing: Vec<String>) -> R
         write(&folder.join(format!("{}.png", picture.name)), &picture.png()?)?;
     }
     let path = folder.join(name);
-    let made_by = format!(
-        "Made by solver report, version {VERSION}. All quantities in SI units. The folder of this page contains the pictures as SVG and PNG files."
-    );
+    let mut made_by = format!("Made by solver report, version {VERSION}. All quantities in SI units.");
+    if !page.pictures().is_empty() {
+        made_by += " The folder of this page contains the pictures as SVG and PNG files.";
+    }
     let html = page.html(&made_by);
     write(&path, html.as_bytes())?;
     Ok(Made { page: path, pictures: html.matches("<figure").count(), missing })

@@ -14,7 +14,8 @@ use crate::{
     error::Result,
     fem::effect::Energy,
     io::output::{
-        field_list::{FIELDS, REGION, VON_MISES},
+        field_list::{FIELDS, VON_MISES},
+        field_snapshot::Snapshot,
         fields::Place,
     },
 };
@@ -58,14 +59,24 @@ pub(super) fn page(found: &Found, options: Options) -> Result<Page> {
     Ok(page)
 }
 
-/// Sections with pictures: heading, HTML, pictures.
-pub(super) type Sections = Vec<(String, String, Vec<Picture>)>;
+/// Sections with pictures.
+pub(super) type Sections = Vec<Section>;
+
+/// Heading, HTML, pictures.
+pub(super) type Section = (String, String, Vec<Picture>);
 
 /// The sections of the body, the boundaries and the quantities over time.
 pub(super) fn drawn_sections(found: &Found, options: Options) -> Result<Sections> {
     let mut sections = Sections::new();
-    sections.extend(body_section(found, options)?);
-    boundary_sections(&mut sections, found)?;
+    let body = found.snapshot.as_ref().map(|snapshot| {
+        let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
+        let Options { per_cell, contours } = options;
+        Body::new(snapshot).with_look(body::Look { per_cell, contours, several_materials })
+    });
+    if let (Some(body), Some(snapshot)) = (&body, &found.snapshot) {
+        sections.push(body_section(found, body, snapshot)?);
+    }
+    boundary_sections(&mut sections, found, body.as_ref())?;
     time_sections(&mut sections, found)?;
     Ok(sections)
 }
@@ -102,11 +113,7 @@ fn head(found: &Found) -> String {
     head
 }
 
-fn body_section(found: &Found, options: Options) -> Result<Option<(String, String, Vec<Picture>)>> {
-    let Some(snapshot) = &found.snapshot else { return Ok(None) };
-    let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
-    let Options { per_cell, contours } = options;
-    let body = Body::new(snapshot).with_look(body::Look { per_cell, contours, several_materials });
+fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Section> {
     let mut drawn = Vec::new();
     for field in &FIELDS {
         drawn.extend(body.of_field(field)?);
@@ -114,7 +121,7 @@ fn body_section(found: &Found, options: Options) -> Result<Option<(String, Strin
     for history in snapshot.histories.iter().filter(|history| history.place == Place::Cell) {
         drawn.push(body.of_history(history)?);
     }
-    for direction in contact_directions(found)? {
+    for direction in contact_directions(found, snapshot) {
         let Some(side) = body.hidden_side(direction) else { continue };
         if let Some(Drawn::Picture(picture)) = side.of_field(&VON_MISES)? {
             drawn.push(Drawn::Picture(picture.renamed("von_mises_contact_side")));
@@ -135,25 +142,26 @@ fn body_section(found: &Found, options: Options) -> Result<Option<(String, Strin
     if !uniform.is_empty() {
         words += &paragraph(&format!("Not drawn, because the same everywhere: {}.", uniform.join(", ")));
     }
-    if several_materials && !per_cell && snapshot.values(&REGION).is_none() {
+    if body.lacks_regions() {
         words += &paragraph(
             "Each cell has one colour: [output] also = [\"region\"] in the job would tell the regions apart, within which \
              values are averaged at the nodes.",
         );
     }
-    Ok(Some(("Body".into(), words, pictures)))
+    Ok(("Body".into(), words, pictures))
 }
 
-/// The mean outward normals of the contact boundaries that have a profile.
-fn contact_directions(found: &Found) -> Result<Vec<[f64; 3]>> {
-    let (Some(profiles), Some(job)) = (&found.profiles, &found.job) else { return Ok(Vec::new()) };
+/// The mean outward normals of the contact boundaries of a solid that have a profile.
+fn contact_directions(found: &Found, snapshot: &Snapshot) -> Vec<[f64; 3]> {
+    let (Some(profiles), Some(job), 3) = (&found.profiles, &found.job, snapshot.dimension()) else {
+        return Vec::new();
+    };
     let names = profiles.names();
     let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
-    let boundaries = touching.map(|name| Boundary::new(profiles, name, None, found.snapshot.as_ref()));
-    Ok(boundaries.filter_map(|boundary| boundary.direction()).collect())
+    touching.filter_map(|name| Boundary::new(profiles, name, None, Some(snapshot)).direction()).collect()
 }
 
-fn boundary_sections(sections: &mut Sections, found: &Found) -> Result<()> {
+fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>) -> Result<()> {
     let mut contacts: Vec<(&[String], Laws)> = Vec::new();
     for contact in found.job.iter().flat_map(|job| &job.contact) {
         let friction = contact.friction;
@@ -171,8 +179,8 @@ fn boundary_sections(sections: &mut Sections, found: &Found) -> Result<()> {
             let snapshot = found.snapshot.as_ref();
             let boundary = Boundary::new(profiles, name, contact.map(|(_, laws)| laws), snapshot);
             let mut pictures = boundary.pictures(snapshot)?;
-            if let Some(snapshot) = snapshot.filter(|_| contact.is_some()) {
-                pictures.extend(boundary.arrows(&Body::new(snapshot))?);
+            if let Some(body) = body.filter(|_| contact.is_some()) {
+                pictures.extend(boundary.arrows(body)?);
             }
             let heading =
                 format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });
