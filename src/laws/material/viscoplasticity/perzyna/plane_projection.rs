@@ -24,7 +24,7 @@ impl Surface {
     /// The `m >= 0` with `volumetric / (1 + along m)^2 + deviatoric / (1 + across m)^2` equal to the square of the yield stress,
     /// for squares in Pa^2 whose sum has the root `norms`; 0 where that is not above the yield stress.
     ///
-    /// Newton's method on the reciprocal of the norm, which is nearly linear and never overshoots.
+    /// Newton's method, from zero, on the reciprocal of the norm, which is nearly linear and concave: no step overshoots.
     #[inline(always)]
     pub(super) fn multipliers<const N: usize>(
         &self,
@@ -38,18 +38,17 @@ impl Surface {
         let volumetric: [f64; N] = array::from_fn(|i| if outside[i] { volumetric[i] } else { 0.0 });
         let deviatoric: [f64; N] =
             array::from_fn(|i| if outside[i] { deviatoric[i] } else { yield_stress * yield_stress });
-        let first = 1.0 / along.max(across);
-        let mut multipliers: [f64; N] =
-            array::from_fn(|i| if outside[i] { (norms[i] / yield_stress - 1.0) * first } else { 0.0 });
+        let mut multipliers = [0.0; N];
         let mut pace = outside.map(|outside| if outside { 1.0 } else { 0.0 });
         for _ in 0..ITERATIONS {
             for i in 0..N {
+                // Quotients are multiplied by both denominators, so that one root and one quotient are left.
                 let m = multipliers[i];
-                let (a, b) = (1.0 / (1.0 + along * m), 1.0 / (1.0 + across * m));
-                let (v, d) = (volumetric[i] * a * a, deviatoric[i] * b * b);
+                let (a, b) = (1.0 + along * m, 1.0 + across * m);
+                let (v, d) = (volumetric[i] * b * b, deviatoric[i] * a * a);
                 let square = v + d;
-                let fall = along * v * a + across * d * b;
-                let step = pace[i] * (square.sqrt() / yield_stress - 1.0) * square / fall;
+                let fall = along * v * b + across * d * a;
+                let step = pace[i] * (square.sqrt() / yield_stress - a * b) * square / fall;
                 multipliers[i] = m + step;
                 pace[i] = if step.abs() <= LAST * multipliers[i] { 0.0 } else { pace[i] };
             }

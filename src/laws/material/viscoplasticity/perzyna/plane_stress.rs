@@ -11,7 +11,10 @@
 //! equation for `m`, the projection's own with other factors. For `n = 1` `eta` is known; else it is the root of an increasing
 //! equation around that one.
 
-use super::overstress::{NO_YIELD_STRESS, Perzyna};
+use super::{
+    overstress::{NO_YIELD_STRESS, Perzyna},
+    plane_projection::Surface,
+};
 use crate::{
     laws::{
         law::increasing_root,
@@ -152,23 +155,16 @@ impl Step {
 
     /// `m` at this `eta`: the root of `Y / |t| - 1`.
     fn multiplier(&self, eta: f64) -> f64 {
-        let effective = |i: usize| self.compliance[i] * (1.0 + eta * self.stiffness[i]);
-        let largest = effective(0).max(effective(1));
-        let norm = (0..3).map(|i| WEIGHTS[i] * self.trial[i] * self.trial[i]).sum::<f64>().sqrt();
+        let [along, across] = [0, 1].map(|i| self.compliance[i] * (1.0 + eta * self.stiffness[i]));
+        let [p, q, r] = std::array::from_fn(|i| WEIGHTS[i] * self.trial[i] * self.trial[i]);
+        let norm = (p + q + r).sqrt();
+        if self.hardening == 0.0 {
+            let surface = Surface { along, across, yield_stress: self.yield_stress };
+            return surface.multipliers(&[p], &[q + r], &[norm])[0];
+        }
+        let largest = along.max(across);
         let start =
             if self.yield_stress > 0.0 { (norm / self.yield_stress - 1.0) / largest } else { 1.0 / largest };
-        if self.hardening == 0.0 {
-            let factors = [0, 1, 2].map(effective);
-            return increasing_root(0.0, f64::INFINITY, start, |m| {
-                let shares = factors.map(|factor| 1.0 / (1.0 + factor * m));
-                let squares: [f64; 3] =
-                    std::array::from_fn(|i| WEIGHTS[i] * (self.trial[i] * shares[i]).powi(2));
-                let square: f64 = squares.iter().sum();
-                let fall: f64 = (0..3).map(|i| squares[i] * factors[i] * shares[i]).sum();
-                let ratio = self.yield_stress / square.sqrt();
-                [ratio - 1.0, ratio * fall / square]
-            });
-        }
         increasing_root(0.0, f64::INFINITY, start, |multiplier| {
             let values = self.values(multiplier, eta);
             let y = self.yield_stress + self.hardening * values.growth;
