@@ -378,8 +378,9 @@ impl DenseFactor {
 
 /// Zeros on large pages.
 fn zeros<R: Real>(count: usize) -> Vec<R> {
-    let zeros = vec![R::default(); count];
-    large_pages::put(&zeros);
+    let mut zeros = Vec::with_capacity(count);
+    large_pages::request(&mut zeros);
+    zeros.resize(count, R::default());
     zeros
 }
 

@@ -51,9 +51,10 @@ impl<R: Real> SupernodalFactor<R> {
                     .into(),
             )
         };
-        Vec::<R>::new().try_reserve_exact(count).map_err(no_memory)?;
-        let mut values = vec![R::default(); count];
-        large_pages::put(&values);
+        let mut values = Vec::new();
+        values.try_reserve_exact(count).map_err(no_memory)?;
+        large_pages::request(&mut values);
+        values.resize(count, R::default());
         if factor(nodes, &columns, end, &mut values).is_none() {
             return Ok(None);
         }
