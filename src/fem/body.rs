@@ -37,6 +37,9 @@ pub struct Body<const D: usize, const S: usize> {
     pub mesh: Mesh<D>,
     /// Geometry of its cells.
     pub geometry: Geometry<D>,
+    /// For each of the body's materials the position of its table in the job among those that cells have. Materials of one table
+    /// differ in properties that vary with place; the table's own number is that of one of them. Empty: each has its own table.
+    pub material_tables: Vec<usize>,
     /// Effects of the interior.
     pub effects: Vec<Box<dyn Effect<D, S>>>,
     /// Contacts of the surface.
@@ -76,6 +79,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Self {
             mesh,
             geometry,
+            material_tables: Vec::new(),
             effects,
             contacts: Vec::new(),
             surface_effects: Vec::new(),
@@ -219,6 +223,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.terms().filter(|term| term.form() == Some(form)).find_map(|term| term.tensor(material))
     }
 
+    /// The table of a material, see [`Body::material_tables`].
+    pub fn table_of(&self, material: usize) -> usize {
+        self.material_tables.get(material).copied().unwrap_or(material)
+    }
+
     /// The density of a material in kg/m^d, if it has inertia.
     pub fn density(&self, material: usize) -> Option<f64> {
         self.terms().find_map(|term| match term {
@@ -265,7 +274,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         });
     }
 
-    /// The smallest eigenvalue of the viscosity in Pa s, if there is viscosity; 0 where it is not everywhere.
+    /// The smallest eigenvalue of the viscosity in Pa s on this rank, if there is viscosity; 0 where it is not everywhere.
     pub fn smallest_viscosity(&self) -> Option<f64> {
         let modulus = |term: Term<'_>| {
             let Term::Viscosity(tensor) = term else { return None };

@@ -1,5 +1,6 @@
 //! Builds a body from the tables of a job. A table that is absent creates nothing.
 
+use super::materials::Materials;
 use crate::{
     error::{Error, Result},
     fem::{
@@ -8,13 +9,13 @@ use crate::{
             Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle,
             Resistances, SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
         },
-        space::{Geometry, Held, SurfacePoint, cell_rule, facets, surface_points, values},
+        space::{Geometry, Held, SurfacePoint, cell_rule, facets, surface_means, surface_points, values},
         state::State,
     },
-    job::{self, Job, Material, Scalar},
+    job::{self, Job, Scalar},
     laws::{
         contact::{Gap, NormalResponse, Quadrature},
-        material::{ByMaterial, Hypothesis},
+        material::{ByMaterial, Hypothesis, Material},
     },
     linear_algebra::tensor::{Mandel, Vector, add_scaled, component, norm},
     mesh::Mesh,
@@ -29,14 +30,14 @@ pub(super) fn body<const D: usize, const S: usize>(
     job: &Job,
     mesh: Mesh<D>,
 ) -> Result<(Body<D, S>, State)> {
-    let (materials, of_region) = materials(session, job, &mesh);
-    let geometry = Geometry::with_materials(&mesh, |region| of_region[region]);
+    let materials = Materials::new(session, job, &mesh)?;
+    let geometry = Geometry::by_cells(&mesh, |cell| materials.of_cell(&mesh, cell));
     let mut state = session.agree(State::at_rest(&mesh))?;
     let Supports { held, motion } = Supports::new(session, &mesh, &job.support, &state.velocity)?;
     let initial_stress = session.agree(initial_stress::<D, S>(job, &mesh, &geometry))?;
-    let effects = session.agree(effects(&materials, &geometry, &initial_stress))?;
-    let load = load(job, &mesh, &materials);
-    let elastic_support = elastic_support::<D, S>(session, job, &mesh, (&materials, &of_region))?;
+    let effects = session.agree(effects(&materials.all, &geometry, &initial_stress))?;
+    let load = load(job, &mesh, &materials.all);
+    let elastic_support = elastic_support::<D, S>(session, job, &mesh, &materials)?;
     let mut contacts = Vec::new();
     let mut taken = BTreeSet::new();
     let mut parts = Vec::new();
@@ -79,6 +80,7 @@ pub(super) fn body<const D: usize, const S: usize>(
     state.displacement.update_ghosts()?;
     state.velocity.update_ghosts()?;
     let mut body = Body::new(mesh, geometry, effects, held, evaluation(job.time.scheme));
+    body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
@@ -88,23 +90,6 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.restore_history("viscoplastic_history", initial_stress.as_flattened());
     }
     Ok((body, state))
-}
-
-/// The materials that cells of the body have, and for each region of the mesh the index of its material. Collective.
-fn materials<'a, const D: usize>(
-    session: &Session,
-    job: &'a Job,
-    mesh: &Mesh<D>,
-) -> (Vec<&'a Material>, Vec<usize>) {
-    let given: Vec<&Material> =
-        std::iter::once(&job.material).chain(job.region.iter().map(|r| &r.material)).collect();
-    let of_name = |name: &String| job.region.iter().position(|r| r.name == *name).map_or(0, |at| at + 1);
-    let named: Vec<usize> = mesh.regions.iter().map(of_name).collect();
-    let mut counts = vec![0; given.len()];
-    mesh.cell_regions.iter().for_each(|&region| counts[named[usize::from(region)]] += 1);
-    let used: Vec<usize> = (0..given.len()).filter(|&at| session.total(counts[at]) > 0).collect();
-    let of_region = named.iter().map(|at| used.iter().position(|u| u == at).unwrap_or(0)).collect();
-    (used.into_iter().map(|at| given[at]).collect(), of_region)
 }
 
 /// The law of a contact, and the gap beyond which it acts.
@@ -163,7 +148,7 @@ fn elastic_support<const D: usize, const S: usize>(
     session: &Session,
     job: &Job,
     mesh: &Mesh<D>,
-    (materials, of_region): (&[&Material], &[usize]),
+    materials: &Materials,
 ) -> Result<ElasticSupport<D>> {
     let mut all = ElasticSupport::default();
     let resistances = |given: Option<job::Resistance>| {
@@ -191,39 +176,43 @@ fn elastic_support<const D: usize, const S: usize>(
             continue;
         }
         all.has_damping = true;
-        for (at, material) in materials.iter().enumerate() {
-            let is_behind = |facet: &&u32| {
-                let cell = mesh.facet_cells[**facet as usize] as usize;
-                of_region[usize::from(mesh.cell_regions[cell])] == at
-            };
-            let facets: Vec<u32> = facets.iter().filter(is_behind).copied().collect();
+        let table_behind =
+            |facet: u32| materials.table_of_cell(mesh, mesh.facet_cells[facet as usize] as usize);
+        for table in 0..materials.table_count {
+            let facets: Vec<u32> =
+                facets.iter().copied().filter(|facet| table_behind(*facet) == table).collect();
             if session.total(facets.len()) == 0 {
                 continue;
             }
-            let (Some(density), Some(elasticity)) = (material.density, material.elasticity) else {
+            if impedances::<S>(&materials.all[table]).is_none() {
                 return Err(Error::Refused(format!(
                     "support.{number}.absorbing: waves need a density and elasticity, and the material behind the boundaries {} \
                      lacks one of them; give [material] density and [material.elasticity], or use `damping`",
                     support.on.join(", ")
                 )));
+            }
+            let behind = |facet: u32| {
+                let material = materials.of_cell(mesh, mesh.facet_cells[facet as usize] as usize);
+                impedances::<S>(&materials.all[material]).unwrap_or_default()
             };
-            let law = elasticity.tensor(Hypothesis::of(S));
-            let impedance = |modulus: f64| (density * modulus).sqrt();
-            let damping = Resistances {
-                normal: impedance(law.volumetric + law.shear),
-                tangential: impedance(0.5 * law.shear),
-            };
-            let points = surface_points(session, mesh, &facets)?;
+            let points = surface_means(session, mesh, &facets, behind)?;
             let stiffness = Resistances::default();
-            all.points.extend(points.into_iter().map(|point| ElasticPoint {
+            all.points.extend(points.into_iter().map(|(point, [normal, tangential])| ElasticPoint {
                 support: number,
                 point,
                 stiffness,
-                damping,
+                damping: Resistances { normal, tangential },
             }));
         }
     }
     Ok(all)
+}
+
+/// The impedances in Pa s/m of pressure and shear waves: density times the speed of the waves; none without density or elasticity.
+fn impedances<const S: usize>(material: &Material<f64>) -> Option<[f64; 2]> {
+    let (density, law) = (material.density?, material.elasticity?.tensor(Hypothesis::of(S)));
+    let moduli = [law.volumetric + law.shear, 0.5 * law.shear];
+    Some(moduli.map(|modulus| (density * modulus).sqrt()))
 }
 
 /// The facets of the boundaries of a table on this rank at whose centre the expression is not 0. Collective.
@@ -301,7 +290,7 @@ fn refuse_moving_contact<const D: usize>(
     Ok(())
 }
 
-fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[&Material]) -> Load {
+fn load<const D: usize>(job: &Job, mesh: &Mesh<D>, materials: &[Material<f64>]) -> Load {
     let traction = |t: &job::Traction| Traction {
         facets: facets(mesh, &t.on),
         value: t.value.clone(),

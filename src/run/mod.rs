@@ -8,6 +8,7 @@ mod folder;
 mod header;
 mod validate;
 mod inventory;
+mod materials;
 mod obstacles;
 mod outputs;
 mod phases;

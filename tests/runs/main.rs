@@ -12,6 +12,7 @@ mod effects;
 mod example;
 mod failures;
 mod friction;
+mod graded;
 mod hdf5_file;
 mod indicator;
 mod iterations;

@@ -88,7 +88,7 @@ const _: () = assert!(energy::are_in_order(ENERGIES), "each energy must be at it
 /// The effects in the interior of bodies of these materials, with the initial stress at each point of the cells, cell by cell, if there
 /// is any. A table that is absent creates none.
 pub fn effects<const D: usize, const S: usize>(
-    materials: &[&Material],
+    materials: &[Material<f64>],
     geometry: &Geometry<D>,
     initial_stress: &[Mandel<S>],
 ) -> Result<Vec<Box<dyn Effect<D, S>>>> {
@@ -102,11 +102,11 @@ pub fn effects<const D: usize, const S: usize>(
     if let Some(tensor) = by_material(materials, |m| Some(m.viscosity?.tensor())) {
         effects.push(Box::new(ViscousStress { tensor }));
     }
-    let flow = materials.iter().map(|m| flow_law::<S>(m)).collect::<Result<_>>()?;
+    let flow = materials.iter().map(flow_law::<S>).collect::<Result<_>>()?;
     if let Some(laws) = ByMaterial::new(flow) {
         effects.push(Box::new(ViscoplasticFlow::<S>::new(laws, geometry)));
     }
-    let elastic = |m: &Material| match m.viscoplasticity {
+    let elastic = |m: &Material<f64>| match m.viscoplasticity {
         None => Some(m.elasticity?.tensor(Hypothesis::of(S))),
         Some(_) => None,
     };
@@ -121,7 +121,7 @@ pub fn effects<const D: usize, const S: usize>(
         let stress = batches.map(pack).collect();
         effects.push(Box::new(InitialStress::new(laws, stress)));
     }
-    let damage = |m: &Material| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
+    let damage = |m: &Material<f64>| Some(m.damage?.prepare(&m.elasticity?, Hypothesis::of(S)));
     if let Some(laws) = by_material(materials, damage) {
         effects.push(Box::new(Damage::new(laws, geometry)));
     }
@@ -155,16 +155,19 @@ pub fn surface_effects<const D: usize>(
     Ok(effects)
 }
 
-fn by_material<T>(materials: &[&Material], law: impl Fn(&Material) -> Option<T>) -> Option<ByMaterial<T>> {
-    ByMaterial::new(materials.iter().map(|m| law(m)).collect())
+fn by_material<T>(
+    materials: &[Material<f64>],
+    law: impl Fn(&Material<f64>) -> Option<T>,
+) -> Option<ByMaterial<T>> {
+    ByMaterial::new(materials.iter().map(law).collect())
 }
 
-fn elastic_law<const S: usize>(material: &Material) -> Option<ElasticLaw> {
+fn elastic_law<const S: usize>(material: &Material<f64>) -> Option<ElasticLaw> {
     let tensor = material.elasticity?.tensor(Hypothesis::of(S));
     Some(ElasticLaw { tensor, with_history: material.viscoplasticity.is_some() })
 }
 
-fn flow_law<const S: usize>(material: &Material) -> Result<Option<FlowLaw>> {
+fn flow_law<const S: usize>(material: &Material<f64>) -> Result<Option<FlowLaw>> {
     let Some(law) = &material.viscoplasticity else { return Ok(None) };
     let Some(elasticity) = &material.elasticity else {
         return Err(Error::Refused(Viscoplasticity::WITHOUT_ELASTICITY.into()));

@@ -208,9 +208,16 @@ impl<const D: usize> Geometry<D> {
 
     /// The geometry of all cells of the mesh; `material` gives the material of a region of the mesh.
     pub fn with_materials(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
+        Self::by_cells(mesh, |cell| {
+            mesh.cell_regions.get(cell).map_or(0, |&region| material(usize::from(region)))
+        })
+    }
+
+    /// The geometry of all cells of the mesh; `material` gives the material of a cell by its local number.
+    pub fn by_cells(mesh: &Mesh<D>, material: impl Fn(usize) -> usize) -> Self {
         let mut runs: Vec<CellRun> = Vec::new();
         for cell in 0..mesh.cells.len() / (D + 1) {
-            let material = mesh.cell_regions.get(cell).map_or(0, |&region| material(usize::from(region)));
+            let material = material(cell);
             match runs.last_mut() {
                 Some(run) if run.material == material && run.count < LANES => run.count += 1,
                 _ => runs.push(CellRun { first: cell, count: 1, material }),

@@ -19,5 +19,6 @@ pub use kernels::NodalPacks;
 pub use quadratic::{MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, values};
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{
-    FacetPoint, SurfacePoint, acts_at_midsides, add_corner_means, facet_points, facets, surface_points,
+    FacetPoint, SurfacePoint, acts_at_midsides, add_corner_means, facet_points, facets, surface_means,
+    surface_points,
 };

@@ -66,6 +66,17 @@ pub fn surface_points<const D: usize>(
     mesh: &Mesh<D>,
     facets: &[u32],
 ) -> Result<Vec<SurfacePoint<D>>, Agreed> {
+    let points = surface_means(session, mesh, facets, |_| [])?;
+    Ok(points.into_iter().map(|(point, [])| point).collect())
+}
+
+/// The same points, each with the means of values of the facets around it. Collective.
+pub fn surface_means<const D: usize, const N: usize>(
+    session: &Session,
+    mesh: &Mesh<D>,
+    facets: &[u32],
+    of_facet: impl Fn(u32) -> [f64; N],
+) -> Result<Vec<(SurfacePoint<D>, [f64; N])>, Agreed> {
     let mut outgoing = vec![Vec::new(); session.ranks()];
     for &facet in facets {
         let corners = mesh.facets[facet as usize];
@@ -82,20 +93,22 @@ pub fn surface_points<const D: usize>(
                 let record = &mut outgoing[mesh.owner(global)];
                 record.extend([f64::from(global), factor]);
                 record.extend(normal);
+                record.extend(of_facet(facet));
             }
         }
     }
     let incoming = exchange_lists(session.world(), &outgoing)?;
-    let mut shares: Vec<Share<D>> = incoming
-        .chunks_exact(D + 2)
+    let mut shares: Vec<Share<D, N>> = incoming
+        .chunks_exact(D + 2 + N)
         .map(|record| Share {
             node: record[0] as u32,
             factor: record[1],
             normal: std::array::from_fn(|i| record[i + 2]),
+            values: std::array::from_fn(|i| record[i + 2 + D]),
         })
         .collect();
     shares.sort_by(|a, b| {
-        let vectors = a.normal.iter().zip(&b.normal);
+        let vectors = a.normal.iter().chain(&a.values).zip(b.normal.iter().chain(&b.values));
         a.node.cmp(&b.node).then_with(|| {
             vectors.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
@@ -104,13 +117,15 @@ pub fn surface_points<const D: usize>(
 }
 
 /// A linear facet at one of its nodes.
-struct Share<const D: usize> {
+struct Share<const D: usize, const N: usize> {
     /// Global number of the node.
     node: u32,
     /// Weight of the node as a multiple of its equal share.
     factor: f64,
     /// Normal of the facet, as long as its measure.
     normal: Vector<D>,
+    /// Values of the facet.
+    values: [f64; N],
 }
 
 /// Whether laws on boundaries act at midside nodes alone: of quadratic cells in space.
@@ -213,27 +228,51 @@ pub fn facet_points<const D: usize>(
     (nodes.into_iter().take(count), rule.iter().map(point))
 }
 
-fn points_of_node<const D: usize>(mesh: &Mesh<D>, shares: &[Share<D>]) -> Vec<SurfacePoint<D>> {
-    let mut faces: Vec<(Vector<D>, f64)> = Vec::new();
-    for Share { factor, normal, .. } in shares {
+/// Facets around a node that share a point.
+struct Face<const D: usize, const N: usize> {
+    /// Sum of their normals, each as long as the facet's measure.
+    normal: Vector<D>,
+    /// Sum of their weights at the node.
+    weight: f64,
+    /// Sum of their measures.
+    size: f64,
+    /// Sum of their values times their measures.
+    values: [f64; N],
+}
+
+fn points_of_node<const D: usize, const N: usize>(
+    mesh: &Mesh<D>,
+    shares: &[Share<D, N>],
+) -> Vec<(SurfacePoint<D>, [f64; N])> {
+    let mut faces: Vec<Face<D, N>> = Vec::new();
+    for Share { factor, normal, values, .. } in shares {
         let size = norm(normal);
-        let face = faces.iter_mut().find(|(sum, _)| dot(sum, normal) > SAME_FACE * size * norm(sum));
+        let face =
+            faces.iter_mut().find(|face| dot(&face.normal, normal) > SAME_FACE * size * norm(&face.normal));
         match face {
-            Some((sum, weight)) => {
+            Some(face) => {
                 for i in 0..D {
-                    sum[i] += normal[i];
+                    face.normal[i] += normal[i];
                 }
-                *weight += factor * size;
+                face.weight += factor * size;
+                face.size += size;
+                face.values.iter_mut().zip(values).for_each(|(sum, value)| *sum += size * value);
             }
-            None => faces.push((*normal, factor * size)),
+            None => faces.push(Face {
+                normal: *normal,
+                weight: factor * size,
+                size,
+                values: values.map(|value| size * value),
+            }),
         }
     }
     let node = mesh.owned_node(shares[0].node) as u32;
     faces
         .into_iter()
-        .map(|(sum, weight)| {
-            let size = norm(&sum);
-            SurfacePoint { node, normal: sum.map(|x| x / size), weight: weight / D as f64 }
+        .map(|Face { normal, weight, size, values }| {
+            let length = norm(&normal);
+            let point = SurfacePoint { node, normal: normal.map(|x| x / length), weight: weight / D as f64 };
+            (point, values.map(|value| value / size))
         })
         .collect()
 }

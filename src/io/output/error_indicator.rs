@@ -8,7 +8,8 @@
 //! eta_K^2 = integral over K of (mean - sigma_K) : E^-1 (mean - sigma_K)
 //! ```
 //!
-//! Means are taken over cells of one material only, because stresses may jump between materials.
+//! Means are taken over cells of one material only, because stresses may jump between materials; where its properties vary with
+//! place, each cell has its own `E`.
 
 use super::{
     field::{Place, Shape},
@@ -61,8 +62,8 @@ pub(super) fn compute<'a, const D: usize, const S: usize>(at: Converged<'a, D, S
 /// The indicator of a body, with room for the means.
 #[derive(Debug)]
 pub struct ErrorIndicator<const S: usize> {
-    /// Elastic tensors of the body's materials in Pa; none for a material without elasticity.
-    elasticity: Vec<Option<Isotropic>>,
+    /// For each table of materials whether they are elastic.
+    is_elastic: Vec<bool>,
     /// Mean stress and volume of the cells around, for each node.
     means: DistributedVector,
 }
@@ -81,11 +82,11 @@ pub struct Indicated {
 impl<const S: usize> ErrorIndicator<S> {
     /// Creates the indicator for this body. Collective.
     pub fn new<const D: usize>(session: &Session, body: &Body<D, S>) -> Result<Self> {
-        let mine = body.geometry.runs.iter().map(|run| run.material + 1).max().unwrap_or(0);
+        let mine = body.geometry.runs.iter().map(|run| body.table_of(run.material) + 1).max().unwrap_or(0);
         let count = session.largest([mine as f64])[0] as usize;
-        let of = |material| body.tensor(Form::Elasticity, material);
+        let of = |table| body.tensor(Form::Elasticity, table).is_some();
         let means = DistributedVector::ghosted(S + 1, body.mesh.owned, &body.mesh.ghosts);
-        Ok(Self { elasticity: (0..count).map(of).collect(), means: session.agree(means)? })
+        Ok(Self { is_elastic: (0..count).map(of).collect(), means: session.agree(means)? })
     }
 
     /// The indicator of a stress in Pa, given for each cell. Collective.
@@ -97,14 +98,16 @@ impl<const S: usize> ErrorIndicator<S> {
     ) -> Result<Indicated> {
         let mut cells = vec![0.0; stress.len()];
         let mut squares = [0.0; 2];
-        for material in 0..self.elasticity.len() {
-            let Some(elasticity) = self.elasticity[material] else { continue };
-            session.agree(self.add(body, material, stress))?;
+        for table in 0..self.is_elastic.len() {
+            if !self.is_elastic[table] {
+                continue;
+            }
+            session.agree(self.add(body, table, stress))?;
             self.means.add_ghosts_to_owners()?;
             session.agree(self.divide())?;
             self.means.update_ghosts()?;
             let means = self.means.local()?;
-            for cell in of_material(body, material) {
+            for (cell, elasticity) in with_tensors(body, table) {
                 let volume = body.geometry.cell(cell).volume;
                 let square = |t: &Mandel<S>| volume * elasticity.inverse_square(t);
                 let (mut sum, mut each) = ([0.0; S], 0.0);
@@ -126,16 +129,11 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(Indicated { cells, total: error.sqrt(), relative })
     }
 
-    /// For each node, adds the volumes and the stresses times volume of the surrounding cells of a material on this rank.
-    fn add<const D: usize>(
-        &mut self,
-        body: &Body<D, S>,
-        material: usize,
-        stress: &[Mandel<S>],
-    ) -> Result<()> {
+    /// For each node, adds the volumes and the stresses times volume of the surrounding cells of a table on this rank.
+    fn add<const D: usize>(&mut self, body: &Body<D, S>, table: usize, stress: &[Mandel<S>]) -> Result<()> {
         let mut sums = self.means.local_mut()?;
         sums.fill(0.0);
-        for cell in of_material(body, material) {
+        for (cell, _) in with_tensors(body, table) {
             let volume = body.geometry.cell(cell).volume;
             for &node in body.mesh.cell(cell) {
                 let sum = &mut sums[node as usize * (S + 1)..][..=S];
@@ -146,7 +144,7 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(())
     }
 
-    /// Computes the means at the owned nodes; nodes without a cell of the material keep zero.
+    /// Computes the means at the owned nodes; nodes without a cell of the table keep zero.
     fn divide(&mut self) -> Result<()> {
         for sum in self.means.owned_mut()?.chunks_exact_mut(S + 1).filter(|sum| sum[S] > 0.0) {
             let volume = sum[S];
@@ -156,11 +154,12 @@ impl<const S: usize> ErrorIndicator<S> {
     }
 }
 
-/// The cells of a material on this rank.
-fn of_material<const D: usize, const S: usize>(
+/// The elastic cells of a table of materials on this rank, each with its elastic tensor in Pa.
+fn with_tensors<const D: usize, const S: usize>(
     body: &Body<D, S>,
-    material: usize,
-) -> impl Iterator<Item = usize> {
-    let runs = body.geometry.runs.iter().filter(move |run| run.material == material);
-    runs.flat_map(|run| run.first..run.first + run.count)
+    table: usize,
+) -> impl Iterator<Item = (usize, Isotropic)> {
+    let runs = body.geometry.runs.iter().filter(move |run| body.table_of(run.material) == table);
+    runs.filter_map(|run| Some((run, body.tensor(Form::Elasticity, run.material)?)))
+        .flat_map(|(run, tensor)| (run.first..run.first + run.count).map(move |cell| (cell, tensor)))
 }

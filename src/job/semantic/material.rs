@@ -1,7 +1,9 @@
 //! Checks of materials: effects that require other effects, and the dimension.
 
+use super::boundary::check_flat;
 use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
+use crate::laws::expression::Scalar;
 use crate::laws::material::{Elasticity, Hypothesis, Material, Viscoplasticity, Viscosity};
 
 /// Poisson's ratio above which linear elements lock.
@@ -33,6 +35,12 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             if let Some(fault) = law.and_then(|law| law.fault()) {
                 let key = format!("{path}.viscoplasticity.{name}.{}", fault.key);
                 findings.fault(&key, fault.message, fault.help);
+            }
+        }
+        for key in Material::VARIABLE {
+            let key = format!("{path}.{key}");
+            if root.read::<Scalar>(&key).is_some_and(|scalar| scalar.depends_on_time()) {
+                findings.fault(&key, "a property of a material can't depend on t", "use x, y and z only");
             }
         }
         if path != "material" && present("hypothesis") {
@@ -88,6 +96,10 @@ pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         findings.fault("material.hypothesis", "a 3D body has no hypothesis", "delete this line");
     }
     for path in materials(findings) {
+        for key in Material::VARIABLE {
+            check_flat(findings, &format!("{path}.{key}"), dimension);
+        }
+        // Expressions are checked in each cell.
         let viscosity: Option<Viscosity> = root.read(&format!("{path}.viscosity"));
         if let Some(fault) = viscosity.and_then(|law| law.fault(dimension)) {
             findings.fault(&format!("{path}.viscosity.{}", fault.key), fault.message, fault.help);
@@ -109,7 +121,7 @@ pub(super) fn check_dimension(findings: &mut Findings<'_>, dimension: usize) {
         } else {
             "[mesh] order = 2 hardly locks (docs/stability.md)"
         };
-        if let Some(Elasticity { poisson_ratio, .. }) = root.read(&format!("{path}.elasticity"))
+        if let Some(Elasticity::<Scalar> { poisson_ratio, .. }) = root.read(&format!("{path}.elasticity"))
             && poisson_ratio > LOCKING
         {
             findings.warnings.push(format!(

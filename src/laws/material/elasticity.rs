@@ -28,13 +28,14 @@ impl Hypothesis {
     }
 }
 
-/// Isotropic linear elasticity.
+/// Isotropic linear elasticity, at a point or with a modulus that may vary with place.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Elasticity {
-    /// Young's modulus.
+#[schemars(rename = "Elasticity", description = "Isotropic linear elasticity.")]
+pub struct Elasticity<N = f64> {
+    /// Young's modulus. An expression in x, y, z is evaluated at the centre of each cell.
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 1000.0)]
-    pub youngs_modulus: f64,
+    pub youngs_modulus: N,
     /// Poisson's ratio.
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5), example = 0.4)]
     pub poisson_ratio: f64,

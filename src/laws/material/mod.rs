@@ -8,9 +8,11 @@ mod by_material;
 mod damage;
 mod elasticity;
 mod isotropic;
+mod local;
 mod viscoplasticity;
 mod viscosity;
 
+use crate::laws::expression::Scalar;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,23 +23,29 @@ pub use isotropic::Isotropic;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
 
-/// A material. An effect is simulated only if its table or key is present.
+/// A material: as in the job, where some properties may vary with place, or with the numbers of a point (`Material<f64>`). An effect is
+/// simulated only if its table or key is present.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Material {
+#[schemars(
+    rename = "Material",
+    description = "A material. An effect is simulated only if its table or key is present."
+)]
+pub struct Material<N = Scalar> {
     /// The hypothesis of a plane problem. Required in 2D, not allowed in 3D.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hypothesis: Option<Hypothesis>,
-    /// Mass density. Absent: no inertia, the problem is quasistatic.
+    /// Mass density. An expression in x, y, z is evaluated at the centre of each cell. Absent: no inertia, the problem is
+    /// quasistatic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "kg/m^d", "exclusiveMinimum" = 0), example = 1.0)]
-    pub density: Option<f64>,
+    pub density: Option<N>,
     /// Isotropic linear elasticity. Absent: no elastic stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub elasticity: Option<Elasticity>,
+    pub elasticity: Option<Elasticity<N>>,
     /// Linear viscosity. Absent: no viscous stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub viscosity: Option<Viscosity>,
+    pub viscosity: Option<Viscosity<N>>,
     /// Viscoplastic flow, which relaxes the elastic stress; requires elasticity. Absent: no viscoplastic flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscoplasticity: Option<Viscoplasticity>,

@@ -8,13 +8,15 @@ use serde::{Deserialize, Serialize};
 /// Viscous stress `volumetric tr(e) I + shear e` of the strain rate e.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Viscosity {
-    /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d.
+#[schemars(rename = "Viscosity")]
+pub struct Viscosity<N = f64> {
+    /// Factor of the trace of the strain rate. It may be negative if d volumetric + shear is positive, with the dimension d. An
+    /// expression in x, y, z is evaluated at the centre of each cell.
     #[schemars(extend("unit" = "Pa s"), example = 25.0)]
-    pub volumetric: f64,
-    /// Factor of the strain rate.
+    pub volumetric: N,
+    /// Factor of the strain rate. An expression in x, y, z is evaluated at the centre of each cell.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 50.0)]
-    pub shear: f64,
+    pub shear: N,
 }
 
 impl Viscosity {

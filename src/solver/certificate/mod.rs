@@ -79,8 +79,9 @@ impl Certificates {
         let decrease = decrease.reduce(f64::max);
         let growth = growth(&body.contacts);
         let viscous = body.has_form_everywhere(Form::Viscosity);
+        let viscosity = body.smallest_viscosity();
         let mut known = Self {
-            viscosity_modulus: body.smallest_viscosity(),
+            viscosity_modulus: viscosity.map(|modulus| -session.largest([-modulus])[0]),
             monotonicity_constant: falls.reduce(f64::max),
             growth_constants: growth.ok().flatten(),
             unbounded_growth: growth.err().map(str::to_owned),
@@ -110,6 +111,7 @@ impl Certificates {
         known.not_covered = not_covered(body, &known, length);
         if body.has_form(Form::Elasticity) && !scheme_is_implicit {
             let flow = body.flow_properties().map(|flow| flow.step_bound).reduce(f64::min);
+            let flow = flow.map(|bound| -session.largest([-bound])[0]);
             let decides = |waves: &f64| longest.min(flow.unwrap_or(longest)) < *waves;
             // The bound from the cells alone does not know the springs of supports.
             let is_large = body.unknowns(session) > SMALL && !body.elastic_support.has_stiffness;

@@ -1,0 +1,126 @@
+//! The materials of the cells of a body.
+
+use crate::{
+    error::Error,
+    job::{self, Job},
+    laws::material::Material,
+    linear_algebra::tensor::Vector,
+    mesh::Mesh,
+    parallel::{agreement::Agreed, session::Session},
+};
+use std::collections::HashMap;
+
+/// The materials of a body. Properties that vary with place are constant in each cell: the values at the mean of its corners. Cells of
+/// one table with the same values share a material.
+#[derive(Debug)]
+pub(super) struct Materials {
+    /// First one for each table of the job that a cell of the body has, on all ranks alike: that of its numbers, or, where properties
+    /// vary, that of their largest values in the body. Then those of the cells of this rank.
+    pub all: Vec<Material<f64>>,
+    /// For each material the number of its table; empty if no property varies.
+    pub tables: Vec<usize>,
+    /// The number of tables that cells of the body have.
+    pub table_count: usize,
+    /// For each region of the mesh the number of its table.
+    of_region: Vec<usize>,
+    /// The material of each cell of this rank; empty if no property varies.
+    of_cells: Vec<u32>,
+}
+
+impl Materials {
+    /// The materials of a job. Collective.
+    pub(super) fn new<const D: usize>(session: &Session, job: &Job, mesh: &Mesh<D>) -> Result<Self, Agreed> {
+        let given: Vec<&job::Material> =
+            std::iter::once(&job.material).chain(job.region.iter().map(|r| &r.material)).collect();
+        let of_name = |name: &String| job.region.iter().position(|r| r.name == *name).map_or(0, |at| at + 1);
+        let named: Vec<usize> = mesh.regions.iter().map(of_name).collect();
+        let mut counts = vec![0; given.len()];
+        mesh.cell_regions.iter().for_each(|&region| counts[named[usize::from(region)]] += 1);
+        let used: Vec<usize> = (0..given.len()).filter(|&at| session.total(counts[at]) > 0).collect();
+        let of_region = named.iter().map(|at| used.iter().position(|u| u == at).unwrap_or(0)).collect();
+        let mut found = Self {
+            all: Vec::new(),
+            tables: Vec::new(),
+            table_count: used.len(),
+            of_region,
+            of_cells: Vec::new(),
+        };
+        let tables: Vec<(&job::Material, String)> = used.iter().map(|&at| (given[at], path_of(at))).collect();
+        let cells = found.add_cells(mesh, &tables);
+        let cells = session.agree(cells)?;
+        let of_tables = tables.iter().enumerate().map(|(table, (material, _))| {
+            if !material.has_expressions() {
+                return material.with(material.numbers_at(&[]));
+            }
+            let mine = cells.iter().filter(|(of, _)| *of == table).map(|(_, there)| there.numbers());
+            let most = mine.fold([f64::NEG_INFINITY; 4], |most, numbers| {
+                std::array::from_fn(|k| numbers[k].map_or(most[k], |number| most[k].max(number)))
+            });
+            material.with(session.largest(most).map(Some))
+        });
+        found.all = of_tables.collect();
+        if !found.of_cells.is_empty() {
+            found.tables = (0..tables.len()).collect();
+        }
+        for (table, material) in cells {
+            found.tables.push(table);
+            found.all.push(material);
+        }
+        Ok(found)
+    }
+
+    /// The materials of the cells of tables with expressions, each with its table; notes them in the cells.
+    fn add_cells<const D: usize>(
+        &mut self,
+        mesh: &Mesh<D>,
+        tables: &[(&job::Material, String)],
+    ) -> Result<Vec<(usize, Material<f64>)>, Error> {
+        let mut found: Vec<(usize, Material<f64>)> = Vec::new();
+        if !tables.iter().any(|(material, _)| material.has_expressions()) {
+            return Ok(found);
+        }
+        let mut numbers = HashMap::new();
+        for cell in 0..mesh.cell_count() {
+            let table = self.table_of_cell(mesh, cell);
+            let (material, path) = &tables[table];
+            if !material.has_expressions() {
+                self.of_cells.push(table as u32);
+                continue;
+            }
+            let corners = &mesh.corners(cell)[..=D];
+            let centre: Vector<D> =
+                std::array::from_fn(|i| corners.iter().map(|at| at[i]).sum::<f64>() / (D + 1) as f64);
+            let there = material.at(&centre).map_err(|fault| {
+                Error::Refused(format!(
+                    "{path}.{}: {} at {centre:?} m, the centre of cell {}; {}",
+                    fault.key, fault.message, mesh.cell_ids[cell], fault.help
+                ))
+            })?;
+            let bits = there.numbers().map(|number| number.map(f64::to_bits));
+            let number = *numbers.entry((table, bits)).or_insert_with(|| {
+                found.push((table, there));
+                (tables.len() + found.len() - 1) as u32
+            });
+            self.of_cells.push(number);
+        }
+        Ok(found)
+    }
+
+    /// The number of a cell's material, given the cell's local number.
+    pub(super) fn of_cell<const D: usize>(&self, mesh: &Mesh<D>, cell: usize) -> usize {
+        match self.of_cells.get(cell) {
+            Some(&material) => material as usize,
+            None => self.table_of_cell(mesh, cell),
+        }
+    }
+
+    /// The number of the table of a cell's material, given the cell's local number.
+    pub(super) fn table_of_cell<const D: usize>(&self, mesh: &Mesh<D>, cell: usize) -> usize {
+        self.of_region[usize::from(mesh.cell_regions[cell])]
+    }
+}
+
+/// The path in the job of the main material, or of that of a region.
+fn path_of(at: usize) -> String {
+    at.checked_sub(1).map_or_else(|| "material".to_owned(), |region| format!("region.{region}.material"))
+}
