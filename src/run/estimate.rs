@@ -8,6 +8,7 @@
 use super::Inventory;
 use crate::{
     fem::body::Body,
+    linear_algebra::simd::LANES,
     parallel::session::Session,
     solver::stepping::{Preconditioner, ProblemSize},
 };
@@ -58,7 +59,8 @@ pub(super) struct TimeEstimate {
 const PROGRAM: f64 = 55e6;
 /// Vectors of the state, the scheme, Newton's and the Krylov method.
 const VECTORS: f64 = 16.0;
-/// Seconds of stress, history, forces and energies per point of cells and step, in the plane and in space.
+/// Seconds of stress, history, forces and energies per point of cells and step, in the plane and in space. Batches that are not full
+/// take as long as full ones.
 const POINT: [f64; 2] = [30e-9, 50e-9];
 
 impl Estimate {
@@ -76,14 +78,14 @@ impl Estimate {
             (mesh.bytes() + body.geometry.bytes()) as f64,
             mesh.facets.len() as f64,
             ((mesh.nodes.len() * D) as f64) * 8.0 * VECTORS,
+            (body.geometry.runs.len() * LANES * body.geometry.points()) as f64,
         ];
-        let [mesh_bytes, facets, vectors] = session.sum(own);
+        let [mesh_bytes, facets, vectors, points] = session.sum(own);
         let matrix = matrix_bytes(D, mesh.order(), nodes, cells, facets);
         let cost = problem.cost(preconditioner);
         let history = inventory.history_bytes.values().sum::<u64>() as f64;
         let ranks = session.ranks() as f64;
         let program = PROGRAM * ranks;
-        let points = cells * body.geometry.points() as f64;
         let step = points * POINT[usize::from(D == 3)] / ranks + cost.step;
         let set_up = cost.set_up;
         let preconditioner = cost.memory;

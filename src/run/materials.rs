@@ -4,8 +4,7 @@ use crate::{
     error::Error,
     job::{self, Job},
     laws::material::Material,
-    linear_algebra::tensor::Vector,
-    mesh::Mesh,
+    mesh::{Mesh, shape::centroid},
     parallel::{agreement::Agreed, session::Session},
 };
 use std::collections::HashMap;
@@ -87,9 +86,7 @@ impl Materials {
                 self.of_cells.push(table as u32);
                 continue;
             }
-            let corners = &mesh.corners(cell)[..=D];
-            let centre: Vector<D> =
-                std::array::from_fn(|i| corners.iter().map(|at| at[i]).sum::<f64>() / (D + 1) as f64);
+            let centre = centroid(&mesh.corners(cell)[..=D]);
             let there = material.at(&centre).map_err(|fault| {
                 Error::Refused(format!(
                     "{path}.{}: {} at {centre:?} m, the centre of cell {}; {}",

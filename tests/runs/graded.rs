@@ -184,7 +184,7 @@ fn properties_that_a_body_can_not_have_are_refused_with_their_place() {
         .says(" m");
     refused("material.density", "'1/(x - x)'").says("material.density").says("inf is not finite");
     refused("material.density", "'sqrt(0.5 - x)'").says("NaN is not finite");
-    refused("material.viscosity.volumetric", "'-26*x'")
+    refused("material.viscosity.volumetric", "'-30*x'")
         .says("material.viscosity.volumetric")
         .says("adds energy");
     refused(modulus, "'1000 + t'").says("can't depend on t");

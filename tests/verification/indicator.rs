@@ -24,7 +24,18 @@ fn at_rest<const D: usize, const S: usize>(
     whole: &GlobalMesh<D>,
     hypothesis: &str,
 ) -> Simulation<D, S> {
+    with_modulus(session, whole, hypothesis, |modulus| modulus.to_string())
+}
+
+/// The same, with this text of Young's modulus.
+fn with_modulus<const D: usize, const S: usize>(
+    session: &Session,
+    whole: &GlobalMesh<D>,
+    hypothesis: &str,
+    text: impl Fn(f64) -> String,
+) -> Simulation<D, S> {
     let material = |modulus: f64| {
+        let modulus = text(modulus);
         format!("density = 1\nelasticity = {{ youngs_modulus = {modulus}, poisson_ratio = {RATIO} }}\n")
     };
     // The mesh is handed over in memory; the file is never read.
@@ -84,11 +95,23 @@ fn two_cells(session: &Session) {
 
 /// Random stresses: against the definition, computed over the whole mesh on every rank.
 fn noisy<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, hypothesis: &str) {
-    let run = at_rest::<D, S>(session, whole, hypothesis);
+    indicated_noise(session, whole, &at_rest::<D, S>(session, whole, hypothesis), |_| 1.0);
+    let graded = |modulus: f64| format!("\"{modulus}*(1 + 2*x)\"");
+    let run = with_modulus::<D, S>(session, whole, hypothesis, graded);
+    indicated_noise(session, whole, &run, |centre| 1.0 + 2.0 * centre[0]);
+}
+
+/// The same for a body whose modulus is multiplied by the factor of the centre of each cell.
+fn indicated_noise<const D: usize, const S: usize>(
+    session: &Session,
+    whole: &GlobalMesh<D>,
+    run: &Simulation<D, S>,
+    factor: impl Fn([f64; D]) -> f64,
+) {
     let stress =
         |id: usize| -> Mandel<S> { std::array::from_fn(|c| 2.0 + c as f64 + noise((id * S + c) as u64)) };
     let mine: Vec<Mandel<S>> = run.body.mesh.cell_ids.iter().map(|&id| stress(id as usize)).collect();
-    let found = indicated(session, &run, &mine);
+    let found = indicated(session, run, &mine);
 
     let mut sums = vec![([0.0; S], 0.0); 2 * whole.nodes.len()];
     let slot = |cell: usize, node: u32| 2 * node as usize + usize::from(whole.cell_regions[cell]);
@@ -100,7 +123,8 @@ fn noisy<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D
         }
     }
     let eta = |cell: usize| {
-        let modulus = if whole.cell_regions[cell] == 1 { 3.0 * MODULUS } else { MODULUS };
+        let stiff = if whole.cell_regions[cell] == 1 { 3.0 } else { 1.0 };
+        let modulus = stiff * MODULUS * factor(whole.centroid(cell));
         let apart: Vec<Mandel<S>> = whole
             .cell(cell)
             .iter()
