@@ -52,7 +52,7 @@ impl Materials {
                 return material.with(material.numbers_at(&[]));
             }
             let mine = cells.iter().filter(|(of, _)| *of == table).map(|(_, there)| there.numbers());
-            let most = mine.fold([f64::NEG_INFINITY; 4], |most, numbers| {
+            let most = mine.fold([f64::NEG_INFINITY; _], |most, numbers| {
                 std::array::from_fn(|k| numbers[k].map_or(most[k], |number| most[k].max(number)))
             });
             material.with(session.largest(most).map(Some))

@@ -14,6 +14,7 @@ fn graded() -> Case {
         .set("material.density", "'1 + x*y'")
         .set("material.elasticity.youngs_modulus", "'1000*(1 + y/2)'")
         .set("material.viscosity", "{ volumetric = '25*(1 + x)', shear = '50*(1 + x + y)' }")
+        .set("material.viscoplasticity.perzyna.yield_stress", "'19 - 8*x'")
 }
 
 #[test]
@@ -24,7 +25,8 @@ fn an_expression_without_coordinates_is_the_number_to_the_last_bit() {
         .set("output.error_indicator", "true")
         .set("material.density", "'2/2'")
         .set("material.elasticity.youngs_modulus", "'10*100'")
-        .set("material.viscosity", "{ volumetric = '5^2', shear = '50' }");
+        .set("material.viscosity", "{ volumetric = '5^2', shear = '50' }")
+        .set("material.viscoplasticity.perzyna.yield_stress", "'20 - 1'");
     let results = words.run(2);
     for name in ["probes.csv", "profiles.csv", "history.csv", "resultants.csv"] {
         assert_eq!(numbers.text(name), results.text(name), "{name}");
@@ -45,11 +47,11 @@ fn wheel(scheme: &str) -> Case {
         .set("gravity.acceleration", "[1, 2, -9.81]")
 }
 
-fn material([density, modulus, volumetric, shear]: [&str; 4]) -> String {
+fn material([density, modulus, volumetric, shear, yield_stress]: [&str; 5]) -> String {
     format!(
         "{{ density = {density}, elasticity = {{ youngs_modulus = {modulus}, poisson_ratio = 0.4 }}, \
          viscosity = {{ volumetric = {volumetric}, shear = {shear} }}, \
-         viscoplasticity.perzyna = {{ relaxation = 5e4, yield_stress = 2e4, metric = 'compliance' }}, \
+         viscoplasticity.perzyna = {{ relaxation = 5e4, yield_stress = {yield_stress}, metric = 'compliance' }}, \
          damage = {{ threshold = 1.0, viscosity = 1e3 }} }}"
     )
 }
@@ -58,11 +60,12 @@ fn material([density, modulus, volumetric, shear]: [&str; 4]) -> String {
 fn properties_that_jump_are_those_of_two_regions_under_every_scheme() {
     // The centres of the cells of the tread are beyond this radius, those of the core within it.
     let of = |core: &str, tread: &str| format!("'if(hypot(x, z - 1) > 0.8 - 4e-3, {tread}, {core})'");
-    let jump = [of("2000", "1100"), of("2e7", "5e6"), of("1.5e5", "7e4"), of("2e5", "3.6e4")];
+    let jump =
+        [of("2000", "1100"), of("2e7", "5e6"), of("1.5e5", "7e4"), of("2e5", "3.6e4"), of("2e4", "8e3")];
     for scheme in SCHEMES {
         let two = wheel(scheme)
-            .set("material", &material(["2000", "2e7", "1.5e5", "2e5"]))
-            .set("region.0.material", &material(["1100", "5e6", "7e4", "3.6e4"]));
+            .set("material", &material(["2000", "2e7", "1.5e5", "2e5", "2e4"]))
+            .set("region.0.material", &material(["1100", "5e6", "7e4", "3.6e4", "8e3"]));
         let one =
             wheel(scheme).without("region").set("material", &material(jump.each_ref().map(String::as_str)));
         let (two, one) = (two.run(2), one.run(2));
@@ -187,6 +190,9 @@ fn properties_that_a_body_can_not_have_are_refused_with_their_place() {
     refused("material.viscosity.volumetric", "'-30*x'")
         .says("material.viscosity.volumetric")
         .says("adds energy");
+    let yield_stress = "material.viscoplasticity.perzyna.yield_stress";
+    refused(yield_stress, "'4 - 5*x'").says(yield_stress).says("is not at least 0");
+    refused(yield_stress, "'19 + t'").says("can't depend on t");
     refused(modulus, "'1000 + t'").says("can't depend on t");
     refused(modulus, "'1000 + z'").says("no coordinate z");
     refused(modulus, "-1.0").says("is out of range");

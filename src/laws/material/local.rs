@@ -1,25 +1,45 @@
 //! Materials whose properties vary with place.
 
-use super::{Elasticity, Material, Viscosity};
+use super::{Elasticity, Material, Viscoplasticity, Viscosity};
 use crate::laws::{expression::Scalar, law::LawFault};
 
-/// The keys of properties that may be expressions, relative to the table of the material.
-const KEYS: [&str; 4] = ["density", "elasticity.youngs_modulus", "viscosity.volumetric", "viscosity.shear"];
-/// The only one of them that may be zero or negative.
+/// The number of properties that may be expressions.
+const COUNT: usize = 5;
+/// The keys of those that every material may have, relative to its table; the last property is the yield stress of its flow.
+const KEYS: [&str; COUNT - 1] =
+    ["density", "elasticity.youngs_modulus", "viscosity.volumetric", "viscosity.shear"];
+/// The property that may be negative.
 const VOLUMETRIC: usize = 2;
+
+/// The numbers of the properties that may be expressions: density, Young's modulus, volumetric and shear viscosity, yield stress; none
+/// for those that are absent.
+pub type Numbers = [Option<f64>; COUNT];
 
 impl Material {
     /// The keys of properties that may be expressions, relative to the table of the material.
-    pub const VARIABLE: [&str; 4] = KEYS;
+    pub fn variable_keys() -> impl Iterator<Item = String> {
+        let of_flow = |(law, key): &(&str, Option<&str>)| Some(format!("viscoplasticity.{law}.{}", (*key)?));
+        KEYS.into_iter().map(str::to_owned).chain(Viscoplasticity::YIELD_STRESSES.iter().filter_map(of_flow))
+    }
 
-    /// Their values, in this order.
-    fn properties(&self) -> [Option<&Scalar>; 4] {
+    fn properties(&self) -> [Option<&Scalar>; COUNT] {
         [
             self.density.as_ref(),
             self.elasticity.as_ref().map(|law| &law.youngs_modulus),
             self.viscosity.as_ref().map(|law| &law.volumetric),
             self.viscosity.as_ref().map(|law| &law.shear),
+            self.viscoplasticity.as_ref().and_then(Viscoplasticity::yield_stress),
         ]
+    }
+
+    /// The key of a property.
+    fn key(&self, property: usize) -> String {
+        if let Some(key) = KEYS.get(property) {
+            return (*key).to_owned();
+        }
+        let name = self.viscoplasticity.as_ref().map_or("", Viscoplasticity::name);
+        let key = Viscoplasticity::YIELD_STRESSES.iter().find(|(law, _)| *law == name);
+        format!("viscoplasticity.{name}.{}", key.and_then(|(_, key)| *key).unwrap_or_default())
     }
 
     /// Whether a property is an expression.
@@ -27,26 +47,28 @@ impl Material {
         self.properties().into_iter().flatten().any(|value| matches!(value, Scalar::Expression(_)))
     }
 
-    /// The values of these properties at a place in m; none for those that are absent.
-    pub fn numbers_at(&self, place: &[f64]) -> [Option<f64>; 4] {
+    /// The values of these properties at a place in m.
+    pub fn numbers_at(&self, place: &[f64]) -> Numbers {
         self.properties().map(|value| value.map(|value| value.evaluate(0.0, place)))
     }
 
     /// The material at a place in m with as many coordinates as the body has dimensions; refused where a property is not finite, or
-    /// not positive as it must be.
+    /// not positive as it must be. A yield stress may be zero.
     pub fn at(&self, place: &[f64]) -> Result<Material<f64>, LawFault> {
         let numbers = self.numbers_at(place);
         for (k, number) in numbers.into_iter().enumerate() {
             let Some(number) = number else { continue };
             let wrong = if !number.is_finite() {
                 "finite"
-            } else if number <= 0.0 && k != VOLUMETRIC {
+            } else if k < KEYS.len() && k != VOLUMETRIC && number <= 0.0 {
                 "positive"
+            } else if k == KEYS.len() && number < 0.0 {
+                "at least 0"
             } else {
                 continue;
             };
             return Err(LawFault::at_value(
-                KEYS[k],
+                self.key(k),
                 format!("the value {number} is not {wrong}"),
                 format!(
                     "correct the expression so that it is {wrong} in the whole body, for example with max(..)"
@@ -54,36 +76,41 @@ impl Material {
             ));
         }
         let material = self.with(numbers);
-        match material.viscosity.and_then(|law| law.fault(place.len())) {
-            Some(fault) => Err(fault.within("viscosity")),
+        if let Some(fault) = material.viscosity.and_then(|law| law.fault(place.len())) {
+            return Err(fault.within("viscosity"));
+        }
+        match material.viscoplasticity.and_then(|law| Some((law, law.fault()?))) {
+            Some((law, fault)) => Err(fault.within(law.name()).within("viscoplasticity")),
             None => Ok(material),
         }
     }
 
-    /// The material with these numbers of its properties, in the order of [`Material::VARIABLE`]; absent ones stay absent.
-    pub fn with(&self, [density, modulus, volumetric, shear]: [Option<f64>; 4]) -> Material<f64> {
+    /// The material with these numbers; properties that are absent stay absent.
+    pub fn with(&self, [density, modulus, volumetric, shear, yield_stress]: Numbers) -> Material<f64> {
         let elasticity = self.elasticity.as_ref().zip(modulus);
         let viscosity = self.viscosity.as_ref().and(volumetric.zip(shear));
+        let flow = self.viscoplasticity.as_ref();
         Material {
             hypothesis: self.hypothesis,
             density: self.density.as_ref().and(density),
             elasticity: elasticity
                 .map(|(law, youngs_modulus)| Elasticity { youngs_modulus, poisson_ratio: law.poisson_ratio }),
             viscosity: viscosity.map(|(volumetric, shear)| Viscosity { volumetric, shear }),
-            viscoplasticity: self.viscoplasticity,
+            viscoplasticity: flow.map(|law| law.with_yield_stress(yield_stress.unwrap_or(0.0))),
             damage: self.damage,
         }
     }
 }
 
 impl Material<f64> {
-    /// The numbers of its properties, in the order of [`Material::VARIABLE`].
-    pub fn numbers(&self) -> [Option<f64>; 4] {
+    /// The numbers of its properties.
+    pub fn numbers(&self) -> Numbers {
         [
             self.density,
             self.elasticity.map(|law| law.youngs_modulus),
             self.viscosity.map(|law| law.volumetric),
             self.viscosity.map(|law| law.shear),
+            self.viscoplasticity.and_then(|law| law.yield_stress().copied()),
         ]
     }
 }
@@ -91,7 +118,10 @@ impl Material<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::expression::Expression;
+    use crate::laws::{
+        expression::Expression,
+        material::{DruckerPrager, Metric, Perzyna},
+    };
 
     fn of(text: &str) -> Scalar {
         Scalar::Expression(Expression::parse(text).expect("an expression"))
@@ -112,11 +142,47 @@ mod tests {
     fn properties_are_those_of_the_place() {
         assert!(graded().has_expressions());
         let there = graded().at(&[1.0, 2.0]).expect("a material");
-        assert_eq!(there.numbers(), [Some(3.0), Some(8.0), Some(-1.0), Some(4.0)]);
+        assert_eq!(there.numbers(), [Some(3.0), Some(8.0), Some(-1.0), Some(4.0), None]);
         assert_eq!(there.elasticity.expect("elastic").poisson_ratio, 0.25);
         let rigid = Material { elasticity: None, viscosity: None, ..graded() };
         assert!(!rigid.has_expressions());
-        assert_eq!(rigid.at(&[0.0, 0.0]).expect("a material").numbers(), [Some(3.0), None, None, None]);
+        assert_eq!(rigid.at(&[0.0, 0.0]).expect("a material").numbers(), [Some(3.0), None, None, None, None]);
+    }
+
+    #[test]
+    fn the_yield_stress_is_that_of_the_place() {
+        let law = |yield_stress, exponent| {
+            let parameters = Perzyna {
+                relaxation: 100.0,
+                yield_stress,
+                exponent,
+                hardening_modulus: Some(7.0),
+                metric: Metric::Compliance,
+            };
+            Material { viscoplasticity: Some(Viscoplasticity::Perzyna(parameters)), ..graded() }
+        };
+        let there = law(of("2 - y"), 1.0).at(&[0.0, 0.5]).expect("a material").viscoplasticity;
+        let expected = Perzyna {
+            relaxation: 100.0,
+            yield_stress: 1.5,
+            exponent: 1.0,
+            hardening_modulus: Some(7.0),
+            metric: Metric::Compliance,
+        };
+        assert_eq!(there, Some(Viscoplasticity::Perzyna(expected)));
+        let refused = |exponent, y: f64| law(of("2 - y"), exponent).at(&[0.0, y]).expect_err("refused").key;
+        assert!(law(of("2 - y"), 1.0).at(&[0.0, 2.0]).is_ok(), "zero");
+        assert_eq!(refused(1.0, 3.0), "viscoplasticity.perzyna.yield_stress");
+        assert_eq!(refused(2.0, 2.0), "viscoplasticity.perzyna.exponent");
+        let cone = DruckerPrager { relaxation: 1.0, friction_coefficient: 0.5, cohesion: of("1 + x") };
+        let cone = Material { viscoplasticity: Some(Viscoplasticity::DruckerPrager(cone)), ..graded() };
+        assert_eq!(cone.at(&[1.0, 0.0]).expect("a material").numbers()[4], Some(2.0));
+        assert_eq!(cone.key(4), "viscoplasticity.drucker_prager.cohesion");
+        let keys: Vec<String> = Material::variable_keys().collect();
+        assert_eq!(
+            keys[4..],
+            ["viscoplasticity.perzyna.yield_stress", "viscoplasticity.drucker_prager.cohesion"]
+        );
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub use by_material::ByMaterial;
 pub use damage::Damage;
 pub use elasticity::{Elastic, Elasticity, Hypothesis};
 pub use isotropic::Isotropic;
+pub use local::Numbers;
 pub use viscoplasticity::*;
 pub use viscosity::Viscosity;
 
@@ -48,7 +49,7 @@ pub struct Material<N = Scalar> {
     pub viscosity: Option<Viscosity<N>>,
     /// Viscoplastic flow, which relaxes the elastic stress; requires elasticity. Absent: no viscoplastic flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub viscoplasticity: Option<Viscoplasticity>,
+    pub viscoplasticity: Option<Viscoplasticity<N>>,
     /// Isotropic damage d of each cell, from 0 (sound) to `largest`; requires elasticity. Damage multiplies the elastic stress,
     /// relaxed by viscoplastic flow, by 1 - d and leaves the viscous stress unchanged. It grows as `viscosity d' = (1 - d)^exponent
     /// max(Y - threshold, 0)`, where `Y = s : E^-1 s / 2` is the elastic energy per volume at the stress s of undamaged material,

@@ -14,7 +14,7 @@ mod return_mapping;
 mod tangent;
 
 pub use drucker_prager::DruckerPrager;
-pub use flow::{Flow, Parameters};
+pub use flow::{Flow, InPlaces, Parameters};
 pub use maxwell::{Dashpots, Maxwell};
 pub use norton::Norton;
 pub use perzyna::{Metric, Perzyna};
@@ -36,11 +36,37 @@ use serde::{Deserialize, Serialize};
 
 /// The choice of laws, defined by their list: the enum of the job, the enum that evaluates the law, and the dispatch to the chosen law.
 macro_rules! laws {
-    ($($(#[$about:meta])* $law:ident = $name:literal,)*) => {
-        /// The viscoplastic law.
+    ($($(#[$about:meta])* $law:ident $(<$number:ident>)? = $name:literal,)*) => {
+        /// The viscoplastic law, at a point or with a yield stress that may vary with place.
         #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-        pub enum Viscoplasticity {
-            $($(#[$about])* #[serde(rename = $name)] $law($law),)*
+        #[schemars(rename = "Viscoplasticity", description = "The viscoplastic law.")]
+        pub enum Viscoplasticity<N = f64> {
+            $($(#[$about])* #[serde(rename = $name)] $law($law $(<$number>)?),)*
+        }
+
+        impl<N> Viscoplasticity<N> {
+            /// Its name in the job.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$law(_) => $name,)*
+                }
+            }
+
+            /// Its yield stress in Pa, if it has one.
+            pub fn yield_stress(&self) -> Option<&N> {
+                match self {
+                    $(Self::$law(law) => InPlaces::<N>::yield_stress(law),)*
+                }
+            }
+
+            /// The law where its yield stress, if it has one, has this value in Pa.
+            pub fn with_yield_stress(&self, yield_stress: f64) -> Viscoplasticity {
+                match self {
+                    $(Self::$law(law) => {
+                        Viscoplasticity::$law(InPlaces::<N>::with_yield_stress(law, yield_stress))
+                    })*
+                }
+            }
         }
 
         impl Viscoplasticity {
@@ -49,7 +75,11 @@ macro_rules! laws {
 
             /// The names of the laws in the job, each with its [`NOT_IN_PLANE_STRESS`](Parameters::NOT_IN_PLANE_STRESS).
             pub const NAMES: &'static [(&'static str, Option<[&'static str; 2]>)] =
-                &[$(($name, $law::NOT_IN_PLANE_STRESS),)*];
+                &[$(($name, <$law as Parameters>::NOT_IN_PLANE_STRESS),)*];
+
+            /// The names of the laws, each with the key of its yield stress.
+            pub const YIELD_STRESSES: &'static [(&'static str, Option<&'static str>)] =
+                &[$(($name, <$law as InPlaces<f64>>::YIELD_STRESS),)*];
 
             /// See [`Parameters::prepare`].
             pub fn prepare(&self, elasticity: &Elasticity, hypothesis: Hypothesis) -> FlowLaw {
@@ -91,12 +121,12 @@ macro_rules! laws {
 
 laws! {
     /// Perzyna's overstress law with the von Mises yield condition and optional hardening.
-    Perzyna = "perzyna",
+    Perzyna<N> = "perzyna",
     /// Maxwell's linear relaxation of stress.
     Maxwell = "maxwell",
     /// Overstress law with the yield condition of Drucker and Prager, whose yield stress increases with pressure. For 3D and plane
     /// strain.
-    DruckerPrager = "drucker_prager",
+    DruckerPrager<N> = "drucker_prager",
     /// Norton's creep: the creep rate is a power of the stress, without a yield stress, with optional strain hardening.
     Norton = "norton",
 }

@@ -16,7 +16,7 @@
 //! regularisation: G. Duvaut, J.-L. Lions, Les inequations en mecanique et en physique, 1972, chapter 5.)
 
 use super::{
-    flow::{Flow, Parameters},
+    flow::{Flow, InPlaces, Parameters},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
@@ -32,16 +32,32 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 /// tension).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct DruckerPrager {
+#[schemars(rename = "DruckerPrager")]
+pub struct DruckerPrager<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
     /// Increase of the yield stress in shear, sqrt(J2), per pressure.
     #[schemars(range(min = 0), example = 0.6)]
     pub friction_coefficient: f64,
-    /// Yield stress in pure shear at zero pressure.
-    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 1e4)]
-    pub cohesion: f64,
+    /// Yield stress in pure shear at zero pressure. An expression in x, y, z is evaluated at the centre of each cell.
+    #[schemars(extend("unit" = "Pa", "minimum" = 0), example = 1e4)]
+    pub cohesion: N,
+}
+
+impl<N> InPlaces<N> for DruckerPrager<N> {
+    type There = DruckerPrager;
+
+    const YIELD_STRESS: Option<&'static str> = Some("cohesion");
+
+    fn yield_stress(&self) -> Option<&N> {
+        Some(&self.cohesion)
+    }
+
+    fn with_yield_stress(&self, cohesion: f64) -> DruckerPrager {
+        let Self { relaxation, friction_coefficient, .. } = *self;
+        DruckerPrager { relaxation, friction_coefficient, cohesion }
+    }
 }
 
 impl Parameters for DruckerPrager {

@@ -32,6 +32,24 @@ pub trait Parameters {
     fn keeps_volume(&self) -> bool;
 }
 
+/// The parameters of a law in a body, where the yield stress of type `N` may vary with place. The defaults are those of a law
+/// without yield stress.
+pub trait InPlaces<N> {
+    /// The parameters at a place.
+    type There: Parameters;
+
+    /// The key of the yield stress.
+    const YIELD_STRESS: Option<&'static str> = None;
+
+    /// The yield stress in Pa.
+    fn yield_stress(&self) -> Option<&N> {
+        None
+    }
+
+    /// The parameters where the yield stress has this value in Pa, if there is one.
+    fn with_yield_stress(&self, yield_stress: f64) -> Self::There;
+}
+
 /// The evaluation of a law at a point. The defaults are those of a law without yield surface and without hardening.
 pub trait Flow {
     /// The elastic tensor `E` in Pa.

@@ -9,7 +9,7 @@
 //! Under `lagged_euler` a held deviatoric stress falls by the factor `1 - k / t_d` in a step of length `k`.
 
 use super::{
-    flow::{Flow, Parameters},
+    flow::{Flow, InPlaces, Parameters},
     tangent::{Tangent, write_isotropic},
 };
 use crate::{
@@ -31,6 +31,14 @@ pub struct Maxwell {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 5.0)]
     pub volumetric_relaxation_time: Option<f64>,
+}
+
+impl<N> InPlaces<N> for Maxwell {
+    type There = Self;
+
+    fn with_yield_stress(&self, _: f64) -> Self {
+        *self
+    }
 }
 
 impl Parameters for Maxwell {

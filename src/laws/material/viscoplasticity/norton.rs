@@ -24,7 +24,7 @@
 //! ```
 
 use super::{
-    flow::{Flow, Parameters},
+    flow::{Flow, InPlaces, Parameters},
     tangent::{Tangent, add_product, write_isotropic},
 };
 use crate::{
@@ -63,6 +63,14 @@ pub struct Norton {
 
 fn one() -> f64 {
     1.0
+}
+
+impl<N> InPlaces<N> for Norton {
+    type There = Self;
+
+    fn with_yield_stress(&self, _: f64) -> Self {
+        *self
+    }
 }
 
 impl Parameters for Norton {

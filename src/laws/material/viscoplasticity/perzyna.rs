@@ -26,7 +26,7 @@ mod tests;
 pub use overstress::{Metric, Perzyna};
 
 use super::{
-    flow::{Flow, Parameters, one_by_one},
+    flow::{Flow, InPlaces, Parameters, one_by_one},
     tangent::Tangent,
 };
 use crate::{
@@ -39,6 +39,21 @@ use crate::{
         tensor::{Mandel, dot, normal_components, trace, von_mises},
     },
 };
+
+impl<N> InPlaces<N> for Perzyna<N> {
+    type There = Perzyna;
+
+    const YIELD_STRESS: Option<&'static str> = Some("yield_stress");
+
+    fn yield_stress(&self) -> Option<&N> {
+        Some(&self.yield_stress)
+    }
+
+    fn with_yield_stress(&self, yield_stress: f64) -> Perzyna {
+        let Self { relaxation, exponent, hardening_modulus, metric, .. } = *self;
+        Perzyna { relaxation, yield_stress, exponent, hardening_modulus, metric }
+    }
+}
 
 impl Parameters for Perzyna {
     type Flow = Elastic<Self>;

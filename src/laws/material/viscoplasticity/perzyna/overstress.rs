@@ -17,13 +17,15 @@ use std::{array, f64::consts::FRAC_1_SQRT_2};
 /// projection on the yield set of von Mises and the overstress f is the von Mises norm of s minus the yield stress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Perzyna {
+#[schemars(rename = "Perzyna")]
+pub struct Perzyna<N = f64> {
     /// Viscosity lambda: the larger, the slower stress outside the yield set relaxes.
     #[schemars(extend("unit" = "Pa s", "exclusiveMinimum" = 0), example = 100.0)]
     pub relaxation: f64,
-    /// Yield stress: von Mises norm of the stress above which the material flows.
-    #[schemars(range(min = 0), extend("unit" = "Pa"), example = 19.0)]
-    pub yield_stress: f64,
+    /// Yield stress: von Mises norm of the stress above which the material flows. An expression in x, y, z is evaluated at the
+    /// centre of each cell.
+    #[schemars(extend("unit" = "Pa", "minimum" = 0), example = 19.0)]
+    pub yield_stress: N,
     /// Exponent of the overstress. 1: the law of Wang and Cheng (2022). Above 1 the yield stress must be positive, and with scheme
     /// lagged_euler explicit_step_bound holds only while the von Mises norm is at most twice the yield stress.
     #[serde(default = "one")]
