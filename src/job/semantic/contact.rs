@@ -6,6 +6,7 @@ use crate::job::document::Method;
 use crate::job::source::Node;
 use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
 use crate::laws::expression::Scalar;
+use crate::laws::schemes::Scheme;
 
 /// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
@@ -28,6 +29,21 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             .warnings
             .extend(warning.map(|warning| format!("{}.adhesion: {warning}", table.interface.path)));
         check_obstacle(findings, &table.interface.path);
+        check_redistribution(findings, &table.interface.path);
+    }
+}
+
+/// Stresses from the previous step would leave the velocity of a boundary without mass undetermined.
+fn check_redistribution(findings: &mut Findings<'_>, contact: &str) {
+    let (root, key) = (findings.root, format!("{contact}.redistribute_mass"));
+    let scheme: Scheme = root.read("time.scheme").unwrap_or_default();
+    if root.read(&key).unwrap_or(false) && !scheme.is_implicit() {
+        let message = format!("scheme \"{}\" cannot solve for a boundary without mass", scheme.name());
+        findings.fault(
+            &key,
+            message,
+            "use [time] scheme = \"bdf2\" or \"implicit_euler\", or delete the key",
+        );
     }
 }
 
