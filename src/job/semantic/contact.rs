@@ -15,6 +15,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         items(root, "contact").into_iter().map(|path| table(root, path)).collect();
     check_method(findings, &tables);
     check_loads(findings, &tables);
+    check_strengths(findings, &tables);
     for table in tables {
         for fault in table.faults() {
             let key = format!("{}.{}", table.interface.path, fault.key);
@@ -78,6 +79,17 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
     if tables.is_empty() || !tables.iter().all(is_bound) {
         let message = "this method requires that every contact is frictionless and `unilateral`";
         findings.fault("solver.method", message, "use \"newton\", or delete the key");
+    }
+}
+
+/// Where boundaries meet, the bonds of a node break together: by one rule.
+fn check_strengths(findings: &mut Findings<'_>, tables: &[ContactTable]) {
+    let bonded = || tables.iter().filter_map(|table| Some((table, table.adhesion?.strength.is_some())));
+    let Some((_, first)) = bonded().next() else { return };
+    for (table, _) in bonded().filter(|(_, has_strength)| *has_strength != first) {
+        let key = format!("{}.adhesion", table.interface.path);
+        let message = "either all adhesion tables of a job have a `strength` or none has";
+        findings.fault_at_key(&key, message, "give all of them a strength, or delete the key everywhere");
     }
 }
 

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::laws::expression::Scalar;
 
-pub use adhesion::Adhesion;
+pub use adhesion::{Adhesion, Toughness};
 pub use friction_law::{FrictionBound, Slip};
 pub use interface::Interface;
 pub use laws::*;
