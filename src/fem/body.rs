@@ -11,10 +11,10 @@ use crate::{
     fem::{
         effect::{
             Contact, Curvature, Effect, ElasticSupport, Energy, Evaluation, FlowProperties, Form, History,
-            HistoryStore, Load, Outcome, PeakSquares, Peaks, Phases, STORED_IN_CONTACT, Step, StressError,
-            SupportMotion, SurfaceEffect, SurfaceForce, Term,
+            HistoryStore, KINETIC, Load, NUMERICAL, Outcome, PeakSquares, Peaks, Phases, RedistributedMass,
+            STORED_IN_CONTACT, Step, StressError, SupportMotion, SurfaceEffect, SurfaceForce, Term,
         },
-        space::{Batch, Geometry, Held, Needs, Nodal, assemble},
+        space::{Batch, CellMatrix, Geometry, Held, Needs, Nodal, SurfacePoint, assemble},
         state::State,
     },
     laws::material::Isotropic,
@@ -52,6 +52,8 @@ pub struct Body<const D: usize, const S: usize> {
     pub held: Held<D>,
     /// Springs and dashpots of supports.
     pub elastic_support: ElasticSupport<D>,
+    /// The mass that contact boundaries have passed on, if some have, on all ranks alike.
+    pub redistributed_mass: Option<RedistributedMass<D>>,
     /// The motion of supports, if some move.
     pub support_motion: Option<SupportMotion<D>>,
     /// The state at which laws are evaluated, converged or at the end of the step being taken.
@@ -86,6 +88,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
             load: Load::default(),
             held,
             elastic_support: ElasticSupport::default(),
+            redistributed_mass: None,
             support_motion: None,
             evaluation,
             step: Step::default(),
@@ -100,18 +103,41 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.evaluation == Evaluation::Converged
     }
 
+    /// Moves the mass of these nodes of boundaries to the other nodes of their cells. `layout` is a vector with ghosts. Collective.
+    pub fn redistribute_mass(
+        &mut self,
+        boundary: &[SurfacePoint<D>],
+        layout: &DistributedVector,
+    ) -> Result<()> {
+        let inertia: Vec<_> = self.terms().filter(|term| term.form() == Some(Form::Mass)).collect();
+        let add_mass = |cell: usize, matrix: &mut CellMatrix<D>| {
+            let cell = self.geometry.cell_at(cell);
+            inertia.iter().for_each(|term| term.add_matrix(cell.material(), cell, 1.0, matrix));
+        };
+        let mut flags = layout.like()?;
+        {
+            let mut values = flags.owned_mut()?;
+            boundary.iter().for_each(|point| values[point.node as usize * D] = 1.0);
+        }
+        flags.update_ghosts()?;
+        let is_massless: Vec<bool> = flags.local()?.iter().step_by(D).map(|flag| *flag > 0.0).collect();
+        let mass = RedistributedMass::new(&self.mesh, &is_massless, add_mass);
+        self.redistributed_mass = Some(mass);
+        Ok(())
+    }
+
     /// The constant matrix of a step in which velocity and displacement change by `length` in s times their rates. Collective.
     pub fn matrix(&self, session: &Session, length: f64) -> Result<BlockRows, Agreed> {
         let terms: Vec<_> = self
             .terms()
             .filter(|term| !(self.is_explicit() && term.form() == Some(Form::Elasticity)))
             .collect();
-        let mut runs = self.geometry.runs.iter().copied().peekable();
         let mut rows =
             assemble(session, &self.mesh, &self.geometry, &self.held, |cell, geometry, matrix| {
-                while runs.next_if(|run| run.first + run.count <= cell).is_some() {}
-                let Some(material) = runs.peek().map(|run| run.material) else { return };
-                terms.iter().for_each(|term| term.add_matrix(material, geometry, length, matrix));
+                terms.iter().for_each(|term| term.add_matrix(geometry.material(), geometry, length, matrix));
+                if let Some(mass) = &self.redistributed_mass {
+                    mass.add_to_cell(cell, 1.0 / length, matrix);
+                }
             })?;
         let length = (!self.is_explicit()).then_some(length);
         self.elastic_support.add_to_rows(&self.mesh, &self.held, length, &mut rows);
@@ -143,6 +169,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.evaluated.clear();
         let mut outcome = Outcome::default();
         let mut squares = self.elastic_support.add_start_forces(nodal.displacement, forces);
+        if let (Some(mass), Evaluation::Start(blend)) = (&self.redistributed_mass, at) {
+            mass.add_product(1.0 / blend.length, nodal.velocity, forces);
+        }
         for effect in &mut self.surface_effects {
             effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);
         }
@@ -176,6 +205,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
             let stored = self.contacts.iter().map(|c| c.stored_energy(state.time, nodal.displacement));
             energy[STORED_IN_CONTACT] = stored.sum::<Result<f64>>()?;
             self.elastic_support.add_energy(self.evaluation, step, nodal, &mut energy);
+            if let Some(mass) = &self.redistributed_mass {
+                let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
+                energy[KINETIC] += 0.5 * mass.square(|at| nodal.velocity[at]);
+                energy[NUMERICAL] -= 0.5 * mass.square(change);
+            }
             let effects = self.surface_effects.iter();
             effects.for_each(|e| e.add_energy(self.evaluation, step, nodal, &mut energy));
             let Some(needs) = self.needs_of_energy() else { return Ok((energy, Peaks::default())) };
@@ -213,9 +247,10 @@ impl<const D: usize, const S: usize> Body<D, S> {
         on_the_surface || self.elastic_support.has(form) || self.terms().any(|term| term.form() == Some(form))
     }
 
-    /// Whether an effect has this form in every material of the body.
+    /// Whether an effect has this form in every cell of the body.
     pub fn has_form_everywhere(&self, form: Form) -> bool {
-        self.terms().any(|term| term.form() == Some(form) && term.is_everywhere())
+        (form != Form::Mass || self.redistributed_mass.is_none())
+            && self.terms().any(|term| term.form() == Some(form) && term.is_everywhere())
     }
 
     /// The tensor of a material in a form, if it has one.
@@ -262,6 +297,9 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// Adds `F x` with the part of the matrix `F` of a form that is in the matrix of a step.
     fn add_linear_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         self.elastic_support.add_form(form, x, forces);
+        if let Some(mass) = self.redistributed_mass.as_ref().filter(|_| form == Form::Mass) {
+            mass.add_product(1.0, x, forces);
+        }
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
         let called = Called::filter(&self.effects, |effect| effect.term().form() == Some(form));
@@ -413,6 +451,11 @@ impl<const D: usize, const S: usize> Body<D, S> {
                     }
                     batch.scatter(&self.mesh, forces);
                 });
+                if let Some(mass) = &self.redistributed_mass {
+                    let change =
+                        nodal.velocity.iter().zip(nodal.previous_velocity).map(|(now, before)| now - before);
+                    mass.add_product(-1.0 / length, &change.collect::<Vec<_>>(), forces);
+                }
             })?;
         }
         Ok(read(forces))

@@ -83,6 +83,12 @@ pub(super) fn body<const D: usize, const S: usize>(
     body.material_tables = materials.tables;
     (body.contacts, body.surface_effects, body.load) = (contacts, surface_effects, load);
     (body.support_motion, body.elastic_support) = (motion, elastic_support);
+    if job.contact.iter().any(|contact| contact.redistribute_mass) {
+        let given = job.contact.iter().zip(&parts).filter(|(contact, _)| contact.redistribute_mass);
+        let facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
+        let points = surface_points(session, &body.mesh, &facets)?;
+        session.agree(body.redistribute_mass(&points, &state.velocity))?;
+    }
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
         body.keep_earlier();
     }

@@ -141,7 +141,10 @@ fn advice(scheme: &str, bound: Option<f64>, has_impacts: bool) -> String {
         None => format!("{scheme} is stable with steps of any length"),
     };
     let better = match (scheme, has_impacts) {
-        ("bdf2", true) => "; implicit_euler does not overshoot in impacts, which this job may have",
+        ("bdf2", true) => {
+            "; in impacts, which this job may have, [[contact]] redistribute_mass = true keeps energy and pressure from jumping, and \
+             implicit_euler damps them"
+        }
         (_, true) | ("bdf2", false) => "",
         (_, false) => "; bdf2 is of second order where motions are smooth",
     };

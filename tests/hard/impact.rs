@@ -93,3 +93,51 @@ fn blocks_bounce_without_energy_out_of_nothing() {
         assert!(results.number("max_energy_imbalance") < 1e-9, "{what}");
     }
 }
+
+/// Dimension, order of the cells, step in s, number of ranks.
+type Bounce = (usize, u32, f64, usize);
+
+/// With a bottom without inertia an elastic bar bounces without loss and without peaks of its pressure, for any order of cells, dimension
+/// and number of ranks.
+#[test]
+fn bars_without_inertia_at_the_bottom_bounce_without_loss() {
+    let step = 1.0 / 1200.0;
+    let bounces: Vec<Bounce> = family(
+        &[(2, 1, step, 1), (2, 1, step, 3)],
+        &[(2, 2, step, 2), (3, 1, step, 2), (2, 1, 0.25 * step, 1)],
+    );
+    for (dimension, order, step, ranks) in bounces {
+        let mut case = Case::of("bouncing_bar")
+            .set("time.step", &format!("{step:e}"))
+            .set("mesh.order", &order.to_string());
+        if dimension == 3 {
+            let held = "[{ on = ['left', 'right'], fix = ['x'] }, { on = ['front', 'back'], fix = ['y'] }]";
+            case = case
+                .without("mesh")
+                .without("material.hypothesis")
+                .set("mesh.box", "{ size = [0.2, 0.2, 10.0], cells = [1, 1, 50] }")
+                .set("support", held)
+                .set("gravity.acceleration", "[0, 0, -10]")
+                .set("output.probe", "[{ name = 'middle', point = [0.1, 0.1, 5.0] }]");
+        }
+        let results = case.run(ranks);
+        let what = format!("{dimension}D, order {order}, steps of {step:.1e} s, {ranks} ranks");
+        let energies = energies(&results);
+        let lost = energies[0] - energies[energies.len() - 1];
+        let gained = energies.iter().map(|energy| energy - energies[0]).fold(0.0, larger);
+        let kinetic = results.table("history.csv").numbers("kinetic_energy");
+        let impact = kinetic.into_iter().fold(0.0, larger);
+        let bottom = results.table("resultants.csv").only("source", "contact bottom");
+        let (times, pressures) = (bottom.numbers("time"), bottom.numbers("largest_pressure"));
+        let first = pressures.iter().copied().find(|pressure| *pressure > 0.0).expect("an impact");
+        let shares = times.iter().zip(&pressures).map(|(time, pressure)| pressure / (300.0 * time));
+        let most = shares.fold(0.0, larger);
+        println!(
+            "{what}: {:.2} % lost, {:.0e} gained, pressure at most {most:.2} of the exact one, {first:.0} Pa at first",
+            100.0 * lost / impact,
+            gained / impact
+        );
+        assert!(lost <= 0.01 * impact && gained <= 1e-9 * impact, "{what}: {lost} J lost, {gained} J gained");
+        assert!(first <= 300.0 && most < 1.6, "{what}: {first} Pa at first, at most {most} of the exact one");
+    }
+}

@@ -4,7 +4,7 @@ use super::{
 };
 use crate::{
     fem::space::{Nodal, SurfacePoint},
-    laws::contact,
+    laws::contact::{self, Toughness},
     linear_algebra::tensor::{add_scaled, dot},
 };
 
@@ -79,18 +79,17 @@ impl<const D: usize> Adhesion<D> {
         }
     }
 
-    /// Sums over the points of a node: driving force and threshold of debonding in J, and viscosity in J s. At the corners of quadratic
-    /// facets in space, whose points have no weight, the bonding follows from sums with equal weights; it has no forces.
-    fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> [f64; 3] {
-        let [mut drive, mut energy, mut viscosity] = [0.0; 3];
+    /// Sums over the points of a node: driving force in J, and what opposes debonding. At the corners of quadratic facets in space, whose
+    /// points have no weight, the bonding follows from sums with equal weights; it has no forces.
+    fn drive(&self, group: &[(usize, SurfacePoint<D>)], displacement: &[f64]) -> (f64, Toughness) {
+        let (mut drive, mut toughness) = (0.0, Toughness::default());
         for (law, point) in group {
             let law = &self.laws[*law];
             let weight = if point.weight > 0.0 { point.weight } else { 1.0 };
             drive += weight * law.drive(&point.value(displacement), &point.normal);
-            energy += weight * law.energy;
-            viscosity += weight * law.viscosity;
+            toughness.add(weight, &law.toughness());
         }
-        [drive, energy, viscosity]
+        (drive, toughness)
     }
 
     /// Energy in J that intact bonds at the points of a node store.
@@ -115,8 +114,8 @@ impl<const D: usize> Adhesion<D> {
     fn add_explicit(&mut self, step: Step, displacement: &[f64], forces: &mut [f64], energy: &mut Energy) {
         let mut trial = std::mem::take(&mut self.bonding.trial);
         for ((group, before), after) in self.groups().zip(&self.bonding.converged).zip(&mut trial) {
-            let [drive, threshold, viscosity] = self.drive(group, displacement);
-            [*after, _] = contact::Adhesion::relax(*before, drive, threshold, viscosity, step.length);
+            let (drive, toughness) = self.drive(group, displacement);
+            [*after, _] = toughness.relax(*before, drive, step.length);
             energy[DEBONDING] += (before * before - *after * *after) * self.potential(group, displacement);
             for (law, point) in group {
                 let traction = self.laws[*law].traction(&point.value(displacement), &point.normal);
@@ -132,8 +131,8 @@ impl<const D: usize> Adhesion<D> {
         let mut slopes = std::mem::take(&mut self.slopes);
         slopes.clear();
         for (node, (group, after)) in self.groups().zip(&mut trial).enumerate() {
-            let [drive, threshold, viscosity] = self.drive(group, displacement);
-            let relax = |start, length| contact::Adhesion::relax(start, drive, threshold, viscosity, length);
+            let (drive, toughness) = self.drive(group, displacement);
+            let relax = |start, length| toughness.relax(start, drive, length);
             let (before, last) = (self.bonding.converged[node], self.bonding.last_change(node));
             let slope;
             [*after, slope] = evolution.advance(before, last, relax);

@@ -124,7 +124,7 @@ impl<const D: usize> CellMatrix<D> {
 
     /// Adds multiples of the identity to the blocks.
     #[inline(always)]
-    fn add_scalar(&mut self, entry: impl Fn(usize, usize) -> f64) {
+    pub fn add_scalar(&mut self, entry: impl Fn(usize, usize) -> f64) {
         for a in 0..self.nodes {
             for b in 0..self.nodes {
                 let value = entry(a, b);

@@ -170,6 +170,12 @@ impl<'g, const D: usize> Cell<'g, D> {
         self.geometry.shape(self.run)
     }
 
+    /// The index of its material.
+    #[inline(always)]
+    pub fn material(self) -> usize {
+        self.geometry.runs[self.run].material
+    }
+
     /// Its lane in the weights of its shape.
     #[inline(always)]
     pub fn lane(self) -> usize {
@@ -294,8 +300,13 @@ impl<const D: usize> Geometry<D> {
     /// The whole cell of this local number, see [`Cell::whole`].
     #[inline]
     pub fn cell(&self, number: usize) -> Simplex<D> {
+        self.cell_at(number).whole()
+    }
+
+    /// A cell by its number, with its shape.
+    pub fn cell_at(&self, number: usize) -> Cell<'_, D> {
         let run = self.run_of(number);
-        Cell { geometry: self, run, lane: number - self.runs[run].first }.whole()
+        Cell { geometry: self, run, lane: number - self.runs[run].first }
     }
 
     /// The cell of a point by its number, the place of the point in the cell, and its geometry. Points are numbered in the order in

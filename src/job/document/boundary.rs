@@ -47,16 +47,12 @@ pub struct Support {
     /// Whether waves leave the body through these boundaries. Adds the dashpots of Lysmer and Kuhlemeyer (1969): density times the
     /// speed of pressure waves along the normal, density times the speed of shear waves along the boundary, of the elastic material
     /// behind the boundary. Waves are absorbed completely where they arrive along the normal.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub absorbing: bool,
 }
 
 fn is_zero(value: &Scalar) -> bool {
     *value == Scalar::default()
-}
-
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 /// A stiffness or a damping per area, along the normal of a boundary and along the boundary.

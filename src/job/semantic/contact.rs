@@ -6,6 +6,7 @@ use crate::job::document::Method;
 use crate::job::source::Node;
 use crate::laws::contact::{Adhesion, ContactTable, Gap, Interface, NormalLaw};
 use crate::laws::expression::Scalar;
+use crate::laws::schemes::Scheme;
 
 /// Checks that do not depend on the mesh.
 pub(super) fn check(findings: &mut Findings<'_>) {
@@ -14,6 +15,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
         items(root, "contact").into_iter().map(|path| table(root, path)).collect();
     check_method(findings, &tables);
     check_loads(findings, &tables);
+    check_strengths(findings, &tables);
     for table in tables {
         for fault in table.faults() {
             let key = format!("{}.{}", table.interface.path, fault.key);
@@ -28,6 +30,21 @@ pub(super) fn check(findings: &mut Findings<'_>) {
             .warnings
             .extend(warning.map(|warning| format!("{}.adhesion: {warning}", table.interface.path)));
         check_obstacle(findings, &table.interface.path);
+        check_redistribution(findings, &table.interface.path);
+    }
+}
+
+/// Stresses from the previous step would leave the velocity of a boundary without mass undetermined.
+fn check_redistribution(findings: &mut Findings<'_>, contact: &str) {
+    let (root, key) = (findings.root, format!("{contact}.redistribute_mass"));
+    let scheme: Scheme = root.read("time.scheme").unwrap_or_default();
+    if root.read(&key).unwrap_or(false) && !scheme.is_implicit() {
+        let message = format!("scheme \"{}\" cannot solve for a boundary without mass", scheme.name());
+        findings.fault(
+            &key,
+            message,
+            "use [time] scheme = \"bdf2\" or \"implicit_euler\", or delete the key",
+        );
     }
 }
 
@@ -62,6 +79,17 @@ fn check_method(findings: &mut Findings<'_>, tables: &[ContactTable]) {
     if tables.is_empty() || !tables.iter().all(is_bound) {
         let message = "this method requires that every contact is frictionless and `unilateral`";
         findings.fault("solver.method", message, "use \"newton\", or delete the key");
+    }
+}
+
+/// Where boundaries meet, the bonds of a node break together: by one rule.
+fn check_strengths(findings: &mut Findings<'_>, tables: &[ContactTable]) {
+    let bonded = || tables.iter().filter_map(|table| Some((table, table.adhesion?.strength.is_some())));
+    let Some((_, first)) = bonded().next() else { return };
+    for (table, _) in bonded().filter(|(_, has_strength)| *has_strength != first) {
+        let key = format!("{}.adhesion", table.interface.path);
+        let message = "either all adhesion tables of a job have a `strength` or none has";
+        findings.fault_at_key(&key, message, "give all of them a strength, or delete the key everywhere");
     }
 }
 

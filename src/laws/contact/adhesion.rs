@@ -10,7 +10,15 @@
 //!
 //! with the outward normal `nu` of the body and the displacement `u`; the bonds form at `u = 0`. Broken bonds are not restored.
 //! Bonds store the energy `b^2 F(u)` with the potential `F` of the truncated springs. Slow separation takes the work `energy` in
-//! total, and the largest traction is then `sqrt(stiffness energy)`. (O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational
+//! total, and the largest traction is then `sqrt(stiffness energy)`. With a `strength` the bonding is instead the smallest so far of
+//! that of a bilinear cohesive law: with the separation `s`, `c_n s^2 = c_n u_nu^2 + c_t |u_tau|^2`,
+//!
+//! ```text
+//! b^2 = s_0 (s_f - s) / (s (s_f - s_0)) for s_0 < s < s_f,    s_0 = strength / c_n,    s_f = 2 energy / strength
+//! ```
+//!
+//! so that the traction `b^2 c_n s` falls linearly from `strength` to 0, follows the secant where `s` shrinks, and takes the work
+//! `energy` in total. (P. Camanho, C. Davila, M. de Moura, J. Compos. Mater. 37 (2003), 1415-1438. O. Chau, J. Fernández, M. Shillor, M. Sofonea, Variational
 //! and numerical analysis of a quasistatic viscoelastic contact problem with adhesion, J. Comput. Appl. Math. 159 (2003), 431-465;
 //! M. Raous, L. Cangémi, M. Cocou, A consistent model coupling adhesion, friction, and unilateral contact, Comput. Methods Appl.
 //! Mech. Engrg. 177 (1999), 383-399.)
@@ -38,6 +46,13 @@ pub struct Adhesion {
     /// Dupré's energy of adhesion: the energy that separates a unit of area slowly.
     #[schemars(range(min = 0), extend("unit" = "J/m^2"), example = 10.0)]
     pub energy: f64,
+    /// Largest normal traction of the bonds, as in a bilinear cohesive law: the traction grows with `stiffness` up to `strength`, then
+    /// decreases linearly, and vanishes at the opening `2 energy / strength`. Where the opening shrinks, the traction follows the
+    /// straight line to the origin. Sliding counts as the opening that stores the same energy. Requires `energy` above
+    /// `strength^2 / (2 stiffness)`; excludes `viscosity` and `length`. Absent: bonds give way as `energy` and `viscosity` determine.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 2e6)]
+    pub strength: Option<f64>,
     /// Viscosity of debonding: the larger, the slower bonds break. 0: bonds break as soon as their elastic energy suffices.
     #[serde(default)]
     #[schemars(range(min = 0), extend("unit" = "J s/m^2"), example = 0.1)]
@@ -46,6 +61,59 @@ pub struct Adhesion {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 0.01)]
     pub length: Option<f64>,
+}
+
+/// What opposes the breaking of bonds, per area or as totals of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Toughness {
+    /// Energy of adhesion, in J/m^2 or J.
+    pub energy: f64,
+    /// Viscosity of debonding, in J s/m^2 or J s.
+    pub viscosity: f64,
+    /// The driving forces at which the traction of a cohesive law begins to fall and at which it vanishes, in J/m^2 or J; both are 0
+    /// without a strength.
+    pub softening: [f64; 2],
+}
+
+impl Toughness {
+    /// Adds a share of another one.
+    pub fn add(&mut self, share: f64, other: &Self) {
+        self.energy += share * other.energy;
+        self.viscosity += share * other.viscosity;
+        self.softening = std::array::from_fn(|i| self.softening[i] + share * other.softening[i]);
+    }
+
+    /// The bonding after a step of implicit Euler of this length in s from `start`, which must not be below the value at which
+    /// debonding ends, and its derivative with respect to the driving force.
+    pub fn relax(&self, start: f64, drive: f64, length: f64) -> [f64; 2] {
+        let Self { energy, viscosity, softening: [begin, end] } = *self;
+        if end > 0.0 {
+            return soften(start, drive, begin, end);
+        }
+        if start * drive <= energy {
+            return [start, 0.0];
+        }
+        let resistance = viscosity + length * drive;
+        let bonding = ((viscosity * start + length * energy) / resistance).min(start);
+        [bonding, -length * bonding / resistance]
+    }
+}
+
+/// The bonding of a cohesive law, not above `start`, and its derivative with respect to the driving force, given the driving forces at
+/// which softening begins and ends.
+fn soften(start: f64, drive: f64, begin: f64, end: f64) -> [f64; 2] {
+    if drive <= begin {
+        return [start, 0.0];
+    }
+    if drive >= end {
+        return [0.0, 0.0];
+    }
+    let [first, now, last] = [begin, drive, end].map(f64::sqrt);
+    let bonding = (first * (last - now) / (now * (last - first))).sqrt();
+    if bonding >= start {
+        return [start, 0.0];
+    }
+    [bonding, -first * last / (4.0 * bonding * (last - first) * now * drive)]
 }
 
 impl Adhesion {
@@ -64,9 +132,18 @@ impl Adhesion {
         length.min(self.truncation_length())
     }
 
-    /// The faults of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
+    /// What opposes the breaking of bonds, per area.
+    pub fn toughness(&self) -> Toughness {
+        let square = |length: f64| self.stiffness * length * length;
+        let softening = self.strength.map_or([0.0; 2], |strength| {
+            [strength / self.stiffness, 2.0 * self.energy / strength].map(square)
+        });
+        Toughness { energy: self.energy, viscosity: self.viscosity, softening }
+    }
+
+    /// The faults of the parameters, and of tables that adhesion cannot be combined with. Bonds connect a boundary that touches from the start to an
     /// obstacle at rest. Keys are those of the table of the contact.
-    pub fn faults(interface: &Interface) -> Vec<LawFault> {
+    pub fn faults(&self, interface: &Interface) -> Vec<LawFault> {
         let help = format!("delete it, or [{}.adhesion]", interface.path);
         let gap = interface.normal.as_ref().and_then(NormalLaw::gap_key).map(|gap| {
             let message = "adhesion requires contact from the start: no gap is allowed";
@@ -77,7 +154,30 @@ impl Adhesion {
                 "adhesion requires an obstacle at rest: bonds depend on the displacement of the body only";
             LawFault::at_key("obstacle", message, format!("keep the obstacle at rest, or {help}"))
         });
-        gap.into_iter().chain(obstacle).collect()
+        gap.into_iter()
+            .chain(obstacle)
+            .chain(self.strength.and_then(|strength| self.fault_of(strength)))
+            .collect()
+    }
+
+    /// What is wrong with the other parameters, given this strength in Pa.
+    fn fault_of(&self, strength: f64) -> Option<LawFault> {
+        if self.viscosity > 0.0 || self.length.is_some() {
+            let key = if self.viscosity > 0.0 { "adhesion.viscosity" } else { "adhesion.length" };
+            let message = "bonds with a strength have no viscosity and no length";
+            return Some(LawFault::at_key(key, message, "delete it, or `strength`"));
+        }
+        let least = 0.5 * strength * strength / self.stiffness;
+        (self.energy <= least).then(|| {
+            let message = format!(
+                "bonds store {least} J/m^2 before their traction reaches the strength, and break with less"
+            );
+            LawFault::at_value(
+                "adhesion.energy",
+                message,
+                "give a larger energy or stiffness, or a smaller strength",
+            )
+        })
     }
 
     /// A warning about the parameters, if they mean that no bond ever breaks.
@@ -151,18 +251,6 @@ impl Adhesion {
             if norm(&sliding) > self.truncation_length() { 0.0 } else { 2.0 * self.tangential_stiffness() };
         add_scaled(&normal.map(|n| along * n), across, &sliding)
     }
-
-    /// The bonding after a step of implicit Euler of this length in s from `start`, which must not be below the value at which
-    /// debonding ends, and its derivative with respect to the driving force. Driving force, energy and viscosity may be per area or
-    /// totals of a node.
-    pub fn relax(start: f64, drive: f64, energy: f64, viscosity: f64, length: f64) -> [f64; 2] {
-        if start * drive <= energy {
-            return [start, 0.0];
-        }
-        let resistance = viscosity + length * drive;
-        let bonding = ((viscosity * start + length * energy) / resistance).min(start);
-        [bonding, -length * bonding / resistance]
-    }
 }
 
 #[cfg(test)]
@@ -176,6 +264,7 @@ mod tests {
         energy: 0.5,
         viscosity: 2.0,
         length: Some(0.2),
+        strength: None,
     };
     const DOWN: [f64; 2] = [0.0, -1.0];
 
@@ -196,10 +285,12 @@ mod tests {
     #[test]
     fn bonds_give_way_by_hand() {
         // Driving force 1 J/m² against 0.5: (2 + 0.25) / (2 + 0.5) after half a second.
-        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 2.0, 0.5), [0.9, -0.18]);
-        assert_eq!(Adhesion::relax(1.0, 1.0, 0.5, 0.0, 0.5), [0.5, -0.5], "without viscosity at once");
-        assert_eq!(Adhesion::relax(0.4, 1.0, 0.5, 2.0, 0.5), [0.4, 0.0], "the drive is too weak");
-        assert_eq!(Adhesion::relax(0.0, 1e9, 0.0, 2.0, 0.5)[0], 0.0);
+        let glue = GLUE.toughness();
+        assert_eq!(glue.relax(1.0, 1.0, 0.5), [0.9, -0.18]);
+        let brittle = Toughness { viscosity: 0.0, ..glue };
+        assert_eq!(brittle.relax(1.0, 1.0, 0.5), [0.5, -0.5], "without viscosity at once");
+        assert_eq!(glue.relax(0.4, 1.0, 0.5), [0.4, 0.0], "the drive is too weak");
+        assert_eq!(Toughness { energy: 0.0, ..glue }.relax(0.0, 1e9, 0.5)[0], 0.0);
     }
 
     #[test]
@@ -209,7 +300,7 @@ mod tests {
         let (steps, end) = (100_000, 5.0);
         for step in 0..steps {
             let u = [0.0, end * f64::from(step) / f64::from(steps)];
-            let [next, _] = Adhesion::relax(bonding, law.drive(&u, &DOWN), law.energy, law.viscosity, 1.0);
+            let [next, _] = law.toughness().relax(bonding, law.drive(&u, &DOWN), 1.0);
             dissipated += (bonding * bonding - next * next) * law.potential(&u, &DOWN);
             bonding = next;
             let pull = -bonding * bonding * law.traction(&u, &DOWN)[1];
@@ -221,6 +312,55 @@ mod tests {
         assert!((work / 0.5 - 1.0).abs() < 2e-3, "work {work}");
     }
 
+    /// Stiffness 100 Pa/m, strength 5 Pa: intact up to 0.05 m, broken at 0.4 m.
+    const COHESIVE: Adhesion =
+        Adhesion { energy: 1.0, viscosity: 0.0, length: None, strength: Some(5.0), ..GLUE };
+
+    /// The pull of bonds that were opened so far before, and their bonding.
+    fn pull(opened: f64, opening: f64) -> [f64; 2] {
+        let toughness = COHESIVE.toughness();
+        let bonding = [opened, opening].iter().fold(1.0, |bonding, opening| {
+            toughness.relax(bonding, COHESIVE.drive(&[0.0, *opening], &DOWN), 1.0)[0]
+        });
+        [-bonding * bonding * COHESIVE.traction(&[0.0, opening], &DOWN)[1], bonding]
+    }
+
+    #[test]
+    fn cohesive_bonds_soften_linearly_and_unload_along_the_secant() {
+        for (opened, opening, expected) in [
+            (0.0, 0.05, 5.0),
+            (0.0, 0.225, 2.5),
+            (0.0, 0.39, 5.0 / 35.0),
+            (0.225, 0.09, 1.0),
+            (0.225, 0.3, 10.0 / 7.0),
+        ] {
+            let [found, _] = pull(opened, opening);
+            assert!(
+                (found - expected).abs() < 1e-13,
+                "{opened} then {opening}: {found} instead of {expected}"
+            );
+        }
+        assert_eq!(pull(0.4, 0.1), [0.0, 0.0], "broken");
+        assert_eq!(pull(f64::INFINITY, 0.1), [0.0, 0.0], "broken");
+        let slid =
+            COHESIVE.toughness().relax(1.0, COHESIVE.drive(&[0.225 * 2.5_f64.sqrt(), 0.0], &DOWN), 1.0);
+        assert!((slid[0] - pull(0.0, 0.225)[1]).abs() < 1e-14, "sliding counts by its energy");
+    }
+
+    #[test]
+    fn cohesive_bonds_take_their_energy_and_their_slope_is_the_derivative() {
+        let (steps, end) = (100_000, 0.5);
+        let opening = |step: i32| end * f64::from(step) / f64::from(steps);
+        let work: f64 = (0..steps).map(|step| pull(0.0, opening(step))[0] * end / f64::from(steps)).sum();
+        assert!((work - 1.0).abs() < 1e-4, "{work}");
+        let toughness = COHESIVE.toughness();
+        for drive in [0.3, 1.0, 5.0, 15.9] {
+            let [up, down] = [1e-7, -1e-7].map(|h| toughness.relax(1.0, drive + h, 1.0)[0]);
+            let [_, slope] = toughness.relax(1.0, drive, 1.0);
+            assert!(((up - down) / 2e-7 - slope).abs() < 1e-5 * slope.abs(), "{drive}: {slope}");
+        }
+    }
+
     proptest! {
         #[test]
         fn bonds_only_break_and_dissipate(
@@ -229,7 +369,7 @@ mod tests {
         ) {
             let normal = [0.6, 0.0, -0.8];
             let (drive, potential) = (GLUE.drive(&u, &normal), GLUE.potential(&u, &normal));
-            let [next, _] = Adhesion::relax(bonding, drive, GLUE.energy, viscosity, length);
+            let [next, _] = Toughness { viscosity, ..GLUE.toughness() }.relax(bonding, drive, length);
             prop_assert!((0.0..=bonding).contains(&next));
             prop_assert!((bonding * bonding - next * next) * potential >= 0.0, "dissipation");
             prop_assert!(next == bonding || next * drive >= GLUE.energy * (1.0 - 1e-12), "no further than the end");

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::laws::expression::Scalar;
 
-pub use adhesion::Adhesion;
+pub use adhesion::{Adhesion, Toughness};
 pub use friction_law::{FrictionBound, Slip};
 pub use interface::Interface;
 pub use laws::*;
@@ -50,6 +50,10 @@ pub struct Contact {
     pub quadrature: Quadrature,
     /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
     pub normal: NormalLaw,
+    /// Whether the mass of these boundaries is moved to the other nodes of their cells (mass redistribution), so that impacts do not lose
+    /// its kinetic energy and the contact pressure does not oscillate. Total mass stays the same. Requires an implicit scheme.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub redistribute_mass: bool,
     /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
     /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -47,7 +47,7 @@ impl ContactTable {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
         faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(*has_obstacle)));
-        faults.extend(self.adhesion.iter().flat_map(|_| Adhesion::faults(&self.interface)));
+        faults.extend(self.adhesion.iter().flat_map(|law| law.faults(&self.interface)));
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
         if self.quadrature == Quadrature::Gauss {
             let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);

@@ -111,6 +111,7 @@ mod tests {
             part: None,
             quadrature,
             normal,
+            redistribute_mass: false,
             obstacle,
             obstacle_load: None,
             friction: None,
