@@ -281,7 +281,7 @@ fn every_key_is_described() {
     let text = describe(None).expect("described");
     for part in [
         "[[contact]]",
-        "youngs_modulus: a number; above 0; unit Pa; required",
+        "youngs_modulus: a number or an expression in t, x, y, z; above 0; unit Pa; required",
         "example: poisson_ratio = 0.4",
         "default 1e-10",
         "pressure: a number or an expression in t, x, y, z; unit Pa",

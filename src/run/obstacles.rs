@@ -38,6 +38,9 @@ pub(super) fn warnings<const D: usize, const S: usize>(
         if deepest == f64::NEG_INFINITY && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
             let remedy = match contact.gap {
                 Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
+                Gap::Shape(_) => {
+                    "reverse the sign of `distance`: it must be positive outside of the obstacle"
+                }
                 _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
             };
             out.push(format!(

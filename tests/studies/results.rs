@@ -174,6 +174,7 @@ fn studies_of_the_repository_load() {
         ("graded_corners", 8),
         ("solver_tolerance", 18),
         ("wang_cheng_honest_reference", 63),
+        ("wang_cheng_in_space", 17),
         ("wang_cheng_start_up", 4),
         ("wang_cheng_table_1", 4),
         ("wang_cheng_work_precision", 36),

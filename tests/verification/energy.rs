@@ -103,6 +103,7 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
         "springs",
         "rigid plane",
         "springy sphere",
+        "rigid shape",
     ];
     let law = laws[draw.0 as usize % laws.len()];
     let (friction, quadrature) = match law {
@@ -157,6 +158,15 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
             format!(
                 "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.sphere]\n\
                  centre = [{centre}\"{high}*t-0.5\"]\nradius = 0.5\nrotation = 4\n\
+                 {axis}"
+            )
+        }
+        "rigid shape" => {
+            let (centre, axis) = if D == 2 { ("0.5, ", "") } else { ("0.5, 0.4, ", "axis = [0, 1, 0]\n") };
+            let up = ["", "", "y", "z"][D];
+            format!(
+                "[contact.normal.unilateral]\n[contact.obstacle.shape]\ndistance = \"max(abs(x) - 0.3, {up}) - 0.1\"\n\
+                 centre = [{centre}\"{high}*t-0.11\"]\nrotation = 4\n\
                  {axis}"
             )
         }
@@ -300,7 +310,7 @@ fn balanced<const D: usize, const S: usize>(
 }
 
 /// The tables that must have occurred for each scheme.
-const MET: [&str; 24] = [
+const MET: [&str; 25] = [
     "plane_stress",
     "density",
     "viscosity",
@@ -317,6 +327,7 @@ const MET: [&str; 24] = [
     "bound = \"velocity\"",
     "obstacle.plane",
     "obstacle.sphere",
+    "obstacle.shape",
     "stiffness = ",
     "quadrature = \"gauss\"",
     "tresca",

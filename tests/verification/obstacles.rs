@@ -45,13 +45,14 @@ fn up<const D: usize>() -> &'static str {
 const UNILATERAL: &str = "[contact.normal.unilateral]\n";
 const SPRINGS: &str = "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n";
 
-fn obstacles<const D: usize>() -> [(&'static str, String); 4] {
+fn obstacles<const D: usize>() -> [(&'static str, String); 5] {
     let rising = vector::<D>("0.3", "-0.01+0.5*t");
     let lower = vector::<D>("0.3", "-0.08+t");
     let (normal, tilted) =
         if D == 2 { ("[0, 1]", "[\"0.1+t\", 1]") } else { ("[0, 0, 1]", "[\"0.1+t\", 0.1, 1]") };
     let rolling = vector::<D>("0.2+5*t", "-0.5+0.05*sin(40*t)");
     let shell = vector::<D>("0.5+t", "2+0.5*sin(40*t)");
+    let ball = if D == 2 { "sqrt(x^2 + y^2)" } else { "sqrt(x^2 + y^2 + z^2)" };
     [
         ("a plane that rises", format!("[contact.obstacle.plane]\npoint = {rising}\nnormal = {normal}\n")),
         ("a plane that turns", format!("[contact.obstacle.plane]\npoint = {lower}\nnormal = {tilted}\n")),
@@ -59,6 +60,10 @@ fn obstacles<const D: usize>() -> [(&'static str, String); 4] {
         (
             "a shell that shakes",
             format!("[contact.obstacle.sphere]\ncentre = {shell}\nradius = 2.2\nhollow = true\n"),
+        ),
+        (
+            "a ball that rolls, given by its distance",
+            format!("[contact.obstacle.shape]\ncentre = {rolling}\ndistance = \"{ball} - 0.52\"\n"),
         ),
     ]
 }
@@ -112,15 +117,17 @@ fn difference(session: &Session, one: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
     off / size
 }
 
-/// A plane, a ball and a shell give the same results as gaps defined by expressions.
+/// A plane, a ball, a shell and a shape give the same results as gaps defined by expressions.
 fn alike<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let (z, across) = (up::<D>(), if D == 2 { "" } else { "-(y-0.4)^2" });
     let half = format!("0.52^2-(x-0.2-5*t)^2{across}");
+    let ball = format!("{z}+0.5-0.05*sin(40*t)-sqrt(max({half},0))+1e9*max(sign(-({half})),0)");
     let gaps = [
         "-(-0.01+0.5*t) ".to_owned() + "+" + z,
         format!("(0.08-t+(x-0.3)*(0.1+t){}) + {z}", if D == 2 { "" } else { "+(y-0.4)*0.1" }),
-        format!("{z}+0.5-0.05*sin(40*t)-sqrt(max({half},0))+1e9*max(sign(-({half})),0)"),
+        ball.clone(),
         format!("{z}-2-0.5*sin(40*t)+sqrt(2.2^2-(x-0.5-t)^2{across})"),
+        ball,
     ];
     for ((name, obstacle), gap) in obstacles::<D>().into_iter().zip(gaps) {
         for law in [UNILATERAL, SPRINGS] {

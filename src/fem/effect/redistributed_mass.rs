@@ -156,7 +156,8 @@ mod tests {
         let mut product = vec![0.0; x.len()];
         redistributed.add_product(1.0, &x, &mut product);
         let square: f64 = product.iter().zip(&x).map(|(a, b)| a * b).sum();
-        assert!(close(redistributed.square(|at| x[at]), square) && square != 0.0);
+        let found = redistributed.square(|at| x[at]);
+        assert!(close(found, square) && square != 0.0, "{found} instead of {square}");
         let ones = vec![1.0; x.len()];
         let mass: f64 = geometry.iter().map(|cell| 1.7 * cell.volume * D as f64).sum();
         assert!(close(times_mass(&ones).iter().sum(), mass));

@@ -23,6 +23,7 @@ pub fn row<const D: usize>() -> Mesh<D> {
         nodes: (0..count + D).map(node).collect(),
         cells: (0..count).flat_map(|cell| (cell..=cell + D).map(|node| node as u32)).collect(),
         cell_regions,
+        cell_ids: (0..).take(count).collect(),
         ..Mesh::default()
     }
 }

@@ -103,9 +103,14 @@ fn check_loads(findings: &mut Findings<'_>, tables: &[ContactTable]) {
 }
 
 /// Vectors of an obstacle.
-const OBSTACLE_VECTORS: [&str; 3] = ["plane.point", "plane.normal", "sphere.centre"];
-/// Rotations of an obstacle.
-const OBSTACLE_ROTATIONS: [&str; 2] = ["plane.rotation", "sphere.rotation"];
+const OBSTACLE_VECTORS: [&str; 4] = ["plane.point", "plane.normal", "sphere.centre", "shape.centre"];
+/// Obstacles that rotate about their centre and, in space, an axis.
+const ROUND_OBSTACLES: [&str; 2] = ["sphere", "shape"];
+
+/// The paths of the rotations that an obstacle may have.
+fn rotations(obstacle: &str) -> impl Iterator<Item = String> {
+    ["plane"].into_iter().chain(ROUND_OBSTACLES).map(move |kind| format!("{obstacle}.{kind}.rotation"))
+}
 
 /// An obstacle is rigid, and its normal and axis must not be zero.
 fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
@@ -115,23 +120,33 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
         return;
     }
     let components = OBSTACLE_VECTORS.map(|vector| items(root, &format!("{obstacle}.{vector}")));
-    let rotations = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));
-    for scalar in components.into_iter().flatten().chain(rotations.clone()) {
+    for scalar in components.into_iter().flatten().chain(rotations(&obstacle)) {
         if root.read::<Scalar>(&scalar).is_some_and(|scalar| scalar.depends_on_position()) {
             let help = "use t only; `gap` in the law may depend on x, y and z";
             findings.fault(&scalar, "the motion of a rigid obstacle depends on time only", help);
         }
     }
-    for rotation in rotations {
+    for rotation in rotations(&obstacle) {
         if root.find(&rotation).is_some() && root.find(&format!("{contact}.friction")).is_none() {
             findings.warnings.push(format!(
                 "{rotation}: the rotation of an obstacle affects friction only, and this contact has no friction"
             ));
         }
     }
-    let axis = format!("{obstacle}.sphere.axis");
-    if root.read::<Vec<f64>>(&axis).is_some_and(|axis| !axis.is_empty() && axis.iter().all(|&x| x == 0.0)) {
-        findings.fault(&axis, "the axis is the zero vector", "give the direction of the axis of rotation");
+    for axis in ROUND_OBSTACLES.map(|kind| format!("{obstacle}.{kind}.axis")) {
+        let given: Option<Vec<f64>> = root.read(&axis);
+        if given.is_some_and(|axis| !axis.is_empty() && axis.iter().all(|&x| x == 0.0)) {
+            findings.fault(
+                &axis,
+                "the axis is the zero vector",
+                "give the direction of the axis of rotation",
+            );
+        }
+    }
+    let distance = format!("{obstacle}.shape.distance");
+    if root.read::<Scalar>(&distance).is_some_and(|distance| distance.depends_on_time()) {
+        let help = "use x, y and z only; a shape moves by its `centre`";
+        findings.fault(&distance, "the shape of a rigid obstacle does not depend on t", help);
     }
     let normal: Option<Vec<f64>> = root.read(&format!("{obstacle}.plane.normal"));
     if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
@@ -151,40 +166,37 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
             check_vector(findings, &format!("{contact}.obstacle.{vector}"), mesh.dimension);
         }
         check_vector(findings, &format!("{contact}.obstacle_load.direction"), mesh.dimension);
+        check_flat(findings, &format!("{contact}.obstacle.shape.distance"), mesh.dimension);
         check_rotation(findings, &format!("{contact}.obstacle"), mesh.dimension);
     }
 }
 
-/// In 2D a disc rotates about its centre, and a line does not rotate; in 3D a sphere needs an axis.
+/// In 2D a disc or shape rotates about its centre, and a line does not rotate; in 3D a sphere or shape needs an axis.
 fn check_rotation(findings: &mut Findings<'_>, obstacle: &str, dimension: usize) {
     let root = findings.root;
-    let [plane, sphere] = OBSTACLE_ROTATIONS.map(|rotation| format!("{obstacle}.{rotation}"));
-    let axis = format!("{obstacle}.sphere.axis");
     let has = |key: &str| root.find(key).is_some();
-    if dimension == 2 {
-        if has(&plane) {
-            let help = "delete it; for a belt, let `point` move along the line; for a tilting line, let `normal` depend on t";
-            findings.fault(&plane, "in 2D a plane cannot rotate about its normal", help);
+    let plane = format!("{obstacle}.plane.rotation");
+    if dimension == 2 && has(&plane) {
+        let help = "delete it; for a belt, let `point` move along the line; for a tilting line, let `normal` depend on t";
+        findings.fault(&plane, "in 2D a plane cannot rotate about its normal", help);
+    }
+    for kind in ROUND_OBSTACLES {
+        let [rotation, axis] = ["rotation", "axis"].map(|key| format!("{obstacle}.{kind}.{key}"));
+        if dimension == 2 && has(&axis) {
+            let message = format!("in 2D a {kind} has no axis: it rotates about its centre");
+            findings.fault(&axis, message, "delete the axis");
         }
-        if has(&axis) {
-            findings.fault(
-                &axis,
-                "in 2D a sphere has no axis: it rotates about its centre",
-                "delete the axis",
-            );
+        if dimension == 2 {
+            continue;
         }
-        return;
+        if has(&rotation) && !has(&axis) {
+            let help = "add `axis = [x, y, z]`, the direction of the axis of rotation";
+            findings.fault(&rotation, "in 3D a rotation needs an axis", help);
+        }
+        if has(&axis) && !has(&rotation) {
+            let help = "add `rotation`, or delete the axis";
+            findings.fault(&axis, "an axis without `rotation` has no effect", help);
+        }
+        check_vector(findings, &axis, dimension);
     }
-    if has(&sphere) && !has(&axis) {
-        let help = "add `axis = [x, y, z]`, the direction of the axis of rotation";
-        findings.fault(&sphere, "in 3D a rotation needs an axis", help);
-    }
-    if has(&axis) && !has(&sphere) {
-        findings.fault(
-            &axis,
-            "an axis without `rotation` has no effect",
-            "add `rotation`, or delete the axis",
-        );
-    }
-    check_vector(findings, &axis, dimension);
 }

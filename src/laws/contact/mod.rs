@@ -13,6 +13,7 @@ mod normal_law;
 mod obstacle;
 mod obstacle_load;
 mod obstacle_motion;
+mod obstacle_shape;
 mod polyline;
 mod table;
 
@@ -30,6 +31,7 @@ pub use normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response};
 pub use obstacle::{Gap, Plane, Sphere};
 pub use obstacle_load::ObstacleLoad;
 pub use obstacle_motion::{ObstacleMotion, Rate};
+pub use obstacle_shape::Shape;
 pub use polyline::Polyline;
 pub use table::{ContactTable, Quadrature};
 

@@ -10,9 +10,12 @@
 //! hollow   -d . n + sqrt((d . n)^2 - |d|^2 + radius^2)
 //! ```
 //!
+//! That of a shape is the length of the ray to its surface, see [`Shape`].
+//!
 //! The gap is negative where the point is inside the obstacle, and infinite where the ray along the normal does not meet the
 //! obstacle, so that there is no contact.
 
+use super::obstacle_shape::{Shape, vector};
 use crate::{
     error::{Error, Result},
     laws::expression::Scalar,
@@ -38,6 +41,8 @@ pub enum Gap {
     Plane(Plane),
     /// A sphere, in 2D a disc.
     Sphere(Sphere),
+    /// Any shape, given by the distance from its surface, such as a cylinder, a cone or a punch with round edges.
+    Shape(Shape),
 }
 
 /// A plane that bounds an obstacle.
@@ -82,16 +87,6 @@ pub struct Sphere {
     pub axis: Option<Vec<f64>>,
 }
 
-impl Sphere {
-    /// The axis of rotation; in the plane it is always z.
-    pub(super) fn axis(&self) -> Vector<3> {
-        match self.axis.as_deref() {
-            None | Some([]) => [0.0, 0.0, 1.0],
-            Some(axis) => std::array::from_fn(|i| axis.get(i).copied().unwrap_or(0.0)),
-        }
-    }
-}
-
 impl Default for Gap {
     fn default() -> Self {
         Self::Distance(Scalar::default())
@@ -112,6 +107,10 @@ impl Gap {
                 "the plane's normal vanishes or a component is not finite: correct [contact.obstacle.plane]"
             }
             Self::Sphere(_) => "a component of the centre is not finite: correct [contact.obstacle.sphere]",
+            Self::Shape(_) => {
+                "`distance` or `centre` is not finite, or `distance` changes by more than the way between two places, which \
+                 no distance does: correct [contact.obstacle.shape]"
+            }
         };
         Err(Error::Failed(format!(
             "contact: the gap is {gap} at t = {time} s, position {place:?} m; {cause}"
@@ -123,7 +122,9 @@ impl Gap {
         match self {
             Self::Distance(gap) => vec![std::slice::from_ref(gap)],
             Self::Plane(Plane { point, normal, rotation }) => vec![point, normal, rotation.as_slice()],
-            Self::Sphere(Sphere { centre, rotation, .. }) => vec![centre, rotation.as_slice()],
+            Self::Sphere(Sphere { centre, rotation, .. }) | Self::Shape(Shape { centre, rotation, .. }) => {
+                vec![centre, rotation.as_slice()]
+            }
         }
     }
 
@@ -139,6 +140,7 @@ impl Gap {
                 let away = norm(&add_scaled(place, -1.0, &vector::<D>(centre, time)));
                 Some(if *hollow { away - radius } else { radius - away })
             }
+            Self::Shape(shape) => Some(-shape.distance_at(&shape.offset(time, place))),
         }
     }
 
@@ -158,12 +160,9 @@ impl Gap {
                 let offset: Vector<D> = std::array::from_fn(|i| place[i] - centre[i]);
                 to_sphere(&offset, normal, *radius, *hollow)
             }
+            Self::Shape(shape) => shape.along(&shape.offset(time, place), normal),
         }
     }
-}
-
-pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
-    std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
 }
 
 fn to_sphere<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, radius: f64, hollow: bool) -> f64 {
@@ -202,6 +201,10 @@ pub(super) mod tests {
 
     fn sphere(centre: Vec<Scalar>, radius: f64, hollow: bool) -> Gap {
         Gap::Sphere(Sphere { centre, radius, hollow, rotation: None, axis: None })
+    }
+
+    fn shape(distance: &str, centre: Vec<Scalar>) -> Gap {
+        Gap::Shape(Shape { distance: expression(distance), centre, rotation: None, axis: None })
     }
 
     fn floor(height: f64) -> Gap {
@@ -261,6 +264,19 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_disc_given_by_its_distance_is_a_disc() {
+        let moves = || vec![expression("0.5*t"), Scalar::Number(-3.0)];
+        let (disc, given) = (sphere(moves(), 2.0, false), shape("sqrt(x^2 + y^2) - 2", moves()));
+        assert_eq!(given.expressions(), disc.expressions());
+        for place in [[0.0, 0.0], [0.7, 0.0], [2.4, 0.0], [2.6, 0.0], [0.5, -1.5]] {
+            let [a, b] = [&disc, &given].map(|gap| gap.at(1.0, &place, &DOWN).unwrap());
+            assert!(a == b || (a - b).abs() < 1e-14, "{place:?}: {a} and {b}");
+            let [a, b] = [&disc, &given].map(|gap| gap.depth(1.0, &place).unwrap());
+            assert!((a - b).abs() < 1e-15, "{place:?}: {a} and {b}");
+        }
+    }
+
+    #[test]
     fn depths_are_distances_to_the_surface_from_inside() {
         let depths = |place| {
             [floor(-0.5), disc([1.0, 0.0], false), disc([1.0, 0.0], true)].map(|gap| gap.depth(0.0, &place))
@@ -279,6 +295,8 @@ pub(super) mod tests {
             plane(vec![Scalar::default(), expression("sqrt(t - 2)")], numbers(&[0.0, 1.0])),
             plane(vec![Scalar::default(), expression("1/(t - 1)")], numbers(&[0.0, -1.0])),
             sphere(vec![expression("sqrt(0.5 - t)")], 1.0, false),
+            shape("x^2 + (y + 3)^2 - 1", vec![]),
+            shape("y", vec![expression("sqrt(0.5 - t)")]),
         ];
         for gap in bad {
             let error = gap.at(1.0, &[0.25, 0.0], &DOWN).unwrap_err().to_string();

@@ -1,10 +1,10 @@
 //! The velocity of the material of an obstacle, relative to which friction acts.
 //!
-//! An obstacle is a rigid body. With the point `x` of a plane or the centre `x` of a sphere, and a point `y` of its surface, the
+//! An obstacle is a rigid body. With the point `x` of a plane or the centre `x` of a sphere or shape, and a point `y` of its surface, the
 //! velocity of its material at `y` is
 //!
 //! ```text
-//! w = x' + omega x (y - x),    omega = rotation axis          of a sphere; in 2D the axis is z
+//! w = x' + omega x (y - x),    omega = rotation axis          of a sphere or shape; in 2D the axis is z
 //!                              omega = rotation m + m x m'    of a plane with the unit normal m
 //! ```
 //!
@@ -13,7 +13,10 @@
 //! velocities from displacements: in a step of implicit Euler, `x' = (x_n - x_{n-1}) / k`, so that a sticking point moves exactly
 //! as far as the obstacle. All other quantities are those at the end of the step, as is the gap.
 
-use super::obstacle::{Gap, Plane, Sphere, vector};
+use super::{
+    obstacle::{Gap, Plane, Sphere},
+    obstacle_shape::{Shape, vector},
+};
 use crate::{
     error::{Error, Result},
     laws::expression::Scalar,
@@ -80,7 +83,9 @@ impl Gap {
             Self::Plane(Plane { point, normal, rotation }) => {
                 moves(point) || moves(normal) || turns(rotation)
             }
-            Self::Sphere(Sphere { centre, rotation, .. }) => moves(centre) || turns(rotation),
+            Self::Sphere(Sphere { centre, rotation, .. }) | Self::Shape(Shape { centre, rotation, .. }) => {
+                moves(centre) || turns(rotation)
+            }
         }
     }
 
@@ -127,9 +132,10 @@ impl Gap {
                     angular_velocity: add_scaled(&tilt, rotation, &facing),
                 }
             }
-            Self::Sphere(sphere) => {
-                let (centre, axis, rotation) =
-                    (&sphere.centre, sphere.axis(), rotation_rate(&sphere.rotation));
+            Self::Sphere(Sphere { centre, rotation, axis, .. })
+            | Self::Shape(Shape { centre, rotation, axis, .. }) => {
+                let rotation = rotation_rate(rotation);
+                let axis = axis_of(axis.as_deref().unwrap_or_default());
                 let angular_velocity =
                     if rotation == 0.0 { [0.0; 3] } else { axis.map(|x| rotation * x / norm(&axis)) };
                 ObstacleMotion {
@@ -146,6 +152,14 @@ impl Gap {
             "contact: the obstacle moves at {:?} m/s and turns at {:?} rad/s at t = {time} s; correct [contact.obstacle]",
             motion.velocity, motion.angular_velocity
         )))
+    }
+}
+
+/// An axis of rotation; in the plane, where none is given, z.
+fn axis_of(given: &[f64]) -> Vector<3> {
+    match given {
+        [] => [0.0, 0.0, 1.0],
+        _ => std::array::from_fn(|i| given.get(i).copied().unwrap_or(0.0)),
     }
 }
 
@@ -238,6 +252,22 @@ mod tests {
             [ball.velocity_at(&[1.0, 7.0, 0.0]), ball.velocity_at(&[1.0, 7.0, 1.0])],
             [[0.0; 3], [4.0, 0.0, 0.0]]
         );
+    }
+
+    #[test]
+    fn a_cylinder_given_by_its_distance_rolls() {
+        let cylinder = Gap::Shape(Shape {
+            distance: expression("sqrt(x^2 + z^2) - 0.5"),
+            centre: vec![expression("2*t"), Scalar::Number(0.0), Scalar::Number(0.5)],
+            rotation: Some(Scalar::Number(4.0)),
+            axis: Some(vec![0.0, 1.0, 0.0]),
+        });
+        assert!(cylinder.surface_may_move());
+        let motion = cylinder.motion::<3>(STEP).unwrap();
+        // A body above it, at its highest line: the surface moves at twice the velocity of the axis.
+        let (above, down) = ([1.0, 7.0, 1.25], [0.0, 0.0, -1.0]);
+        let found = cylinder.velocity_along(&motion, STEP.time, &above, &down).unwrap();
+        assert_eq!(found, [4.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -1,0 +1,197 @@
+//! An obstacle given by the distance of a place from its surface.
+//!
+//! The distance `f` is positive outside of the obstacle and negative inside, and changes by at most the way between two places. Along
+//! the ray from a place outside, the obstacle is therefore at least `f` away: the search goes on by this length until the surface is
+//! near, and its last part is halved (Hart, Sphere tracing, The Visual Computer 12, 1996). From a place inside, the search goes back.
+
+use crate::{
+    laws::expression::Scalar,
+    linear_algebra::tensor::{Vector, add_scaled, larger},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An obstacle of any shape, given by the distance from its surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Shape {
+    /// The distance from the surface, positive outside of the obstacle and negative inside, as an expression in x, y, z relative to
+    /// `centre`. It may be less than the distance, not more: between two places it changes by at most the way between them, as do
+    /// distances and their `min` (union) and `max` (intersection).
+    #[schemars(extend("unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
+    pub distance: Scalar,
+    /// The place of the origin of the expression, one component per axis: numbers, or expressions in t. Absent: the origin.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, 0.0, "-1.01 + 0.1*t"]))]
+    pub centre: Vec<Scalar>,
+    /// Angular velocity of the rotation about the centre, counterclockwise; in 3D about `axis`, as seen against its direction: a
+    /// number, or an expression in t. It affects friction only: the shape itself does not turn, and should be round about the axis.
+    /// Absent: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
+    pub rotation: Option<Scalar>,
+    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` in 3D, not allowed in 2D.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = [0.0, 1.0, 0.0])]
+    pub axis: Option<Vec<f64>>,
+}
+
+/// Below this share of the first distance, the surface is near.
+const NEAR: f64 = 1e-3;
+/// The longest step near the surface, as a multiple of the distance.
+const FASTEST: f64 = 20.0;
+/// By how much more than the way a distance may change, relative to the way and to the coordinates: rounding.
+const ROUNDING: [f64; 2] = [1e-9, 1e-13];
+/// A distance of this share of the coordinates is rounding.
+const ZERO: f64 = 1e-15;
+/// A ray that is this multiple of its first distance long does not meet the obstacle.
+const FARTHEST: f64 = 1e6;
+/// The most steps of a search; a ray at less than half a degree to the surface takes more.
+const MOST_STEPS: usize = 1000;
+
+impl Shape {
+    /// The place relative to the centre at `time`.
+    pub(super) fn offset<const D: usize>(&self, time: f64, place: &Vector<D>) -> Vector<D> {
+        add_scaled(place, -1.0, &vector(&self.centre, time))
+    }
+
+    /// The distance in m at a place relative to the centre.
+    pub(super) fn distance_at<const D: usize>(&self, offset: &Vector<D>) -> f64 {
+        self.distance.evaluate(0.0, offset)
+    }
+
+    /// The length in m of the ray from a place relative to the centre, along the unit normal, to the surface; negative from inside.
+    /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there.
+    pub(super) fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
+        let first = self.distance_at(offset);
+        let size = offset.iter().fold(0.0, |most, x| larger(most, x.abs()));
+        if first.abs() <= ZERO * size {
+            return first;
+        }
+        // From inside, the search goes the other way, through distances of the other sign.
+        let side = first.signum();
+        let at = |length: f64| side * self.distance_at(&add_scaled(offset, side * length, normal));
+        let (mut here, mut value, mut step) = (0.0, first.abs(), first.abs());
+        for _ in 0..MOST_STEPS {
+            let next = here + step;
+            let there = at(next);
+            let most = step * (1.0 + ROUNDING[0]) + ROUNDING[1] * (size + next);
+            let is_distance = (there - value).abs() <= most;
+            if !is_distance {
+                return f64::NAN;
+            }
+            if there <= 0.0 {
+                return side * zero_between(at, here, next);
+            }
+            if next > FARTHEST * first.abs() {
+                break;
+            }
+            if there <= ZERO * size {
+                return side * next;
+            }
+            let slope = (there - value) / step;
+            (here, value) = (next, there);
+            // Near the surface, beyond it.
+            let is_near = value < NEAR * first.abs() && slope < 0.0;
+            step = value * if is_near { (2.0 / -slope).min(FASTEST) } else { 1.0 };
+        }
+        f64::INFINITY
+    }
+}
+
+/// The numbers of components at `time`.
+pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector<D> {
+    std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
+}
+
+/// The zero of a function that is positive at the first and not at the second place, to all digits.
+fn zero_between(function: impl Fn(f64) -> f64, mut positive: f64, mut other: f64) -> f64 {
+    loop {
+        let middle = 0.5 * (positive + other);
+        if middle <= positive || middle >= other {
+            return other;
+        }
+        if function(middle) > 0.0 {
+            positive = middle;
+        } else {
+            other = middle;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::expression::Expression;
+    use proptest::prelude::*;
+
+    fn shape(distance: &str) -> Shape {
+        let distance = Scalar::Expression(Expression::parse(distance).expect("an expression"));
+        Shape { distance, centre: Vec::new(), rotation: None, axis: None }
+    }
+
+    const DOWN: Vector<2> = [0.0, -1.0];
+
+    #[test]
+    fn rays_meet_the_surface_they_reach_first() {
+        let two = shape("min(y + 2, sqrt((x - 1)^2 + (y + 1)^2) - 0.5)");
+        let reach = |x: f64, y: f64| two.along(&[x, y], &DOWN);
+        assert!((reach(0.0, 1.0) - 3.0).abs() < 1e-15, "{}", reach(0.0, 1.0));
+        assert!((reach(1.0, 1.0) - 1.5).abs() < 1e-15, "{}", reach(1.0, 1.0));
+        // Past the disc, at a hundredth of its radius.
+        assert!((reach(0.495, 1.0) - 3.0).abs() < 1e-14, "{}", reach(0.495, 1.0));
+        assert_eq!(two.along(&[0.0, 1.0], &[0.0, 1.0]), f64::INFINITY);
+        assert_eq!(two.along(&[-3.0, 1.0], &[-1.0, 0.0]), f64::INFINITY, "parallel");
+        assert!((reach(0.0, -2.25) + 0.25).abs() < 1e-15, "inside");
+        assert_eq!(reach(0.0, -2.0), 0.0, "touching");
+    }
+
+    #[test]
+    fn a_slanted_ray_is_as_long_as_its_slope_says() {
+        let floor = shape("y");
+        for degrees in [0.0f64, 30.0, 60.0, 85.0, 89.0] {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let found = floor.along(&[3.0, 0.25], &[sine, -cosine]);
+            assert!((found * cosine / 0.25 - 1.0).abs() < 1e-13, "{degrees}: {found}");
+            let inside = floor.along(&[3.0, -0.25], &[sine, -cosine]);
+            assert!((inside * cosine / 0.25 + 1.0).abs() < 1e-13, "{degrees}: {inside}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_distance_has_no_gap() {
+        assert!(shape("x^2 + (y + 3)^2 - 1").along(&[0.0, 0.0], &DOWN).is_nan(), "a square");
+        assert!(shape("10*y").along(&[0.0, 1.0], &DOWN).is_nan());
+        assert!(shape("sqrt(x - 1)").along(&[0.0, 1.0], &DOWN).is_nan());
+        assert!(shape("-1/0").along(&[0.0, 1.0], &DOWN).is_nan());
+        assert!((shape("0.1*y").along(&[0.0, 1.0], &DOWN) - 1.0).abs() < 1e-14, "less than the distance");
+    }
+
+    proptest! {
+        #[test]
+        fn the_end_of_the_ray_is_the_first_zero(
+            place in prop::array::uniform3(-3.0f64..3.0), direction in prop::array::uniform3(-1.0f64..1.0),
+        ) {
+            let length = crate::linear_algebra::tensor::norm(&direction);
+            prop_assume!(length > 0.1);
+            let normal = direction.map(|x| x / length);
+            // A box with rounded edges, cut by a plane.
+            let body = shape(
+                "max(sqrt(max(abs(x) - 1, 0)^2 + max(abs(y) - 0.5, 0)^2 + max(abs(z) - 0.7, 0)^2) - 0.2, 0.6*x + 0.8*y - 0.3)",
+            );
+            let first = body.distance_at(&place);
+            let reach = body.along(&place, &normal);
+            prop_assert!(!reach.is_nan());
+            let at = |t: f64| body.distance_at(&add_scaled(&place, t, &normal));
+            if reach.is_finite() {
+                prop_assert!(at(reach).abs() < 1e-12, "{}", at(reach));
+                prop_assert_eq!(reach < 0.0, first < 0.0);
+            }
+            let end = if reach.is_finite() { reach } else { 10.0 };
+            for k in 1..50 {
+                let value = at(end * f64::from(k) / 50.0 * (1.0 - 1e-9));
+                prop_assert!(first * value >= -1e-12, "{value} before the end");
+            }
+        }
+    }
+}
