@@ -13,7 +13,7 @@ use crate::{
         agreement::Agreed,
         session::{Mpi, Session},
     },
-    postprocessing::{report, study},
+    postprocessing::{remesh, report, study},
     run::{self, Clock, Start},
 };
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -40,8 +40,8 @@ Examples:
 Exit codes: 0 done, 1 the run failed, 2 job or command line refused, 3 stopped with a checkpoint, 4 internal fault";
 
 /// Names of the commands, for suggestions.
-const COMMANDS: [&str; 9] =
-    ["run", "check", "describe", "inspect", "partition", "study", "report", "completion", "man"];
+const COMMANDS: [&str; 10] =
+    ["run", "check", "describe", "inspect", "partition", "study", "report", "remesh", "completion", "man"];
 
 /// Dynamic contact of viscoplastic bodies with nonmonotone boundary laws.
 #[derive(Debug, Parser)]
@@ -130,6 +130,18 @@ enum Command {
         #[arg(long)]
         contours: bool,
     },
+    /// Write the cell sizes with which the stress of a run would have a wanted error, for `gmsh -bgm`. The run needs `[output]
+    /// error_indicator = true`.
+    Remesh {
+        /// Output folder of the run.
+        folder: PathBuf,
+        /// The wanted error of the stress, relative to its norm.
+        #[arg(long, value_name = "SHARE")]
+        error: f64,
+        /// The file to write.
+        #[arg(short = 'o', value_name = "FILE.pos")]
+        output: PathBuf,
+    },
     /// Print a script with which a shell completes commands, options and files.
     Completion {
         /// The shell.
@@ -205,6 +217,7 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Report { folder, other, cells, contours }) => {
             report_on(&folder, other.as_deref(), report::Options { per_cell: cells, contours })
         }
+        Some(Command::Remesh { folder, error, output }) => write_sizes(&folder, error, &output),
         Some(Command::Completion { shell }) => completion(shell),
         Some(Command::Man { folder }) => manual(&folder),
         None => match &cli.run {
@@ -364,6 +377,25 @@ fn report_on(folder: &Path, other: Option<&Path>, options: report::Options) -> R
             let _ = writeln!(std::io::stderr(), "missing: {}", missing.trim_end());
         }
         print(&format!("{} with {} pictures", made.page.display(), made.pictures));
+        Ok(Exit::Done)
+    })
+}
+
+/// Writes the sizes for a better mesh, on one process.
+fn write_sizes(folder: &Path, error: f64, output: &Path) -> Result<Exit> {
+    on_one_process(|| {
+        let made = remesh::remesh(folder, error, output)?;
+        print(&format!(
+            "{}: sizes from {:.3e} to {:.3e} m; about {:.0} cells instead of {} for an error of {:.2} % instead of {:.2} %; \
+             use them with gmsh GEOMETRY.geo -bgm {0}, where Mesh.MeshSizeExtendFromBoundary = 0",
+            output.display(),
+            made.sizes[0],
+            made.sizes[1],
+            made.new_cells,
+            made.cells,
+            100.0 * error,
+            100.0 * made.error
+        ));
         Ok(Exit::Done)
     })
 }

@@ -382,6 +382,19 @@ impl<const D: usize, const S: usize> Body<D, S> {
         Ok(out)
     }
 
+    /// Total stress in Pa after a committed step at the points of each cell, one cell after another.
+    pub fn stress_at_points(&self, state: &State) -> Result<Vec<Mandel<S>>> {
+        let points = self.geometry.points();
+        let mut out = vec![[0.0; S]; self.geometry.point_count()];
+        self.visit_stress(state, |batch| {
+            for lane in 0..batch.count {
+                let stress = &mut out[(batch.first_cell + lane) * points + batch.point];
+                *stress = std::array::from_fn(|c| batch.stress.0[c][lane]);
+            }
+        })?;
+        Ok(out)
+    }
+
     /// Visits the batches with the total stress in Pa after a committed step, unless nothing adds to it.
     pub fn visit_stress(&self, state: &State, mut visit: impl FnMut(&Batch<D, S>)) -> Result<()> {
         let Some(needs) = self.needs(|p| p.stress) else { return Ok(()) };

@@ -1,5 +1,6 @@
-//! Studies of accuracy against cost, reports, and their pictures.
+//! Studies of accuracy against cost, reports and their pictures, sizes for better meshes.
 
 pub mod drawing;
+pub mod remesh;
 pub mod study;
 pub mod report;

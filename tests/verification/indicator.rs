@@ -2,9 +2,11 @@
 //! against the true error of a manufactured solution.
 
 use crate::manufactured::{self, VISCOSITY, elasticity, motion, rule};
+use crate::quadratic::of_second_order;
 use crate::run_on;
 use crate::scenes::{brick, crossed, noise, simulation, stir};
 use clarke::{
+    fem::space::cell_rule,
     io::output::error_indicator::{ErrorIndicator, Indicated},
     linear_algebra::tensor::{Mandel, symmetric_part},
     mesh::{
@@ -176,19 +178,51 @@ pub fn sums(session: &Session) {
     if session.ranks() < 3 {
         two_cells(session);
     }
+    linear_stress::<2, 3>(session, &stir(crossed([5, 4]), 0.03), plane);
+    linear_stress::<3, 6>(session, &brick([4, 3, 3]), "");
     noisy::<2, 3>(session, &with_core(stir(crossed([6, 5]), 0.03)), plane);
     noisy::<2, 4>(session, &crossed([6, 5]), strain);
     noisy::<3, 6>(session, &with_core(brick([4, 4, 3])), "");
 }
 
+/// A stress that is linear in place: quadratic cells have no error; one point of one cell that is off has, in this cell and around.
+fn linear_stress<const D: usize, const S: usize>(session: &Session, whole: &GlobalMesh<D>, hypothesis: &str) {
+    let material =
+        format!("elasticity = {{ youngs_modulus = {MODULUS}, poisson_ratio = {RATIO} }}\n{hypothesis}");
+    let job = format!(
+        "[time]\nend = 1\nstep = 1\nscheme = \"implicit_euler\"\n[material]\ndensity = 1\n{material}"
+    );
+    let run = simulation::<D, S>(session, &of_second_order(&job), whole);
+    let mesh = &run.body.mesh;
+    let mut stress = Vec::new();
+    for cell in 0..mesh.cell_count() {
+        let corners: Vec<_> = mesh.cell(cell).iter().map(|&node| mesh.nodes[node as usize]).collect();
+        for (place, _) in cell_rule::<D>() {
+            let x: [f64; D] = std::array::from_fn(|i| (0..=D).map(|a| place[a] * corners[a][i]).sum());
+            let slope = |c: usize| 2.0 + c as f64 - 3.0 * x[0] + (c as f64 - 1.0) * x[D - 1];
+            stress.push(std::array::from_fn(slope));
+        }
+    }
+    let found = indicated(session, &run, &stress);
+    assert!(found.relative < 1e-14 && found.total < 1e-14, "{} {}", found.total, found.relative);
+    if let Some(first) = mesh.cell_ids.iter().position(|&id| id == 0) {
+        stress[first * (D + 1) + 1][0] += 1.0;
+    }
+    let off = indicated(session, &run, &stress);
+    let largest = session.largest([off.cells.iter().fold(0.0, |most, eta| eta.max(most))])[0];
+    assert!(off.total > 1e-3 && largest < off.total && off.cells.contains(&0.0), "{} {largest}", off.total);
+}
+
 /// Ratio of the indicated to the true error of the stress at the end, in the elastic energy norm.
-fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
+fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize, order: usize) -> f64 {
     let end = 0.25;
-    let job = manufactured::job::<2>("plane_stress", "nodal", "", end, end / (2 * n) as f64);
+    let steps = if order == 1 { 2 * n } else { n * n };
+    let job = manufactured::job::<2>("plane_stress", "nodal", "", end, end / steps as f64);
     let job = job.replacen("[time]", "[time]\nscheme = \"bdf2\"", 1);
+    let job = if order == 1 { job } else { of_second_order(&job) };
     let mut run = simulation::<2, 3>(session, &job, whole);
     while run.advance(session).expect("step").is_some() {}
-    let stress = run.body.stress(&run.state).expect("stress");
+    let stress = run.body.stress_at_points(&run.state).expect("stress");
     let found = indicated(session, &run, &stress);
 
     let (field, elastic) = (motion::<2>(), elasticity("plane_stress"));
@@ -213,7 +247,14 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
             let x = std::array::from_fn(|i| {
                 first * corners[0][i] + place[0] * corners[1][i] + place[1] * corners[2][i]
             });
-            let apart: Mandel<3> = std::array::from_fn(|c| exact(&x)[c] - stress[number][c]);
+            let own: Mandel<3> = if order == 1 {
+                stress[number]
+            } else {
+                // The linear function that has these stresses where a coordinate is 2/3 and the others 1/6.
+                let share = [first, place[0], place[1]].map(|share| 2.0 * share - 1.0 / 3.0);
+                std::array::from_fn(|c| (0..3).map(|p| share[p] * stress[3 * number + p][c]).sum())
+            };
+            let apart: Mandel<3> = std::array::from_fn(|c| exact(&x)[c] - own[c]);
             square += 2.0 * weight * cell.volume * compliance.inverse_square(&apart);
         }
     }
@@ -223,13 +264,17 @@ fn effectivity(session: &Session, whole: &GlobalMesh<2>, n: usize) -> f64 {
 /// On a regular mesh the means are of higher order than the stresses, except in cells at the surface.
 pub fn effectivity_tends_to_one(session: &Session) {
     let regular = |n: usize| rectangle([1.0, 1.0], [n, n], Diagonal::Right, [1.0; 2]).expect("mesh");
-    let indices = [6, 12, 24].map(|n| effectivity(session, &regular(n), n));
+    let indices = [6, 12, 24].map(|n| effectivity(session, &regular(n), n, 1));
     println!("effectivity on regular meshes: {indices:.4?}");
     let off = indices.map(|index| (index - 1.0).abs());
     assert!(off[2] < 0.75 * off[1] && off[1] < off[0] && off[0] < 0.05 && off[2] < 0.02, "{indices:?}");
-    let askew = effectivity(session, &stir(regular(12), 0.2 / 12.0), 12);
+    let askew = effectivity(session, &stir(regular(12), 0.2 / 12.0), 12, 1);
     println!("effectivity on a mesh whose nodes were moved by up to a fifth of a cell: {askew:.4}");
     assert!((0.95..1.05).contains(&askew), "{askew}");
+
+    let quadratic = [6, 12].map(|n| effectivity(session, &stir(regular(n), 0.1 / n as f64), n, 2));
+    println!("effectivity of quadratic cells: {quadratic:.4?}");
+    assert!(quadratic.iter().all(|index| (0.7..1.3).contains(index)), "{quadratic:?}");
 }
 
 #[test]

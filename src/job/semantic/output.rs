@@ -24,10 +24,6 @@ fn check_indicator(findings: &mut Findings<'_>) {
     if root.read("output.error_indicator") != Some(true) {
         return;
     }
-    if root.read("mesh.order") == Some(2) {
-        let help = "delete error_indicator, or set order = 1 in [mesh] to estimate the error of linear cells";
-        findings.fault("output.error_indicator", "the error indicator is for linear cells", help);
-    }
     let of_region = |region: String| format!("{region}.material");
     let materials =
         std::iter::once("material".to_owned()).chain(items(root, "region").into_iter().map(of_region));
