@@ -102,8 +102,7 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
         "one way",
         "springs",
         "rigid plane",
-        "springy sphere",
-        "rigid shape",
+        "springy sphere or shape",
     ];
     let law = laws[draw.0 as usize % laws.len()];
     let (friction, quadrature) = match law {
@@ -153,20 +152,16 @@ fn contact<const D: usize>(draw: &mut Draw) -> String {
                  {turn}"
             )
         }
-        "springy sphere" => {
+        "springy sphere or shape" => {
             let (centre, axis) = if D == 2 { ("0.5, ", "") } else { ("0.5, 0.4, ", "axis = [0, 1, 0.5]\n") };
+            let (kind, surface) = if first < 0.055 {
+                ("sphere", "radius = 0.5".to_owned())
+            } else {
+                ("shape", format!("distance = \"max(abs(x) - 0.3, {}) - 0.5\"", ["", "", "y", "z"][D]))
+            };
             format!(
-                "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.sphere]\n\
-                 centre = [{centre}\"{high}*t-0.5\"]\nradius = 0.5\nrotation = 4\n\
-                 {axis}"
-            )
-        }
-        "rigid shape" => {
-            let (centre, axis) = if D == 2 { ("0.5, ", "") } else { ("0.5, 0.4, ", "axis = [0, 1, 0]\n") };
-            let up = ["", "", "y", "z"][D];
-            format!(
-                "[contact.normal.unilateral]\n[contact.obstacle.shape]\ndistance = \"max(abs(x) - 0.3, {up}) - 0.1\"\n\
-                 centre = [{centre}\"{high}*t-0.11\"]\nrotation = 4\n\
+                "[contact.normal.compliance]\nstiffness = 300\nexponent = 1.5\n[contact.obstacle.{kind}]\n{surface}\n\
+                 centre = [{centre}\"{high}*t-0.5\"]\nrotation = 4\n\
                  {axis}"
             )
         }
