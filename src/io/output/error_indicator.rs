@@ -1,15 +1,18 @@
 //! An indicator of the discretisation error of the stress in each cell, which shows where the mesh is too coarse.
 //!
-//! After O. C. Zienkiewicz and J. Z. Zhu, International Journal for Numerical Methods in Engineering 24 (1987) 337-357. At
-//! each node the stresses of the cells around it are averaged, weighted by their volume; in a cell the means are interpolated by the
-//! functions of its nodes. That field is nearer to the true stress than the one of the cell, and stands for it:
+//! After O. C. Zienkiewicz and J. Z. Zhu, International Journal for Numerical Methods in Engineering 24 (1987) 337-357 and 33 (1992)
+//! 1331-1364. Around each corner of cells, the stress at the points of its cells is approximated by a polynomial `P_a`, by least squares
+//! weighted by volume: for linear cells by their mean, for quadratic cells by a quadratic polynomial, or a linear one where the points are
+//! too few. In a cell, the polynomials of its corners are blended by their barycentric coordinates `l_a` (T. Blacker and T. Belytschko,
+//! International Journal for Numerical Methods in Engineering 37, 1994, 517-536). That field is nearer to the true stress than the one of
+//! the cell, and stands for it:
 //!
 //! ```text
-//! eta_K^2 = integral over K of (mean - sigma_K) : E^-1 (mean - sigma_K)
+//! eta_K^2 = integral over K of t : E^-1 t,    t = sum over a of l_a (P_a - sigma_K)
 //! ```
 //!
 //! The stress of a linear cell is constant; that of a quadratic cell is the linear function with the stresses at its points.
-//! Means are taken over cells of one material only, because stresses may jump between materials; where its properties vary with
+//! Polynomials are those of cells of one material only, because stresses may jump between materials; where its properties vary with
 //! place, each cell has its own `E`.
 
 use super::{
@@ -21,13 +24,13 @@ use crate::{
     fem::{
         body::Body,
         effect::Form,
-        space::{MOST_NODES, cell_rule, edges, fine_cell_rule, values},
+        space::{cell_rule, fine_cell_rule, values},
     },
     job::Output,
     laws::material::Isotropic,
     linear_algebra::{
         petsc::DistributedVector,
-        tensor::{Mandel, add_scaled},
+        tensor::{Mandel, Vector, add_scaled},
     },
     parallel::session::Session,
 };
@@ -69,23 +72,26 @@ pub(super) fn compute<'a, const D: usize, const S: usize>(at: Converged<'a, D, S
     Ok(Computed { values: Box::new(cells), figures: vec![total, relative] })
 }
 
-/// The indicator of a body, with room for the means.
+/// The indicator of a body, with room for the polynomials.
 #[derive(Debug)]
 pub struct ErrorIndicator<const S: usize> {
     /// For each table of materials whether they are elastic.
     is_elastic: Vec<bool>,
-    /// Mean stress and volume of the cells around, for each node.
-    means: DistributedVector,
+    /// Terms of the polynomials.
+    terms: usize,
+    /// For each node the lower triangle of the least squares' matrix, row by row, and the right-hand sides of the components of the
+    /// stress; then the coefficients of the polynomials of these components first.
+    patches: DistributedVector,
 }
 
-/// The indicator of a state.
+/// Values of the indicator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indicated {
-    /// `eta_K` of each cell here, in J^(1/2), in two dimensions (J/m)^(1/2); zero where the material has no elasticity.
+    /// For each cell of this rank, `eta_K` in the root of J, in 2D per metre of thickness.
     pub cells: Vec<f64>,
-    /// The square root of the sum of the squares over all ranks.
+    /// The root of the sum of their squares over all cells.
     pub total: f64,
-    /// The total relative to the norm of the stress including the error: about 0.1 means an error of 10 %.
+    /// Its ratio to the root of the sum of its square and that of the norm of the stress; 0 if both are.
     pub relative: f64,
 }
 
@@ -95,8 +101,10 @@ impl<const S: usize> ErrorIndicator<S> {
         let mine = body.geometry.runs.iter().map(|run| body.table_of(run.material) + 1).max().unwrap_or(0);
         let count = session.largest([mine as f64])[0] as usize;
         let of = |table| body.tensor(Form::Elasticity, table).is_some();
-        let means = DistributedVector::ghosted(S + 1, body.mesh.owned, &body.mesh.ghosts);
-        Ok(Self { is_elastic: (0..count).map(of).collect(), means: session.agree(means)? })
+        let terms = if body.mesh.order() == 1 { 1 } else { most_terms::<D>() };
+        let width = triangle(terms) + S * terms;
+        let patches = DistributedVector::ghosted(width, body.mesh.owned, &body.mesh.ghosts);
+        Ok(Self { is_elastic: (0..count).map(of).collect(), terms, patches: session.agree(patches)? })
     }
 
     /// The indicator of a stress in Pa, given at the points of each cell, one cell after another. Collective.
@@ -107,7 +115,7 @@ impl<const S: usize> ErrorIndicator<S> {
         stress: &[Mandel<S>],
     ) -> Result<Indicated> {
         let points = body.geometry.points();
-        let samples = samples::<D>(points > 1);
+        let rule = if self.terms > 1 { fine_cell_rule::<D>() } else { cell_rule::<D>() };
         let mut cells = vec![0.0; body.mesh.cell_count()];
         let mut squares = [0.0; 2];
         for table in 0..self.is_elastic.len() {
@@ -115,20 +123,26 @@ impl<const S: usize> ErrorIndicator<S> {
                 continue;
             }
             session.agree(self.add(body, table, stress))?;
-            self.means.add_ghosts_to_owners()?;
-            session.agree(self.divide())?;
-            self.means.update_ghosts()?;
-            let means = self.means.local()?;
+            self.patches.add_ghosts_to_owners()?;
+            session.agree(self.fit(D))?;
+            self.patches.update_ghosts()?;
+            let patches = self.patches.local()?;
+            let width = triangle(self.terms) + S * self.terms;
             for (cell, elasticity) in with_tensors(body, table) {
                 let volume = body.geometry.cell(cell).volume;
                 let own = &stress[cell * points..][..points];
                 let mut error = 0.0;
-                for Sample { place, shares, weight } in &samples {
+                for (place, weight) in rule {
                     let here = stress_at::<D, S>(own, place);
-                    let mut apart = here.map(|value| -value);
-                    for (node, share) in body.mesh.cell_nodes(cell).zip(shares) {
-                        let mean = &means[node as usize * (S + 1)..][..S];
-                        apart.iter_mut().zip(mean).for_each(|(apart, mean)| *apart += share * mean);
+                    let x = position(body, cell, place);
+                    let mut apart = [0.0; S];
+                    for (&node, share) in body.mesh.cell(cell).iter().zip(place) {
+                        let basis = basis(&add_scaled(&x, -1.0, &body.mesh.nodes[node as usize]));
+                        let coefficients = patches[node as usize * width..].chunks_exact(self.terms);
+                        for (c, coefficients) in coefficients.take(S).enumerate() {
+                            let value: f64 = coefficients.iter().zip(basis).map(|(k, term)| k * term).sum();
+                            apart[c] += share * (value - here[c]);
+                        }
                     }
                     error += weight * volume * elasticity.inverse_square(&apart);
                     squares[1] += weight * volume * elasticity.inverse_square(&here);
@@ -142,68 +156,134 @@ impl<const S: usize> ErrorIndicator<S> {
         Ok(Indicated { cells, total: error.sqrt(), relative })
     }
 
-    /// For each node, adds the volumes and the stresses times volume of the surrounding cells of a table on this rank.
+    /// For each corner, adds the matrix and the right-hand sides of the points of the surrounding cells of a table on this rank.
     fn add<const D: usize>(&mut self, body: &Body<D, S>, table: usize, stress: &[Mandel<S>]) -> Result<()> {
         let points = body.geometry.points();
-        let places = node_places::<D>();
-        let mut sums = self.means.local_mut()?;
-        sums.fill(0.0);
+        let mut patches = self.patches.local_mut()?;
+        patches.fill(0.0);
+        let width = triangle(self.terms) + S * self.terms;
         for (cell, _) in with_tensors(body, table) {
             let volume = body.geometry.cell(cell).volume;
-            let own = &stress[cell * points..][..points];
-            for (node, place) in body.mesh.cell_nodes(cell).zip(&places) {
-                let sum = &mut sums[node as usize * (S + 1)..][..=S];
-                let there = stress_at::<D, S>(own, place);
-                sum.iter_mut().zip(&there).for_each(|(sum, value)| *sum += volume * value);
-                sum[S] += volume;
+            for (point, (place, share)) in cell_rule::<D>().iter().enumerate().take(points) {
+                let weight = if points == 1 { volume } else { share * volume };
+                let (x, stress) = (position(body, cell, place), &stress[cell * points + point]);
+                for &node in body.mesh.cell(cell) {
+                    let basis = &basis(&add_scaled(&x, -1.0, &body.mesh.nodes[node as usize]))[..self.terms];
+                    let patch = &mut patches[node as usize * width..][..width];
+                    let (matrix, sides) = patch.split_at_mut(triangle(self.terms));
+                    let pairs =
+                        basis.iter().enumerate().flat_map(|(i, a)| basis[..=i].iter().map(move |b| a * b));
+                    matrix.iter_mut().zip(pairs).for_each(|(entry, pair)| *entry += weight * pair);
+                    for (side, stress) in sides.chunks_exact_mut(self.terms).zip(stress) {
+                        side.iter_mut().zip(basis).for_each(|(sum, term)| *sum += weight * stress * term);
+                    }
+                }
             }
         }
         Ok(())
     }
 
-    /// Computes the means at the owned nodes; nodes without a cell of the table keep zero.
-    fn divide(&mut self) -> Result<()> {
-        for sum in self.means.owned_mut()?.chunks_exact_mut(S + 1).filter(|sum| sum[S] > 0.0) {
-            let volume = sum[S];
-            sum[..S].iter_mut().for_each(|value| *value /= volume);
+    /// Computes the coefficients at the owned nodes; nodes without a cell of the table keep zeros.
+    fn fit(&mut self, dimension: usize) -> Result<()> {
+        let terms = self.terms;
+        for patch in self.patches.owned_mut()?.chunks_exact_mut(triangle(terms) + S * terms) {
+            let (matrix, sides) = patch.split_at_mut(triangle(terms));
+            if matrix[0] == 0.0 {
+                continue;
+            }
+            // Of few points, a polynomial of lower degree.
+            let factor =
+                [terms, dimension + 1].into_iter().find_map(|count| factored(matrix, count.min(terms)));
+            match factor.filter(|_| terms > 1) {
+                Some(factor) => sides.chunks_exact_mut(terms).for_each(|side| factor.solve(side)),
+                None => sides.chunks_exact_mut(terms).for_each(|side| {
+                    side[0] /= matrix[0];
+                    side[1..].fill(0.0);
+                }),
+            }
+            patch.copy_within(triangle(terms).., 0);
         }
         Ok(())
     }
 }
 
-/// A place at which the indicator is integrated over a cell.
-struct Sample {
-    /// Its barycentric coordinates.
-    place: [f64; 4],
-    /// The values of the functions of the nodes of a cell.
-    shares: [f64; MOST_NODES],
-    /// Its share of the volume.
-    weight: f64,
+/// A place in a cell, given in barycentric coordinates; of linear cells, whose polynomials are constant, the origin.
+fn position<const D: usize, const S: usize>(body: &Body<D, S>, cell: usize, place: &[f64; 4]) -> Vector<D> {
+    if body.mesh.order() == 1 {
+        return [0.0; D];
+    }
+    let shares = values(D + 1, place);
+    let nodes = body.mesh.cell_nodes(cell).map(|node| &body.mesh.nodes[node as usize]);
+    nodes.zip(shares).fold([0.0; D], |sum, (node, share)| add_scaled(&sum, share, node))
 }
 
-/// Places at which squares of linear functions, or of quadratic ones, are integrated exactly.
-fn samples<const D: usize>(is_quadratic: bool) -> Vec<Sample> {
-    let rule = if is_quadratic { fine_cell_rule::<D>() } else { cell_rule::<D>() };
-    let sample = |&(place, weight): &([f64; 4], f64)| {
-        let mut shares = [0.0; MOST_NODES];
-        if is_quadratic {
-            shares = values(D + 1, &place);
-        } else {
-            shares[..=D].copy_from_slice(&place[..=D]);
+/// Terms of a quadratic polynomial.
+const fn most_terms<const D: usize>() -> usize {
+    (D + 1) * (D + 2) / 2
+}
+
+/// Entries of the lower triangle of a matrix.
+const fn triangle(rows: usize) -> usize {
+    rows * (rows + 1) / 2
+}
+
+/// Terms of a quadratic polynomial in space.
+const MOST_TERMS: usize = 10;
+
+/// The terms of a quadratic polynomial at a place: one, the linear and the quadratic ones.
+fn basis<const D: usize>(x: &Vector<D>) -> [f64; MOST_TERMS] {
+    let mut out = [0.0; MOST_TERMS];
+    out[0] = 1.0;
+    out[1..=D].copy_from_slice(x);
+    let pairs = (0..D).flat_map(|i| (0..=i).map(move |j| x[i] * x[j]));
+    out[D + 1..].iter_mut().zip(pairs).for_each(|(term, pair)| *term = pair);
+    out
+}
+
+/// The Cholesky factor of the first rows and columns of a matrix, scaled to a diagonal of ones.
+struct Factor {
+    count: usize,
+    scales: [f64; MOST_TERMS],
+    rows: [[f64; MOST_TERMS]; MOST_TERMS],
+}
+
+/// Squares of pivots below this mean that the points determine no polynomial of this degree.
+const LEAST_PIVOT: f64 = 1e-3;
+
+/// Factors the first `count` rows and columns of a matrix, given by its lower triangle; `None` if it is nearly singular.
+fn factored(matrix: &[f64], count: usize) -> Option<Factor> {
+    let entry = |i: usize, j: usize| matrix[triangle(i) + j];
+    let mut factor = Factor { count, scales: [0.0; MOST_TERMS], rows: [[0.0; MOST_TERMS]; MOST_TERMS] };
+    for i in 0..count {
+        factor.scales[i] = 1.0 / entry(i, i).sqrt();
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| factor.rows[i][k] * factor.rows[j][k]).sum();
+            let rest = entry(i, j) * factor.scales[i] * factor.scales[j] - known;
+            let is_definite = rest > LEAST_PIVOT;
+            if i == j && !is_definite {
+                return None;
+            }
+            factor.rows[i][j] = if i == j { rest.sqrt() } else { rest / factor.rows[j][j] };
         }
-        Sample { place, shares, weight }
-    };
-    rule.iter().map(sample).collect()
+    }
+    Some(factor)
 }
 
-/// The barycentric coordinates of the nodes of a quadratic cell; the corners come first.
-fn node_places<const D: usize>() -> Vec<[f64; 4]> {
-    let middle = |nodes: &[usize]| {
-        let mut place = [0.0; 4];
-        nodes.iter().for_each(|&node| place[node] += 1.0 / nodes.len() as f64);
-        place
-    };
-    (0..=D).map(|corner| middle(&[corner])).chain(edges(D + 1).iter().map(|edge| middle(edge))).collect()
+impl Factor {
+    /// Replaces a right-hand side by the solution; its further entries by zeros.
+    fn solve(&self, side: &mut [f64]) {
+        let Self { count, scales, rows } = self;
+        side[*count..].fill(0.0);
+        for i in 0..*count {
+            let known: f64 = (0..i).map(|k| rows[i][k] * side[k]).sum();
+            side[i] = (side[i] * scales[i] - known) / rows[i][i];
+        }
+        for i in (0..*count).rev() {
+            let known: f64 = (i + 1..*count).map(|k| rows[k][i] * side[k]).sum();
+            side[i] = (side[i] - known) / rows[i][i];
+        }
+        side.iter_mut().zip(scales).take(*count).for_each(|(value, scale)| *value *= scale);
+    }
 }
 
 /// The stress of a cell at a place in barycentric coordinates: its only one, or the linear function of those at its points, which are
