@@ -26,10 +26,8 @@ use crate::{
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
 };
-use std::cell::RefCell;
+use std::{cell::RefCell, collections::BTreeSet};
 
-/// The table of slips in checkpoints and field files.
-const SLIP: &str = "slip";
 
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
@@ -519,20 +517,22 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The converged histories of nodes.
     pub fn node_histories(&self) -> impl Iterator<Item = History<'_>> {
         let of_effects = self.surface_effects.iter().flat_map(|effect| effect.histories());
-        of_effects.map(|store| store.history()).chain(self.slip())
+        of_effects.map(|store| store.history()).chain(self.friction_histories())
     }
 
-    /// The slip of nodes, if the bound of friction depends on it.
-    fn slip(&self) -> Option<History<'_>> {
-        let mut values = vec![0.0; self.mesh.owned];
-        let mut count = 0;
-        for (node, slip) in self.contacts.iter().flat_map(Contact::slips) {
-            values[node] = slip;
-            count += 1;
-        }
-        let follows = self.contacts.iter().filter_map(Contact::friction).any(|law| law.follows_slip());
-        let bytes = count * size_of::<f64>();
-        follows.then(|| History { name: SLIP, width: 1, points: 1, values: values.into(), bytes })
+    /// The histories that laws of friction keep at nodes, one for each name.
+    fn friction_histories(&self) -> impl Iterator<Item = History<'_>> {
+        let laws = self.contacts.iter().filter_map(Contact::friction);
+        let names: BTreeSet<_> = laws.filter_map(|law| Some(law.history()?.name)).collect();
+        names.into_iter().map(|name| {
+            let mut values = vec![0.0; self.mesh.owned];
+            let mut bytes = 0;
+            for (node, value) in self.contacts.iter().flat_map(|contact| contact.friction_history(name)) {
+                values[node] = value;
+                bytes += size_of::<f64>();
+            }
+            History { name, width: 1, points: 1, values: values.into(), bytes }
+        })
     }
 
     /// The histories of cells at all their points: the converged ones and, where they are kept, those before the last step.
@@ -542,15 +542,16 @@ impl<const D: usize, const S: usize> Body<D, S> {
 
     /// The histories of nodes, likewise.
     pub fn all_node_histories(&self) -> impl Iterator<Item = History<'_>> {
-        self.surface_effects.iter().flat_map(|effect| all_of(effect.histories())).chain(self.slip())
+        self.surface_effects
+            .iter()
+            .flat_map(|effect| all_of(effect.histories()))
+            .chain(self.friction_histories())
     }
 
     /// Restores the saved values of the history of this name.
     pub fn restore_history(&mut self, name: &str, values: &[f64]) {
         self.visit_histories(&mut |history| history.restore(name, values));
-        if name == SLIP {
-            self.contacts.iter_mut().for_each(|contact| contact.restore_slips(values));
-        }
+        self.contacts.iter_mut().for_each(|contact| contact.restore_friction_history(name, values));
     }
 
     /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.

@@ -193,6 +193,21 @@ fn a_restarted_run_with_an_obstacle_that_a_force_moves_is_the_straight_run_to_th
 }
 
 #[test]
+fn a_restarted_run_with_rate_and_state_friction_is_the_straight_run_to_the_last_bit() {
+    let law = "reference = 0.4, velocity = 1e-3, direct = 0.02, evolution = 0.03, distance = 0.01";
+    for evolution in ["ageing", "slip"] {
+        let friction = format!("{{ rate_and_state = {{ {law}, law = '{evolution}' }} }}");
+        let make = || {
+            saving()
+                .set("contact.0.friction", &friction)
+                .set("contact.0.normal", "{ unilateral = { bound = 'velocity' } }")
+        };
+        compare_with_straight(make, 1, evolution);
+        compare_with_straight(make, 3, evolution);
+    }
+}
+
+#[test]
 fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
     for law in [
         "tresca = { bound = 0.2 }",

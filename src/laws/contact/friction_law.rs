@@ -1,7 +1,7 @@
 //! Friction laws: the friction traction as a function of the sliding velocity, at a given contact pressure.
 //!
 //! `-sigma_tau = g(|v_tau|) v_tau / |v_tau|` while a point slides, and `|sigma_tau| <= g(0)` while it sticks. The bound `g` does
-//! not increase with the velocity. In the direction of sliding this is a scalar graph with a jump at rest. Its relaxed monotonicity
+//! not increase with the velocity, but for laws with a [`resolve`](FrictionBound::resolve) of their own. In the direction of sliding this is a scalar graph with a jump at rest. Its relaxed monotonicity
 //! constant is [`steepest_decrease`](FrictionBound::steepest_decrease) times the contact pressure. For a larger `c`, `s = c v + q`
 //! is a parameter of the graph ([`FrictionBound::resolve`]), and also of the vector graph: the law is radial, so that the vectors
 //! `s`, velocity and traction have the same direction.
@@ -23,6 +23,15 @@ pub struct Slip {
     pub coefficient: f64,
 }
 
+/// A number at each point that a friction law keeps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionHistory {
+    /// Its name in field files and checkpoints.
+    pub name: &'static str,
+    /// Its value at the start of the run.
+    pub initial: f64,
+}
+
 /// Bisection halves the bracket, so that more iterations than bits are useless.
 const ITERATIONS: usize = 100;
 
@@ -37,7 +46,7 @@ pub trait FrictionBound {
         self.coefficient(speed) * pressure.max(0.0)
     }
 
-    /// Derivative of the bound by the sliding velocity, in Pa s/m: not positive.
+    /// Derivative of the bound by the sliding velocity, in Pa s/m.
     fn slope(&self, _speed: f64, _pressure: f64) -> f64 {
         0.0
     }
@@ -58,13 +67,18 @@ pub trait FrictionBound {
         0.0
     }
 
-    /// Whether the bound depends on the slip, the length of the way that a point has slid.
-    fn follows_slip(&self) -> bool {
-        false
+    /// The history of a point on which the bound depends, if it depends on one.
+    fn history(&self) -> Option<FrictionHistory> {
+        None
     }
 
-    /// Sets the slip in m with which a step begins, and its length in s.
-    fn start_step(&mut self, _slip: f64, _length: f64) {}
+    /// Sets the history with which a step begins, and the length of the step in s.
+    fn start_step(&mut self, _history: f64, _length: f64) {}
+
+    /// The history after a step of this length in s that began with `history`, at this sliding velocity in m/s at its end.
+    fn history_after(&self, history: f64, _length: f64, _speed: f64) -> f64 {
+        history
+    }
 
     /// The faults of the parameters; keys are those of the table of the law.
     fn own_faults(&self) -> Vec<LawFault> {
@@ -143,20 +157,21 @@ macro_rules! friction_laws {
                 follows_pressure() -> bool;
                 steepest_decrease() -> f64;
                 corner_velocity() -> f64;
-                follows_slip() -> bool;
+                history() -> Option<FrictionHistory>;
+                history_after(history: f64, length: f64, speed: f64) -> f64;
                 own_faults() -> Vec<crate::laws::law::LawFault>;
                 resolve(s: f64, c: f64, pressure: f64) -> Slip;
             }
 
             /// See [`FrictionBound::start_step`].
             #[inline]
-            pub fn start_step(&mut self, slip: f64, length: f64) {
-                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, slip, length));
+            pub fn start_step(&mut self, history: f64, length: f64) {
+                each_friction_law!(FrictionLaw, self, law => FrictionBound::start_step(law, history, length));
             }
 
-            /// The law at the start of a step of this length in s of a point that has not slid.
+            /// The law in a first step of this length in s.
             pub fn in_step(mut self, length: f64) -> Self {
-                self.start_step(0.0, length);
+                self.start_step(self.history().map_or(0.0, |history| history.initial), length);
                 self
             }
 

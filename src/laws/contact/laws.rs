@@ -7,6 +7,7 @@ mod displacement_graph;
 mod distance_weakening;
 mod exponential_damper;
 mod graph;
+mod rate_and_state;
 mod slip_weakening;
 mod tresca;
 mod unilateral;
@@ -18,12 +19,13 @@ pub use displacement_graph::DisplacementGraph;
 pub use distance_weakening::{Decay, DistanceWeakening};
 pub use exponential_damper::ExponentialDamper;
 pub use graph::Graph;
+pub use rate_and_state::{Evolution, RateAndState};
 pub use slip_weakening::SlipWeakening;
 pub use tresca::Tresca;
 pub use unilateral::{Bound, Unilateral};
 
 use super::{
-    friction_law::{FrictionBound, Slip, friction_laws},
+    friction_law::{FrictionBound, FrictionHistory, Slip, friction_laws},
     normal_law::{Branch, NodeContext, NormalParameters, Resolved, Response, normal_laws},
 };
 use crate::{
@@ -60,6 +62,8 @@ friction_laws! {
     SlipWeakening = "slip_weakening",
     /// A friction coefficient that decreases with the slip, the length of the way that a point has slid: the law of dynamic rupture.
     DistanceWeakening = "distance_weakening",
+    /// A friction coefficient that depends on the sliding velocity and on a state that evolves with slip and time: the law of faults.
+    RateAndState = "rate_and_state",
 }
 
 impl NormalLaw {

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use crate::laws::expression::Scalar;
 
 pub use adhesion::{Adhesion, Toughness};
-pub use friction_law::{FrictionBound, Slip};
+pub use friction_law::{FrictionBound, FrictionHistory, Slip};
 pub use interface::Interface;
 pub use laws::*;
 pub use memory::Memory;

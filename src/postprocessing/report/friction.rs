@@ -35,8 +35,8 @@ pub(super) fn picture(
 ) -> Result<Option<Picture>> {
     let touching: Vec<&Rubbing> =
         nodes.iter().filter(|node| !law.follows_pressure() || node.pressure > 0.0).collect();
-    // Nodes with different slips have different graphs.
-    if touching.is_empty() || law.follows_slip() {
+    // Nodes with different histories have different graphs.
+    if touching.is_empty() || law.history().is_some() {
         return Ok(None);
     }
     let ordinate = |node: &Rubbing| node.traction / if law.follows_pressure() { node.pressure } else { 1.0 };

@@ -62,14 +62,14 @@ pub(super) fn restore_pressures<const D: usize, const S: usize>(
     Ok(())
 }
 
-/// Copies the pressures of the step just taken into the state, and adds its slip. Collective.
+/// Copies the pressures of the step just taken into the state, and advances the histories of friction. Collective.
 pub(super) fn commit_tractions<const D: usize, const S: usize>(
     body: &mut Body<D, S>,
     state: &mut State,
 ) -> Result<()> {
     let Some(traction) = &mut state.contact_traction else { return Ok(()) };
     let velocity = state.velocity.local()?;
-    body.contacts.iter_mut().for_each(|contact| contact.add_slip(&velocity, state.step_length));
+    body.contacts.iter_mut().for_each(|contact| contact.advance_histories(&velocity, state.step_length));
     traction.owned_mut()?.fill(0.0);
     for contact in &body.contacts {
         contact.add_tractions(&velocity, &mut traction.owned_mut()?);

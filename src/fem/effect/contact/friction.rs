@@ -91,7 +91,7 @@ impl<const D: usize> Friction<D> {
                 tangents,
                 count,
                 law,
-                slip: 0.0,
+                history: law.history().map_or(0.0, |history| history.initial),
                 pressure: 0.0,
                 traction: [0.0; D],
                 tangent: Tangent::free(),
@@ -124,22 +124,23 @@ impl<const D: usize> Friction<D> {
 
     /// Starts a step of this length in s.
     pub(super) fn start_step(&mut self, length: f64) {
-        if self.law.follows_slip() {
-            self.law.start_step(0.0, length);
-            self.points.iter_mut().for_each(|point| point.law.start_step(point.slip, length));
+        if let Some(history) = self.law.history() {
+            self.law.start_step(history.initial, length);
+            self.points.iter_mut().for_each(|point| point.law.start_step(point.history, length));
         }
     }
 
-    /// Adds to the slips the ways of a step of this length in s at these velocities, with ghosts.
-    pub(super) fn add_slip(&mut self, velocity: &[f64], length: f64) {
-        if !self.law.follows_slip() {
+    /// Advances the histories by a step of this length in s at these velocities at its end, with ghosts.
+    pub(super) fn advance_histories(&mut self, velocity: &[f64], length: f64) {
+        if self.law.history().is_none() {
             return;
         }
         let Self { points, obstacle_velocities, .. } = self;
         for (at, point) in points.iter_mut().enumerate() {
             let along = point.along(Body, velocity);
             let obstacle = obstacle_velocities.get(at).map_or([0.0; D], |obstacle| *obstacle);
-            point.slip += length * norm(&add_scaled(&along, -1.0, &obstacle));
+            let speed = norm(&add_scaled(&along, -1.0, &obstacle));
+            point.history = point.law.history_after(point.history, length, speed);
         }
     }
 
@@ -212,8 +213,9 @@ impl<const D: usize> Friction<D> {
             point.tangent = if found.derivative == 0.0 || (at_rest && touches) {
                 Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
             } else if at_rest {
-                // Without a bound.
-                Tangent::free()
+                // Without a bound, or with one that grows from zero with the velocity.
+                let theta = scale * found.derivative;
+                Tangent { theta: [theta; 2], slopes: [found.slope; 2], ..Tangent::free() }
             } else {
                 Tangent {
                     sticks: false,
@@ -320,8 +322,8 @@ impl<const D: usize> Friction<D> {
 
     /// Steepest descent of the graphs of all points in Pa s/m, at the pressures in the bounds.
     pub(super) fn steepest_decrease(&self) -> f64 {
-        let most = self.points.iter().fold(0.0, |most, point| larger(most, point.pressure));
-        self.law.steepest_decrease() * most
+        let decrease = |point: &TangentialPoint<D>| point.law.steepest_decrease() * point.pressure;
+        self.points.iter().fold(0.0, |most, point| larger(most, decrease(point)))
     }
 
     /// The state of each point with its weight, at these velocities.

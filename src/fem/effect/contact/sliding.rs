@@ -54,23 +54,24 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Adds to the slips of points the ways of a step of this length in s, at its velocities with ghosts.
-    pub fn add_slip(&mut self, velocity: &[f64], length: f64) {
+    /// Advances the histories of friction by a step of this length in s, at its velocities with ghosts.
+    pub fn advance_histories(&mut self, velocity: &[f64], length: f64) {
         if let Some(friction) = &mut self.friction {
-            friction.add_slip(velocity, length);
+            friction.advance_histories(velocity, length);
         }
     }
 
-    /// The slip in m of each node with friction on this rank, if the law depends on it.
-    pub fn slips(&self) -> impl Iterator<Item = (usize, f64)> {
-        let friction = self.friction.iter().filter(|friction| friction.law.follows_slip());
-        friction.flat_map(|friction| &friction.points).map(|point| (point.node(), point.slip))
+    /// The history of this name that friction keeps at each of its nodes on this rank.
+    pub fn friction_history(&self, name: &str) -> impl Iterator<Item = (usize, f64)> {
+        let friction = self.friction.iter().filter(move |friction| has_history(&friction.law, name));
+        friction.flat_map(|friction| &friction.points).map(|point| (point.node(), point.history))
     }
 
-    /// Sets the slips from values at the owned nodes of the body.
-    pub fn restore_slips(&mut self, nodal: &[f64]) {
-        let points = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
-        points.for_each(|point| point.slip = nodal[point.node()]);
+    /// Sets the history of this name from values at the owned nodes of the body.
+    pub fn restore_friction_history(&mut self, name: &str, nodal: &[f64]) {
+        let friction = self.friction.iter_mut().filter(|friction| has_history(&friction.law, name));
+        let points = friction.flat_map(|friction| &mut friction.points);
+        points.for_each(|point| point.history = nodal[point.node()]);
     }
 
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
@@ -118,4 +119,8 @@ impl<const D: usize> Contact<D> {
     pub fn friction_traction(&self, node: usize, traction: &[f64]) -> Vector<D> {
         self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
     }
+}
+
+fn has_history(law: &FrictionLaw, name: &str) -> bool {
+    law.history().is_some_and(|history| history.name == name)
 }

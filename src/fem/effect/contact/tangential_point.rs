@@ -22,8 +22,8 @@ pub(super) struct TangentialPoint<const D: usize> {
     pub count: usize,
     /// The law in the current step.
     pub law: FrictionLaw,
-    /// Length in m of the way that it has slid, if the law depends on it.
-    pub slip: f64,
+    /// What the law keeps, if it has a history.
+    pub history: f64,
     /// The contact pressure in Pa that determines the bound.
     pub pressure: f64,
     /// `q` in Pa at the last evaluation.

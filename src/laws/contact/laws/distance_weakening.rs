@@ -11,7 +11,10 @@
 //! Within a step of length `k` that starts with the slip `s0`, the slip at the end is `s0 + k v`: a law of the sliding velocity whose
 //! steepest decrease is `k (static - dynamic) / distance p`.
 
-use crate::laws::{contact::friction_law::FrictionBound, law::LawFault};
+use crate::laws::{
+    contact::friction_law::{FrictionBound, FrictionHistory},
+    law::LawFault,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -86,12 +89,16 @@ impl FrictionBound for DistanceWeakening {
         if self.step[1] > 0.0 { self.distance / self.step[1] } else { 0.0 }
     }
 
-    fn follows_slip(&self) -> bool {
-        true
+    fn history(&self) -> Option<FrictionHistory> {
+        Some(FrictionHistory { name: "slip", initial: 0.0 })
     }
 
     fn start_step(&mut self, slip: f64, length: f64) {
         self.step = [slip, length];
+    }
+
+    fn history_after(&self, slip: f64, length: f64, speed: f64) -> f64 {
+        slip + length * speed
     }
 
     fn own_faults(&self) -> Vec<LawFault> {

@@ -1,0 +1,308 @@
+//! Rate-and-state friction: the law of faults (Dieterich 1979; Ruina 1983).
+//!
+//! The bound is `mu(v, theta) p` with the positive part `p` of the contact pressure, the sliding velocity `v` and the state `theta` in s,
+//! the age of the contacts (regularised at rest: N. Lapusta et al., Journal of Geophysical Research 105, 2000):
+//!
+//! ```text
+//! mu      = direct asinh(v / (2 v0) exp((reference + evolution ln(v0 theta / distance)) / direct))
+//! ageing    theta' = 1 - v theta / distance
+//! slip      theta' = -(v theta / distance) ln(v theta / distance)
+//! ```
+//!
+//! For velocities that are not tiny, `mu = reference + direct ln(v / v0) + evolution ln(v0 theta / distance)`. There is no jump at rest: a
+//! point that sticks creeps at a velocity that has no effect.
+//!
+//! Within a step of length `k` the velocity is that of its end, for which both laws have closed forms. With `x = k v / distance`
+//!
+//! ```text
+//! ageing    theta = theta_0 exp(-x) + k (1 - exp(-x)) / x
+//! slip      ln(v theta / distance) = ln(v theta_0 / distance) exp(-x)
+//! ```
+//!
+//! The coefficient at the end is a law of the velocity alone. It decreases at most by `evolution k / distance`, times
+//! `1 + max(0, ln(theta_0 / k)) + 1/e` for the slip law.
+
+use crate::laws::{
+    contact::friction_law::{FrictionBound, FrictionHistory, Slip},
+    law::LawFault,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The evolution of the state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Evolution {
+    /// The state grows with time at rest (Dieterich).
+    #[default]
+    Ageing,
+    /// The state changes only with slip (Ruina).
+    Slip,
+}
+
+/// Rate-and-state friction: a coefficient that depends on the sliding velocity and on a state, which tends to `distance` over the sliding
+/// velocity. Field files and checkpoints contain the state as `friction_state`, in s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RateAndState {
+    /// Friction coefficient of steady sliding at the velocity `velocity`.
+    #[schemars(extend("exclusiveMinimum" = 0), example = 0.6)]
+    pub reference: f64,
+    /// The velocity to which `reference` belongs.
+    #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 1e-6)]
+    pub velocity: f64,
+    /// The direct effect, often called a: increase of the coefficient where the velocity is multiplied by e at once.
+    #[schemars(extend("exclusiveMinimum" = 0), example = 0.01)]
+    pub direct: f64,
+    /// The evolution effect, often called b: decrease of the coefficient as the state follows. Steady sliding is unstable where it is
+    /// larger than `direct`.
+    #[schemars(range(min = 0), example = 0.015)]
+    pub evolution: f64,
+    /// Slip over which the state changes.
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1e-5)]
+    pub distance: f64,
+    /// The law by which the state changes.
+    #[serde(default)]
+    pub law: Evolution,
+    /// The state at the start of the run. Absent: that of steady sliding at `velocity`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0), example = 10.0)]
+    pub initial_state: Option<f64>,
+    /// State in s at the start of the step, and length of the step in s.
+    #[serde(skip)]
+    pub step: [f64; 2],
+}
+
+/// Of the solution for the velocity.
+const ITERATIONS: usize = 200;
+/// The logarithm of the smallest velocity.
+const LEAST: f64 = -700.0;
+/// The largest ratio of `reference` to `direct`, beyond which numbers overflow.
+const MOST: f64 = 500.0;
+
+impl RateAndState {
+    fn first_state(&self) -> f64 {
+        self.initial_state.unwrap_or(self.distance / self.velocity)
+    }
+
+    /// The logarithm of the state over 1 s at the end of a step with this velocity in m/s, and its derivative by the velocity.
+    fn log_state(&self, [before, length]: [f64; 2], speed: f64) -> [f64; 2] {
+        let (rate, x) = (length / self.distance, length * speed / self.distance);
+        let left = (-x).exp();
+        match self.law {
+            Evolution::Ageing => {
+                // The derivative of (1 - exp(-x)) / x, which cancels near zero.
+                let mean = if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x };
+                let slope = if x < 1e-3 {
+                    -0.5 + x * (1.0 / 3.0 - x * (0.125 - x / 30.0))
+                } else {
+                    (left - mean) / x
+                };
+                let state = before * left + length * mean;
+                [state.ln(), rate * (length * slope - before * left) / state]
+            }
+            Evolution::Slip if speed == 0.0 => [before.ln(), f64::NEG_INFINITY],
+            Evolution::Slip => {
+                let follows = (speed * before / self.distance).ln();
+                let value = (self.distance / speed).ln() + follows * left;
+                [value, (-x).exp_m1() / speed - follows * rate * left]
+            }
+        }
+    }
+
+    /// The coefficient at the end of a step with this velocity, and its derivative by the velocity in s/m.
+    fn at(&self, speed: f64) -> [f64; 2] {
+        let [log_state, log_slope] = self.log_state(self.step, speed);
+        let strength = self.reference + self.evolution * (log_state + (self.velocity / self.distance).ln());
+        // asinh of a number that may be too large for an f64.
+        let log_argument = (0.5 * speed / self.velocity).ln() + strength / self.direct;
+        let share = if log_argument > 18.0 { 1.0 } else { 1.0 / (1.0 + (-2.0 * log_argument).exp()).sqrt() };
+        let value = if log_argument > 18.0 {
+            log_argument + std::f64::consts::LN_2
+        } else {
+            log_argument.exp().asinh()
+        };
+        if speed == 0.0 {
+            let slope = 0.5 * self.direct / self.velocity * (strength / self.direct).exp();
+            return [0.0, slope];
+        }
+        // d asinh(y) = y / sqrt(1 + y^2) d ln y.
+        [self.direct * value, share * (self.direct / speed + self.evolution * log_slope)]
+    }
+}
+
+impl FrictionBound for RateAndState {
+    fn coefficient(&self, speed: f64) -> f64 {
+        self.at(speed)[0]
+    }
+
+    fn slope(&self, speed: f64, pressure: f64) -> f64 {
+        self.at(speed)[1] * pressure.max(0.0)
+    }
+
+    fn steepest_decrease(&self) -> f64 {
+        let [before, length] = self.step;
+        let follows = match self.law {
+            Evolution::Ageing => 1.0,
+            Evolution::Slip if length > 0.0 => {
+                1.0 + (before / length).ln().max(0.0) + 1.0 / std::f64::consts::E
+            }
+            Evolution::Slip => 0.0,
+        };
+        self.evolution * follows * length / self.distance
+    }
+
+    fn corner_velocity(&self) -> f64 {
+        self.velocity
+    }
+
+    fn history(&self) -> Option<FrictionHistory> {
+        Some(FrictionHistory { name: "friction_state", initial: self.first_state() })
+    }
+
+    fn start_step(&mut self, history: f64, length: f64) {
+        self.step = [history, length];
+    }
+
+    fn history_after(&self, history: f64, length: f64, speed: f64) -> f64 {
+        self.log_state([history, length], speed)[0].exp()
+    }
+
+    fn own_faults(&self) -> Vec<LawFault> {
+        if self.reference <= MOST * self.direct {
+            return Vec::new();
+        }
+        let help = format!("it must be at least {}; common values are about 0.01", self.reference / MOST);
+        vec![LawFault::at_value(
+            "direct",
+            "the direct effect is too small for the reference coefficient",
+            help,
+        )]
+    }
+
+    /// The velocity is sought by its logarithm: it may be smaller than any rounding error of the parameter.
+    fn resolve(&self, s: f64, c: f64, pressure: f64) -> Slip {
+        let pressure = pressure.max(0.0);
+        let at = |speed: f64| {
+            let [coefficient, slope] = self.at(speed);
+            let slope = slope * pressure;
+            let traction = if pressure > 0.0 { s - c * speed } else { 0.0 };
+            Slip { speed, traction, derivative: 1.0 / (c + slope), slope, coefficient }
+        };
+        if s == 0.0 || pressure == 0.0 {
+            return at(s / c);
+        }
+        // The coefficient is at most its slope at rest times the velocity, and the state at most that of rest.
+        let [mut low, mut high] = [(s / (c + pressure * self.at(0.0)[1])).ln().max(LEAST), (s / c).ln()];
+        let mut now = high;
+        for _ in 0..ITERATIONS {
+            let speed = now.exp();
+            let [coefficient, slope] = self.at(speed);
+            let open = c * speed + pressure * coefficient - s;
+            if open > 0.0 {
+                high = now;
+            } else {
+                low = now;
+            }
+            let newton = now - open / (speed * (c + pressure * slope));
+            let next = if (low..=high).contains(&newton) { newton } else { 0.5 * (low + high) };
+            let change = (next - now).abs();
+            now = next;
+            if change <= 1e-15 * (1.0 + now.abs()) {
+                break;
+            }
+        }
+        at(now.exp())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn law(law: Evolution, state: f64, length: f64) -> RateAndState {
+        let mut law = RateAndState {
+            reference: 0.6,
+            velocity: 1e-6,
+            direct: 0.01,
+            evolution: 0.015,
+            distance: 1e-5,
+            law,
+            initial_state: None,
+            step: [0.0; 2],
+        };
+        law.start_step(state, length);
+        law
+    }
+
+    #[test]
+    fn steady_sliding_and_a_jump_of_the_velocity_by_hand() {
+        for evolution in [Evolution::Ageing, Evolution::Slip] {
+            // No time passes: the state is that given.
+            let steady = law(evolution, 10.0, 0.0);
+            assert_eq!(steady.first_state(), 10.0);
+            assert!((steady.coefficient(1e-6) - 0.6).abs() < 1e-12);
+            assert!((steady.coefficient(1e-5) - (0.6 + 0.01 * 10f64.ln())).abs() < 1e-12);
+            // Long after the jump the state is distance / velocity = 1 s.
+            let after = law(evolution, 10.0, 100.0);
+            assert!((after.coefficient(1e-5) - (0.6 - 0.005 * 10f64.ln())).abs() < 1e-12);
+            assert!((after.history_after(10.0, 100.0, 1e-5) - 1.0).abs() < 1e-12);
+        }
+        // At rest: ageing grows by the time, the slip law keeps the state.
+        assert!((law(Evolution::Ageing, 10.0, 3.0).history_after(10.0, 3.0, 0.0) - 13.0).abs() < 1e-14);
+        assert!((law(Evolution::Slip, 10.0, 3.0).history_after(10.0, 3.0, 0.0) - 10.0).abs() < 1e-14);
+        // One step, or two of half the length, at the same velocity.
+        for evolution in [Evolution::Ageing, Evolution::Slip] {
+            let law = law(evolution, 4.0, 1.0);
+            let half = law.history_after(law.history_after(4.0, 0.5, 3e-6), 0.5, 3e-6);
+            assert!((law.history_after(4.0, 1.0, 3e-6) - half).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn small_arguments_are_as_exact_as_large_ones() {
+        let law = law(Evolution::Ageing, 2.0, 1.0);
+        let [below, above] = [0.9999e-8, 1.0001e-8].map(|speed| law.log_state([2.0, 1.0], speed));
+        assert!(
+            (below[0] - above[0] + 2e-12 * 0.5 * (below[1] + above[1])).abs() < 1e-15,
+            "{below:?} {above:?}"
+        );
+        assert!((below[1] / above[1] - 1.0).abs() < 1e-6, "{below:?} {above:?}");
+        assert_eq!(law.coefficient(0.0), 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn parameters_lead_to_points_of_the_graph_and_its_slopes(
+            slips in any::<bool>(), [state, length, speed] in [-2.0f64..6.0, -3.0f64..2.0, -12.0f64..0.0],
+            pressure in 0.1f64..5.0, more in 1.1f64..5.0,
+        ) {
+            let [state, length, speed] = [state, length, speed].map(|power: f64| 10f64.powf(power));
+            let law = law(if slips { Evolution::Slip } else { Evolution::Ageing }, state, length);
+            let h = 1e-5 * speed;
+            let quotient = (law.coefficient(speed + h) - law.coefficient(speed - h)) / (2.0 * h);
+            let slope = law.slope(speed, 1.0);
+            prop_assert!((quotient - slope).abs() <= 1e-5 * (0.02 / speed), "{quotient} {slope}");
+            prop_assert!(slope >= -law.steepest_decrease(), "{slope} below {}", law.steepest_decrease());
+            let c = more * law.steepest_decrease() * pressure + 0.1;
+            let s = c * speed + law.bound(speed, pressure);
+            let found = law.resolve(s, c, pressure);
+            prop_assert!((c * found.speed + law.bound(found.speed, pressure) - s).abs() < 1e-13 * (1.0 + s));
+            prop_assert!((found.traction - law.bound(found.speed, pressure)).abs() < 1e-12 * (1.0 + s));
+            prop_assert!((found.derivative * (c + pressure * law.slope(found.speed, 1.0)) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn without_pressure_or_traction_there_is_no_friction() {
+        let law = law(Evolution::Ageing, 10.0, 1.0);
+        for pressure in [0.0, -3.0] {
+            let found = law.resolve(6.0, 2.0, pressure);
+            assert_eq!((found.speed, found.traction, found.slope), (3.0, 0.0, 0.0));
+        }
+        let rest = law.resolve(0.0, 2.0, 5.0);
+        assert_eq!((rest.speed, rest.traction), (0.0, 0.0));
+        assert!(rest.derivative > 0.0 && rest.derivative < 1e-10, "{rest:?}");
+    }
+}
