@@ -28,7 +28,6 @@ use crate::{
 };
 use std::{cell::RefCell, collections::BTreeSet};
 
-
 /// A body of `D` dimensions whose stresses have `S` components.
 pub struct Body<const D: usize, const S: usize> {
     /// This rank's part of the mesh.
