@@ -190,7 +190,7 @@ fn linear_stress<const D: usize, const S: usize>(session: &Session, whole: &Glob
     let material =
         format!("elasticity = {{ youngs_modulus = {MODULUS}, poisson_ratio = {RATIO} }}\n{hypothesis}");
     let job = format!(
-        "[time]\nend = 1\nstep = 1\nscheme = \"implicit_euler\"\n[material]\ndensity = 1\n{material}"
+        "file = \"in_memory.msh\"\n[time]\nend = 1\nstep = 1\nscheme = \"implicit_euler\"\n[material]\ndensity = 1\n{material}"
     );
     let run = simulation::<D, S>(session, &of_second_order(&job), whole);
     let mesh = &run.body.mesh;
@@ -210,7 +210,8 @@ fn linear_stress<const D: usize, const S: usize>(session: &Session, whole: &Glob
     }
     let off = indicated(session, &run, &stress);
     let largest = session.largest([off.cells.iter().fold(0.0, |most, eta| eta.max(most))])[0];
-    assert!(off.total > 1e-3 && largest < off.total && off.cells.contains(&0.0), "{} {largest}", off.total);
+    let [least] = session.largest([-off.cells.iter().fold(f64::INFINITY, |least, eta| eta.min(least))]);
+    assert!(off.total > 1e-3 && largest < off.total && -least < 1e-12, "{} {largest} {least}", off.total);
 }
 
 /// Ratio of the indicated to the true error of the stress at the end, in the elastic energy norm.
@@ -274,7 +275,7 @@ pub fn effectivity_tends_to_one(session: &Session) {
 
     let quadratic = [6, 12].map(|n| effectivity(session, &stir(regular(n), 0.1 / n as f64), n, 2));
     println!("effectivity of quadratic cells: {quadratic:.4?}");
-    assert!(quadratic.iter().all(|index| (0.7..1.3).contains(index)), "{quadratic:?}");
+    assert!(quadratic.iter().all(|index| (0.98..1.02).contains(index)), "{quadratic:?}");
 }
 
 #[test]
