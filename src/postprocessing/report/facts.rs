@@ -29,7 +29,7 @@ const MEMBERS: [(&str, &str, &str); 10] = [
 const MORE_MEMBERS: [(&str, &str, &str); 13] = [
     ("max_inclusion_residual", "largest inclusion residual", ""),
     ("max_energy_imbalance", "largest energy imbalance", ""),
-    ("max_slip_pressure", "largest contact pressure under slip weakening", "Pa"),
+    ("max_slip_pressure", "largest contact pressure under friction that weakens", "Pa"),
     ("effects", "effects simulated", ""),
     ("scheme", "time scheme", ""),
     ("preconditioner", "preconditioner", ""),
@@ -124,7 +124,7 @@ pub(super) fn certificates(found: &Found) -> String {
         ("growth constant c₁", growth(1), "Pa s/m", "slope of that bound"),
         ("trace norm |γ|²", known.trace_norm_squared, "m", "of the normal trace on the contact boundary"),
         (
-            "pressure bound of slip weakening",
+            "pressure bound of friction that weakens",
             known.slip_pressure_bound,
             "Pa",
             "uniqueness of each step, for given pressures up to this",

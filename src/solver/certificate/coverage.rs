@@ -42,7 +42,7 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
             )
         });
         words.push(format!(
-            "slip weakening decreases the friction traction by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
+            "the friction traction falls by {fall:.4} Pa s/m for each Pa of contact pressure, which this normal law does not \
              bound: theta does not cover it{covered}"
         ));
     }

@@ -105,7 +105,7 @@ impl Certificates {
             } else {
                 0.0
             };
-            known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite() && *bound > 0.0);
+            known.slip_pressure_bound = Some(bound).filter(|bound| bound.is_finite() && *bound >= 0.0);
         }
         known.decrease_with_displacement = decrease;
         known.not_covered = not_covered(body, &known, length);
