@@ -19,7 +19,7 @@ const PAGE: &str = "docs/space.md";
 const COMMAND: &str = "make bench-space ARGS=--write";
 const STUDY: &str = "jobs/studies/wang_cheng_in_space.toml";
 /// How often each run is repeated; the fastest counts.
-const REPETITIONS: usize = 3;
+const REPETITIONS: usize = 2;
 /// Relative errors for which the fastest run is listed.
 const TARGETS: [f64; 4] = [0.05, 0.02, 0.01, 0.003];
 
@@ -53,15 +53,10 @@ const fn family(
 
 const PLANE: &str = "mesh.rectangle.cells";
 const BOX: &str = "mesh.box.cells";
-const BARS: [&str; 5] = ["[8, 1, 2]", "[16, 1, 4]", "[32, 2, 8]", "[64, 4, 16]", "[96, 6, 24]"];
+const BARS: [&str; 4] = ["[8, 1, 2]", "[16, 1, 4]", "[32, 2, 8]", "[64, 4, 16]"];
 const BAR_FAMILIES: &[Family] = &[
     family("linear", BOX, &["mesh.order=1"], &BARS),
-    family(
-        "quadratic",
-        BOX,
-        &["mesh.order=2"],
-        &["[4, 1, 1]", "[8, 1, 2]", "[16, 1, 4]", "[32, 2, 8]", "[48, 3, 12]"],
-    ),
+    family("quadratic", BOX, &["mesh.order=2"], &["[4, 1, 1]", "[8, 1, 2]", "[16, 1, 4]", "[32, 2, 8]"]),
 ];
 
 const PROBLEMS: &[Problem] = &[
@@ -76,19 +71,14 @@ const PROBLEMS: &[Problem] = &[
                 "linear",
                 PLANE,
                 &["mesh.rectangle.diagonal=right"],
-                &["[20, 20]", "[40, 40]", "[80, 80]", "[160, 160]"],
+                &["[20, 20]", "[40, 40]", "[80, 80]"],
             ),
-            family(
-                "linear, crossed",
-                PLANE,
-                &[],
-                &["[10, 10]", "[20, 20]", "[40, 40]", "[80, 80]", "[120, 120]"],
-            ),
+            family("linear, crossed", PLANE, &[], &["[10, 10]", "[20, 20]", "[40, 40]", "[80, 80]"]),
             family(
                 "quadratic",
                 PLANE,
                 &["mesh.order=2", "mesh.rectangle.diagonal=alternating"],
-                &["[10, 10]", "[20, 20]", "[40, 40]", "[80, 80]"],
+                &["[10, 10]", "[20, 20]", "[40, 40]"],
             ),
             family(
                 "quadratic, graded",
@@ -98,7 +88,7 @@ const PROBLEMS: &[Problem] = &[
                     "mesh.rectangle.diagonal=alternating",
                     "mesh.rectangle.grading={x = 1.5, y = 1.5, toward = ['left', 'top']}",
                 ],
-                &["[10, 10]", "[20, 20]", "[40, 40]", "[80, 80]"],
+                &["[10, 10]", "[20, 20]", "[40, 40]"],
             ),
         ],
     },
@@ -188,6 +178,7 @@ fn tables(problem: &Problem) -> (String, String) {
     let mut best =
         format!("| {} | {} |\n|:--|{}\n", problem.name, head.join(" | "), "--:|".repeat(TARGETS.len()));
     for family in problem.families {
+        eprintln!("{}: {}", problem.name, family.name);
         let costs: Vec<Cost> = family.cells.iter().map(|cells| measure(problem, family, cells)).collect();
         for Cost { family, cells, unknowns, error, seconds, bytes } in &costs {
             all += &format!(

@@ -3,6 +3,7 @@
 use crate::{
     case::Case,
     hdf5_file::NumberFile,
+    launch,
     report::report,
     results::{Results, relative_difference},
 };
@@ -84,4 +85,49 @@ fn the_report_shows_the_indicator_and_its_total() {
     assert!((shown / total - 1.0).abs() < 1e-4, "{shown} {total}");
     assert!(html.contains("id=\"error_indicator\"") && html.contains("error indicator / √(J/m)"));
     assert!(html.contains("error indicator over the norm of the stress at the end"));
+}
+
+/// For an error of a fourth, linear cells become four times as small where they are all alike; here the largest error sits at corners.
+#[test]
+fn sizes_for_a_better_mesh_cover_all_cells_and_are_smallest_where_the_error_is_largest() {
+    for (order, parts) in [(1, 1), (2, 4)] {
+        let case = square().set("mesh.order", &order.to_string()).run_and_keep(1);
+        let output = case.results().path("sizes.pos");
+        let folder = case.results().path("");
+        let words =
+            ["remesh".as_ref(), folder.as_os_str(), "--error".as_ref(), "0.05".as_ref(), "-o".as_ref()];
+        let words: Vec<_> = words.into_iter().chain([output.as_os_str()]).collect();
+        launch::run_alone(&words).expect(0).says("cells instead of 128 for an error of 5.00 %");
+        let text = std::fs::read_to_string(&output).expect("sizes");
+        let corner = |line: &str| -> ([f64; 2], f64) {
+            let (place, sizes) = line.split_once(")").expect("places");
+            let numbers = |list: &str| -> Vec<f64> {
+                list.split(',').map(|number| number.parse().expect("a number")).collect()
+            };
+            let places = numbers(place.trim_start_matches("ST("));
+            let sizes = numbers(sizes.trim_matches(['{', '}', ';']));
+            assert_eq!((places.len(), sizes.len()), (9, 3), "{line}");
+            ([places[0], places[1]], sizes[0])
+        };
+        let found: Vec<_> = text.lines().filter(|line| line.starts_with("ST(")).map(corner).collect();
+        assert_eq!(found.len(), 128 * parts);
+        let [x, y] = found.iter().min_by(|a, b| a.1.total_cmp(&b.1)).expect("sizes").0;
+        assert!(x < 0.2 && !(0.2..0.8).contains(&y), "the smallest size is at {x}, {y}");
+    }
+}
+
+#[test]
+fn sizes_need_the_indicator_a_share_and_a_view() {
+    let case = Case::square(4).run_and_keep(1);
+    let folder = case.results().path("");
+    let refused = |error: &str, name: &str, words: &str| {
+        let output = case.results().path(name);
+        let arguments = ["remesh".as_ref(), folder.as_os_str(), "--error".as_ref(), error.as_ref()];
+        let arguments: Vec<_> = arguments.into_iter().chain(["-o".as_ref(), output.as_os_str()]).collect();
+        launch::run_alone(&arguments).expect(2).says(words);
+        assert!(!output.exists());
+    };
+    refused("0.05", "sizes.pos", "add `error_indicator = true` to [output]");
+    refused("0.05", "sizes.msh", "give a file that ends in .pos");
+    refused("5", "sizes.pos", "the wanted error is 5");
 }
