@@ -40,6 +40,14 @@ pub(super) fn check(findings: &mut Findings<'_>) {
                     "delete one, or write two tables",
                 );
             }
+            (true, false)
+                if root
+                    .read::<Vec<Scalar>>(&format!("{traction}.value"))
+                    .is_some_and(|value| value.is_empty()) =>
+            {
+                let help = "give a number or an expression for each axis";
+                findings.fault(&format!("{traction}.value"), "this value has no components", help);
+            }
             (false, false) => {
                 let help = "add value = [..], or pressure = .. against the normal";
                 findings.fault(&traction, "this traction has neither `value` nor `pressure`", help);
