@@ -97,7 +97,7 @@ const PROBLEMS: &[Problem] = &[
         job: "verification/hertz_line",
         quantity: "resultant.contact bottom.largest_pressure",
         reference: 27_472_527.472_527_478,
-        changes: &[],
+        changes: &["solver.preconditioner=cholesky"],
         families: &[
             family(
                 "linear, uniform",
