@@ -167,7 +167,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         let mut outcome = Outcome::default();
         let mut squares = self.elastic_support.add_start_forces(nodal.displacement, forces);
         if let (Some(mass), Evaluation::Start(blend)) = (&self.redistributed_mass, at) {
-            mass.add_product(1.0 / blend.length, nodal.velocity, forces);
+            mass.add_product(1.0 / blend.length, |at| nodal.velocity[at], forces);
         }
         for effect in &mut self.surface_effects {
             effect.evaluate(at, step, nodal.previous_displacement, forces, &mut outcome);
@@ -295,7 +295,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
     fn add_linear_form(&self, form: Form, x: &[f64], forces: &mut [f64]) {
         self.elastic_support.add_form(form, x, forces);
         if let Some(mass) = self.redistributed_mass.as_ref().filter(|_| form == Form::Mass) {
-            mass.add_product(1.0, x, forces);
+            mass.add_product(1.0, |at| x[at], forces);
         }
         let needs =
             Needs { strain_rate: form != Form::Mass, velocity: form == Form::Mass, ..Needs::default() };
@@ -462,9 +462,8 @@ impl<const D: usize, const S: usize> Body<D, S> {
                     batch.scatter(&self.mesh, forces);
                 });
                 if let Some(mass) = &self.redistributed_mass {
-                    let change =
-                        nodal.velocity.iter().zip(nodal.previous_velocity).map(|(now, before)| now - before);
-                    mass.add_product(-1.0 / length, &change.collect::<Vec<_>>(), forces);
+                    let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
+                    mass.add_product(-1.0 / length, change, forces);
                 }
             })?;
         }

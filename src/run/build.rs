@@ -9,7 +9,9 @@ use crate::{
             Contact, ContactConditions, ElasticPoint, ElasticSupport, Gravity, Load, LoadedObstacle,
             Resistances, SupportMotion, Supports, Traction, choose_unknowns, effects, surface_effects,
         },
-        space::{Geometry, Held, SurfacePoint, cell_rule, facets, surface_means, surface_points, values},
+        space::{
+            Geometry, Held, SurfacePoint, cell_rule, facets, place_in_cell, surface_means, surface_points,
+        },
         state::State,
     },
     job::{self, Job, Scalar},
@@ -17,7 +19,7 @@ use crate::{
         contact::{Gap, NormalResponse, Quadrature},
         material::{ByMaterial, Hypothesis, Material},
     },
-    linear_algebra::tensor::{Mandel, Vector, add_scaled, component, norm},
+    linear_algebra::tensor::{Mandel, Vector, component, norm},
     mesh::Mesh,
     parallel::{agreement::Agreed, session::Session},
     solver::stepping::evaluation,
@@ -144,9 +146,7 @@ fn place_of<const D: usize>(mesh: &Mesh<D>, cell: usize, point: usize) -> Vector
         let corners = &mesh.corners(cell)[..=D];
         return std::array::from_fn(|i| corners.iter().map(|corner| corner[i]).sum::<f64>() / (D + 1) as f64);
     }
-    let shares = values(D + 1, &cell_rule::<D>()[point].0);
-    let nodes = mesh.cell_nodes(cell).zip(shares);
-    nodes.fold([0.0; D], |sum, (node, share)| add_scaled(&sum, share, &mesh.nodes[node as usize]))
+    place_in_cell(mesh, cell, &cell_rule::<D>()[point].0)
 }
 
 /// The springs and dashpots of the supports that give way. Collective.

@@ -16,7 +16,9 @@ pub use batch::{Batch, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
 pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;
-pub use quadratic::{MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, values};
+pub use quadratic::{
+    MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, node_count, place_in_cell, values,
+};
 pub use quadrature::{CellRule, MOST_POINTS, cell_rule, fine_cell_rule};
 pub use surface::{
     FacetPoint, SurfacePoint, acts_at_midsides, add_corner_means, facet_points, facets, surface_means,

@@ -6,7 +6,10 @@
 //! nodal values, and forces on the corners of the linear cell go to the nodes by the same coefficients. The same holds for
 //! coordinates: the linear function of the coordinates of a curved cell has its Jacobian.
 
-use crate::mesh::shape::edges_of_cell;
+use crate::{
+    linear_algebra::tensor::{Vector, add_scaled},
+    mesh::{Mesh, shape::edges_of_cell},
+};
 
 /// The edge of a tetrahedron that has no corner in common with each of its edges.
 pub const OPPOSITE: [usize; 6] = [5, 3, 4, 1, 2, 0];
@@ -22,7 +25,7 @@ pub fn edges(corners: usize) -> &'static [[usize; 2]] {
 
 /// Number of the nodes of a quadratic cell.
 #[inline(always)]
-pub(super) const fn node_count<const D: usize>() -> usize {
+pub const fn node_count<const D: usize>() -> usize {
     (D + 1) * (D + 2) / 2
 }
 
@@ -36,6 +39,18 @@ pub fn values(corners: usize, place: &[f64]) -> [f64; MOST_NODES] {
         *value = 4.0 * place[i] * place[j];
     }
     out
+}
+
+/// The place in m of a point of a cell, given in barycentric coordinates.
+pub fn place_in_cell<const D: usize>(mesh: &Mesh<D>, cell: usize, point: &[f64; 4]) -> Vector<D> {
+    let mut shares = [0.0; MOST_NODES];
+    if mesh.order() == 1 {
+        shares[..=D].copy_from_slice(&point[..=D]);
+    } else {
+        shares = values(D + 1, point);
+    }
+    let nodes = mesh.cell_nodes(cell).zip(shares);
+    nodes.fold([0.0; D], |sum, (node, share)| add_scaled(&sum, share, &mesh.nodes[node as usize]))
 }
 
 /// The derivatives of the function of a node by the barycentric coordinates at a point.

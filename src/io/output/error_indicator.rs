@@ -24,7 +24,7 @@ use crate::{
     fem::{
         body::Body,
         effect::Form,
-        space::{cell_rule, fine_cell_rule, values},
+        space::{MOST_NODES, cell_rule, fine_cell_rule, node_count, place_in_cell},
     },
     job::Output,
     laws::material::Isotropic,
@@ -84,14 +84,14 @@ pub struct ErrorIndicator<const S: usize> {
     patches: DistributedVector,
 }
 
-/// Values of the indicator.
+/// The indicator of a state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indicated {
-    /// For each cell of this rank, `eta_K` in the root of J, in 2D per metre of thickness.
+    /// `eta_K` of each cell here, in J^(1/2), in two dimensions (J/m)^(1/2); zero where the material has no elasticity.
     pub cells: Vec<f64>,
-    /// The root of the sum of their squares over all cells.
+    /// The square root of the sum of the squares over all ranks.
     pub total: f64,
-    /// Its ratio to the root of the sum of its square and that of the norm of the stress; 0 if both are.
+    /// The total relative to the norm of the stress including the error: about 0.1 means an error of 10 %.
     pub relative: f64,
 }
 
@@ -101,7 +101,7 @@ impl<const S: usize> ErrorIndicator<S> {
         let mine = body.geometry.runs.iter().map(|run| body.table_of(run.material) + 1).max().unwrap_or(0);
         let count = session.largest([mine as f64])[0] as usize;
         let of = |table| body.tensor(Form::Elasticity, table).is_some();
-        let terms = if body.mesh.order() == 1 { 1 } else { most_terms::<D>() };
+        let terms = if body.mesh.order() == 1 { 1 } else { node_count::<D>() };
         let width = triangle(terms) + S * terms;
         let patches = DistributedVector::ghosted(width, body.mesh.owned, &body.mesh.ghosts);
         Ok(Self { is_elastic: (0..count).map(of).collect(), terms, patches: session.agree(patches)? })
@@ -134,7 +134,7 @@ impl<const S: usize> ErrorIndicator<S> {
                 let mut error = 0.0;
                 for (place, weight) in rule {
                     let here = stress_at::<D, S>(own, place);
-                    let x = position(body, cell, place);
+                    let x = place_in_cell(&body.mesh, cell, place);
                     let mut apart = [0.0; S];
                     for (&node, share) in body.mesh.cell(cell).iter().zip(place) {
                         let basis = basis(&add_scaled(&x, -1.0, &body.mesh.nodes[node as usize]));
@@ -166,7 +166,7 @@ impl<const S: usize> ErrorIndicator<S> {
             let volume = body.geometry.cell(cell).volume;
             for (point, (place, share)) in cell_rule::<D>().iter().enumerate().take(points) {
                 let weight = if points == 1 { volume } else { share * volume };
-                let (x, stress) = (position(body, cell, place), &stress[cell * points + point]);
+                let (x, stress) = (place_in_cell(&body.mesh, cell, place), &stress[cell * points + point]);
                 for &node in body.mesh.cell(cell) {
                     let basis = &basis(&add_scaled(&x, -1.0, &body.mesh.nodes[node as usize]))[..self.terms];
                     let patch = &mut patches[node as usize * width..][..width];
@@ -192,9 +192,8 @@ impl<const S: usize> ErrorIndicator<S> {
                 continue;
             }
             // Of few points, a polynomial of lower degree.
-            let factor =
-                [terms, dimension + 1].into_iter().find_map(|count| factored(matrix, count.min(terms)));
-            match factor.filter(|_| terms > 1) {
+            let degrees = [terms, dimension + 1].into_iter().filter(|_| terms > 1);
+            match degrees.filter_map(|count| factored(matrix, count)).next() {
                 Some(factor) => sides.chunks_exact_mut(terms).for_each(|side| factor.solve(side)),
                 None => sides.chunks_exact_mut(terms).for_each(|side| {
                     side[0] /= matrix[0];
@@ -207,32 +206,14 @@ impl<const S: usize> ErrorIndicator<S> {
     }
 }
 
-/// A place in a cell, given in barycentric coordinates; of linear cells, whose polynomials are constant, the origin.
-fn position<const D: usize, const S: usize>(body: &Body<D, S>, cell: usize, place: &[f64; 4]) -> Vector<D> {
-    if body.mesh.order() == 1 {
-        return [0.0; D];
-    }
-    let shares = values(D + 1, place);
-    let nodes = body.mesh.cell_nodes(cell).map(|node| &body.mesh.nodes[node as usize]);
-    nodes.zip(shares).fold([0.0; D], |sum, (node, share)| add_scaled(&sum, share, node))
-}
-
-/// Terms of a quadratic polynomial.
-const fn most_terms<const D: usize>() -> usize {
-    (D + 1) * (D + 2) / 2
-}
-
 /// Entries of the lower triangle of a matrix.
 const fn triangle(rows: usize) -> usize {
     rows * (rows + 1) / 2
 }
 
-/// Terms of a quadratic polynomial in space.
-const MOST_TERMS: usize = 10;
-
-/// The terms of a quadratic polynomial at a place: one, the linear and the quadratic ones.
-fn basis<const D: usize>(x: &Vector<D>) -> [f64; MOST_TERMS] {
-    let mut out = [0.0; MOST_TERMS];
+/// The terms, as many as a quadratic cell has nodes, of a quadratic polynomial at a place: one, the linear and the quadratic ones.
+fn basis<const D: usize>(x: &Vector<D>) -> [f64; MOST_NODES] {
+    let mut out = [0.0; MOST_NODES];
     out[0] = 1.0;
     out[1..=D].copy_from_slice(x);
     let pairs = (0..D).flat_map(|i| (0..=i).map(move |j| x[i] * x[j]));
@@ -243,8 +224,8 @@ fn basis<const D: usize>(x: &Vector<D>) -> [f64; MOST_TERMS] {
 /// The Cholesky factor of the first rows and columns of a matrix, scaled to a diagonal of ones.
 struct Factor {
     count: usize,
-    scales: [f64; MOST_TERMS],
-    rows: [[f64; MOST_TERMS]; MOST_TERMS],
+    scales: [f64; MOST_NODES],
+    rows: [[f64; MOST_NODES]; MOST_NODES],
 }
 
 /// Squares of pivots below this mean that the points determine no polynomial of this degree.
@@ -253,7 +234,7 @@ const LEAST_PIVOT: f64 = 1e-3;
 /// Factors the first `count` rows and columns of a matrix, given by its lower triangle; `None` if it is nearly singular.
 fn factored(matrix: &[f64], count: usize) -> Option<Factor> {
     let entry = |i: usize, j: usize| matrix[triangle(i) + j];
-    let mut factor = Factor { count, scales: [0.0; MOST_TERMS], rows: [[0.0; MOST_TERMS]; MOST_TERMS] };
+    let mut factor = Factor { count, scales: [0.0; MOST_NODES], rows: [[0.0; MOST_NODES]; MOST_NODES] };
     for i in 0..count {
         factor.scales[i] = 1.0 / entry(i, i).sqrt();
         for j in 0..=i {

@@ -157,13 +157,10 @@ impl Gap {
 
 /// An axis of rotation; in the plane, where none is given, z.
 fn axis_of(given: &[f64]) -> Vector<3> {
-    match given {
-        [] => [0.0, 0.0, 1.0],
-        _ => std::array::from_fn(|i| given.get(i).copied().unwrap_or(0.0)),
-    }
+    if given.is_empty() { [0.0, 0.0, 1.0] } else { in_space(given) }
 }
 
-fn in_space<const D: usize>(vector: &Vector<D>) -> Vector<3> {
+fn in_space(vector: &[f64]) -> Vector<3> {
     std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
 }
 

@@ -214,7 +214,7 @@ impl<const D: usize> Friction<D> {
                 Tangent { sticks: true, theta: [0.0; 2], ..Tangent::free() }
             } else if at_rest {
                 // Without a bound, or with one that grows from zero with the velocity.
-                let theta = scale * found.derivative;
+                let theta = 1.0 / (1.0 + found.slope / scale);
                 Tangent { theta: [theta; 2], slopes: [found.slope; 2], ..Tangent::free() }
             } else {
                 Tangent {
