@@ -32,6 +32,8 @@ pub struct Quality {
     /// Number of cells below [`POOR_QUALITY`].
     #[serde(rename = "poor_cells")]
     pub poor: usize,
+    /// The mean of the inverse quality of the cells, at least 1.
+    pub mean_inverse: f64,
 }
 
 /// Refuses a mesh with node ids that do not exist, coordinates that are not finite, degenerate, inverted or overlapping cells,
@@ -165,7 +167,9 @@ impl<const D: usize> Mesh<D> {
         let smallest = -session.largest([-own.smallest])[0];
         let worst = if own.smallest == smallest { own.worst_cell as f64 } else { f64::INFINITY };
         let worst_cell = -session.largest([-worst])[0] as usize;
-        Quality { smallest, worst_cell, poor: session.total(own.poor) }
+        let [inverse, cells] =
+            session.sum([own.mean_inverse * self.cell_count() as f64, self.cell_count() as f64]);
+        Quality { smallest, worst_cell, poor: session.total(own.poor), mean_inverse: inverse / cells }
     }
 }
 
@@ -181,8 +185,11 @@ impl<const D: usize> Mesh<D> {
 impl Quality {
     /// Of cells, each with its id and quality.
     fn of(cells: impl Iterator<Item = (usize, f64)>) -> Self {
-        let mut summary = Self { smallest: 1.0, worst_cell: 0, poor: 0 };
+        let mut summary = Self { smallest: 1.0, worst_cell: 0, poor: 0, mean_inverse: 1.0 };
+        let mut count = 0.0;
         for (cell, quality) in cells {
+            count += 1.0;
+            summary.mean_inverse += (1.0 / quality - summary.mean_inverse) / count;
             summary.poor += (quality < POOR_QUALITY) as usize;
             if quality < summary.smallest {
                 (summary.smallest, summary.worst_cell) = (quality, cell);
@@ -296,5 +303,8 @@ mod tests {
         let quality = mesh.quality_summary();
         assert_eq!((quality.worst_cell, quality.poor), (1, 1));
         assert!(quality.smallest > 0.0 && quality.smallest < POOR_QUALITY);
+        let inverse = [0, 1].map(|cell| 1.0 / shape::quality(&mesh.corners(cell)[..3]));
+        let mean = 0.5 * (inverse[0] + inverse[1]);
+        assert!((quality.mean_inverse - mean).abs() < 1e-12 * mean, "{} {mean}", quality.mean_inverse);
     }
 }

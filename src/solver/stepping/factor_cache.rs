@@ -146,6 +146,7 @@ mod tests {
                 dimension: 3,
                 order: 1,
                 unknowns,
+                inverse_quality: 1.2,
                 ranks,
                 steps: 2,
                 interface: 0,

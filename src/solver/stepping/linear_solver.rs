@@ -12,7 +12,7 @@ pub(super) use crate::job::Solver as SolverSettings;
 pub use crate::job::{FactorPrecision, FrictionIteration, Method, Preconditioner};
 
 /// The problem sizes that determine the choice of a preconditioner.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProblemSize {
     /// Dimension of the space.
     pub dimension: usize,
@@ -20,6 +20,8 @@ pub struct ProblemSize {
     pub order: usize,
     /// Velocity components over all ranks.
     pub unknowns: usize,
+    /// The mean of the inverse shape quality of the cells.
+    pub inverse_quality: f64,
     /// Processes.
     pub ranks: usize,
     /// Number of steps that share one matrix, as far as it is known.
@@ -167,6 +169,7 @@ mod tests {
             dimension,
             order: 1,
             unknowns,
+            inverse_quality: 1.2,
             ranks,
             interface,
             steps,
@@ -208,6 +211,15 @@ mod tests {
         assert_eq!(precision_of(requested(1000)), Precision::Single);
         let (_, why) = Preconditioner::Cholesky.resolve(requested(1));
         assert!(why.ends_with("; factors in single precision"), "{why}");
+    }
+
+    #[test]
+    fn flat_cells_are_expensive_for_multigrid() {
+        let one_step = problem(3, 100_000, 1, 1);
+        let flat = ProblemSize { inverse_quality: 20.0, ..one_step };
+        assert_eq!([chosen(one_step), chosen(flat)], [Preconditioner::Gamg, Preconditioner::Cholesky]);
+        let [regular, slow] = [one_step, flat].map(|problem| problem.cost(Preconditioner::Gamg));
+        assert!(slow.step > 10.0 * regular.step && slow.set_up == regular.set_up, "{regular:?} {slow:?}");
     }
 
     #[test]
