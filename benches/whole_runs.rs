@@ -1,5 +1,5 @@
 //! Whole runs against the memory bandwidth of the same machine:
-//! `cargo bench --bench whole_runs -- [--quick] [--ranks N] [--peer "COMMAND"] [--write]`.
+//! `cargo bench --bench whole_runs -- [--quick] [--ranks N] [--orders] [--peer "COMMAND"] [--write]`.
 //!
 //! Runs the solver on the problem of Wang and Cheng (2022) in the plane and in space, on one process, and takes seconds and bytes
 //! by phase from `summary.json`. The bytes are those that have to be moved at the least if nothing stays in cache; a triad before
@@ -7,6 +7,9 @@
 //! residual of 1e-8 of the forces.
 //!
 //! With `--ranks N` the same problems are run on one process and on N instead, in turn, three times, and the medians compared.
+//!
+//! With `--orders` they are run with quadratic cells and with linear cells of half the size instead, in turn, three times: with equal
+//! unknowns.
 //!
 //! A peer is another program for the same problem: its command is given the dimension, the cells along an edge, the number of steps,
 //! the preconditioner (cholesky or gamg) and the number of processes, and prints the seconds that a step took as its last word. Its
@@ -45,13 +48,14 @@ struct Case {
     dimension: usize,
     /// Along an edge.
     cells: usize,
+    order: usize,
     steps: u32,
     preconditioner: &'static str,
     quick: bool,
 }
 
 const fn case(dimension: usize, cells: usize, steps: u32, preconditioner: &'static str, quick: bool) -> Case {
-    Case { dimension, cells, steps, preconditioner, quick }
+    Case { dimension, cells, order: 1, steps, preconditioner, quick }
 }
 
 const CASES: [Case; 9] = [
@@ -68,6 +72,15 @@ const CASES: [Case; 9] = [
 
 /// A problem that is compared on one process and on several besides those of the table by phases.
 const LARGE_CUBE: Case = case(3, 48, 16, "auto", false);
+/// Problems that are compared with linear cells and with quadratic ones of twice the size.
+const ORDERS: [Case; 6] = [
+    case(2, 128, 64, "cholesky", true),
+    case(2, 256, 32, "cholesky", false),
+    case(2, 256, 32, "gamg", true),
+    case(3, 16, 16, "cholesky", true),
+    case(3, 32, 16, "cholesky", false),
+    case(3, 32, 16, "gamg", true),
+];
 /// How often each is run.
 const REPETITIONS: usize = 3;
 /// Where the table of ranks stands.
@@ -78,6 +91,7 @@ const RANKS_PAGE: &str = "docs/scaling.md";
 struct Wanted {
     quick: bool,
     ranks: Option<u32>,
+    orders: bool,
     peer: Option<String>,
     write: bool,
 }
@@ -91,12 +105,15 @@ fn wanted() -> Wanted {
             "--bench" => {}
             "--quick" => wanted.quick = true,
             "--write" => wanted.write = true,
+            "--orders" => wanted.orders = true,
             "--ranks" => {
                 let count = words.next().and_then(|word| word.parse().ok()).filter(|count| *count > 1);
                 wanted.ranks = Some(count.expect("a number above 1 behind --ranks"));
             }
             "--peer" => wanted.peer = Some(words.next().expect("a command behind --peer")),
-            other => panic!("{other}: known are --quick, --write, --ranks N and --peer \"COMMAND\""),
+            other => {
+                panic!("{other}: known are --quick, --write, --orders, --ranks N and --peer \"COMMAND\"")
+            }
         }
     }
     wanted
@@ -111,6 +128,7 @@ fn run(case: &Case, ranks: u32) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
     let settings = [
         cells,
+        format!("mesh.order={}", case.order),
         format!("time.step={}", 1.0 / f64::from(RATE)),
         format!("time.end={}", f64::from(case.steps) / f64::from(RATE)),
         format!("solver.preconditioner={:?}", case.preconditioner),
@@ -262,8 +280,41 @@ fn on_ranks(wanted: &Wanted, ranks: u32) {
     }
 }
 
+/// Compares linear cells with quadratic ones of twice the size.
+fn orders(wanted: &Wanted) {
+    let mut triad = Triad::new();
+    let bandwidth = BYTES as f64 / fastest(&mut || triad.run());
+    let mut table = "| problem with linear cells, unknowns, preconditioner, steps | ms a step: linear, quadratic | ratio | whole run, s: linear, \
+                     quadratic | ratio | peak memory, MB: linear, quadratic | ratio |\n|---|---|---|---|---|---|---|\n"
+        .to_owned();
+    print!("{table}");
+    for linear in ORDERS.iter().filter(|case| case.quick || !wanted.quick) {
+        let quadratic = Case { cells: linear.cells / 2, order: 2, ..*linear };
+        let mut costs = [Vec::new(), Vec::new()];
+        let mut words = String::new();
+        for _ in 0..REPETITIONS {
+            for (case, costs) in [&quadratic, linear].into_iter().zip(&mut costs) {
+                let summary = run(case, 1);
+                costs.push(cost(case, &summary));
+                words = head(case, &summary);
+            }
+        }
+        let [quadratic, linear] = costs.map(|costs| median(&costs));
+        let line = against(&words, linear, quadratic);
+        println!("{line}");
+        writeln!(table, "{line}").expect("text");
+    }
+    if wanted.write {
+        table::write(PAGE, "orders of cells", "make bench-runs ARGS='--orders --write'", bandwidth, &table);
+    }
+}
+
 fn main() {
     let wanted = wanted();
+    if wanted.orders {
+        orders(&wanted);
+        return;
+    }
     if let Some(ranks) = wanted.ranks {
         on_ranks(&wanted, ranks);
         return;

@@ -56,5 +56,13 @@ fn small_jobs_take_as_many_iterations_as_they_did() {
 fn multigrid_takes_as_many_iterations_as_it_did() {
     let gamg = |case: Case| case.set("solver.preconditioner", "'gamg'");
     let [square, cube] = [gamg(Case::square(32)), gamg(Case::cube(6)).set("time.end", "0.25")];
-    assert_counts(&[("square", &square, 1, [66.0, 447.0]), ("cube", &cube, 2, [17.0, 98.0])]);
+    let [quadratic_square, quadratic_cube] = [Case::square(16), Case::cube(3).set("time.end", "0.25")]
+        .map(|case| gamg(case.set("mesh.order", "2")));
+    assert_counts(&[
+        ("square", &square, 1, [66.0, 447.0]),
+        ("cube", &cube, 2, [17.0, 98.0]),
+        ("square of quadratic cells", &quadratic_square, 1, [65.0, 427.0]),
+        ("square of quadratic cells", &quadratic_square, 2, [66.0, 474.0]),
+        ("cube of quadratic cells", &quadratic_cube, 2, [17.0, 96.0]),
+    ]);
 }

@@ -126,6 +126,13 @@ fn a_cube_under_gamg_is_the_same_on_any_number_of_ranks() {
 }
 
 #[test]
+fn quadratic_cells_under_gamg_are_the_same_on_any_number_of_ranks() {
+    let quadratic = |case: Case| case.set("mesh.order", "2").set("solver.preconditioner", "'gamg'");
+    compare(|| quadratic(Case::square(6)), "quadratic square");
+    compare(|| quadratic(Case::cube(3).set("time.end", "0.5")), "quadratic cube");
+}
+
+#[test]
 fn a_cube_under_boomeramg_is_the_same_on_any_number_of_ranks() {
     cube("boomeramg", "nodal");
 }

@@ -95,7 +95,9 @@ fn a_restarted_run_with_profiles_at_times_of_their_own_is_the_straight_run_to_th
 #[test]
 fn a_restarted_run_under_gamg_is_the_straight_run_to_the_last_bit() {
     for ranks in [1, 2, 3, 4] {
-        compare_with_straight(|| saving().set("solver.preconditioner", "'gamg'"), ranks, "gamg");
+        let gamg = || saving().set("solver.preconditioner", "'gamg'");
+        compare_with_straight(gamg, ranks, "gamg");
+        compare_with_straight(|| gamg().set("mesh.order", "2"), ranks, "gamg with quadratic cells");
     }
 }
 

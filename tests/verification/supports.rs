@@ -78,6 +78,12 @@ fn turned<const D: usize>(vector: &[f64; D]) -> [f64; D] {
     out
 }
 
+/// The job with quadratic cells and a preconditioner.
+fn quadratic(job: &str, preconditioner: &str) -> String {
+    let solver = format!("[solver]\npreconditioner = \"{preconditioner}\"");
+    format!("[mesh]\norder = 2\n{}", job.replace("[solver]", &solver))
+}
+
 fn in_dimension<const D: usize, const S: usize>(session: &Session, mesh: &GlobalMesh<D>) {
     let mut slanted = mesh.clone();
     slanted.nodes.iter_mut().for_each(|node| *node = turned(node));
@@ -86,12 +92,17 @@ fn in_dimension<const D: usize, const S: usize>(session: &Session, mesh: &Global
     } else {
         ""
     };
-    for scheme in SCHEMES {
+    let linear = SCHEMES.map(|scheme| (scheme, None));
+    for (scheme, preconditioner) in linear.into_iter().chain([("lagged_euler", Some("gamg"))]) {
         let force = [1.0, 0.0, -5.0];
-        let (_, straight) = moved::<D, S>(session, &job::<D>(scheme, force, front), mesh);
+        let made = |force, preconditioner: Option<&str>| {
+            let job = job::<D>(scheme, force, front);
+            preconditioner.map_or(job.clone(), |preconditioner| quadratic(&job, preconditioner))
+        };
+        let straight = made(force, preconditioner.map(|_| "cholesky"));
+        let (_, straight) = moved::<D, S>(session, &straight, mesh);
         let plane = turned(&[force[0], force[2]]);
-        let force = [plane[0], 0.0, plane[1]];
-        let (run, found) = moved::<D, S>(session, &job::<D>(scheme, force, front), &slanted);
+        let (run, found) = moved::<D, S>(session, &made([plane[0], 0.0, plane[1]], preconditioner), &slanted);
         let pairs = straight.chunks_exact(D).zip(found.chunks_exact(D));
         let mut worst = 0.0;
         for (straight, found) in pairs {
@@ -100,7 +111,7 @@ fn in_dimension<const D: usize, const S: usize>(session: &Session, mesh: &Global
         }
         assert!(
             worst < 1e-10,
-            "{scheme} in {D}D: displacements differ by {worst:e} after a turn of the body"
+            "{scheme} {preconditioner:?} in {D}D: displacements differ by {worst:e} after a turn of the body"
         );
         let held: usize = run.body.held.slanted().len();
         assert!(session.total(held) > 0, "nodes are held along slanted normals");

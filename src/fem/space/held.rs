@@ -183,7 +183,7 @@ impl<const D: usize> Held<D> {
     }
 }
 
-fn axis<const D: usize>(i: usize) -> Vector<D> {
+pub(super) fn axis<const D: usize>(i: usize) -> Vector<D> {
     std::array::from_fn(|j| f64::from(u8::from(i == j)))
 }
 

@@ -5,6 +5,7 @@ mod batch;
 mod geometry;
 mod held;
 mod kernels;
+mod linear_subspace;
 mod quadratic;
 mod quadrature;
 #[cfg(test)]
@@ -16,6 +17,7 @@ pub use batch::{Batch, Integrity, Needs, Nodal};
 pub use geometry::{Cell, CellRun, CellShape, Geometry, Simplex, SimplexPack};
 pub use held::{Held, Slanted};
 pub use kernels::NodalPacks;
+pub use linear_subspace::linear_subspace;
 pub use quadratic::{
     MOST_NODES, MassCoefficients, OPPOSITE, edges, linear_at, nodal_forces, node_count, place_in_cell, values,
 };

@@ -122,8 +122,7 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioner {
-    /// "gamg" if the factor would take more than 4 GB of memory, or on several ranks with more than 50,000 velocity components;
-    /// otherwise "cholesky" or "gamg", whichever is estimated to be faster. The log gives the reason.
+    /// "gamg" if a factor would take more than 4 GB of memory on each rank; otherwise "cholesky" or "gamg", whichever is estimated to be faster. The log gives the reason.
     #[default]
     Auto,
     /// Sparse Cholesky factorisation. Fast if the factor fits in memory and serves many steps.

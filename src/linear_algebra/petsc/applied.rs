@@ -1,6 +1,6 @@
 //! Memory traffic of products and preconditioners.
 
-use super::{Ksp, Matrix, check, levels::Level, library::is_set, sys};
+use super::{Ksp, Matrix, check, coarse_space::solver_of_levels, levels::Level, library::is_set, sys};
 use crate::error::Result;
 use std::{
     ffi::{CStr, c_char},
@@ -30,6 +30,10 @@ impl Ksp {
             Ok(None)
         } else if is_one_of(kind, &[c"gamg"]) && !is_set(c"-pc_mg_type")? && !is_set(c"-pc_mg_cycle_type")? {
             cycle(pc, &self.levels)
+        } else if let Some(coarse) = self.coarse.as_ref().filter(|_| is_one_of(kind, &[c"mg"])) {
+            // SAFETY: a live preconditioner that is multigrid.
+            let levels = cycle(unsafe { solver_of_levels(pc)? }, &coarse.levels)?;
+            Ok(cycle(pc, &self.levels)?.zip(levels).map(|(fine, coarse)| fine + coarse))
         } else if is_one_of(kind, &[c"shell"]) {
             Ok(self.own.as_ref().map(|own| own.borrow().bytes()))
         } else if is_one_of(kind, &[c"cholesky"]) && ranks == 1 {

@@ -1,5 +1,7 @@
 use super::{
-    DistributedVector, Matrix, c_string, check, index,
+    DistributedVector, Interpolation, Matrix, c_string, check,
+    coarse_space::{self, CoarseSpace},
+    index,
     levels::{self, Level},
     library::communicator,
     own_preconditioner::{self, Own, OwnPreconditioner},
@@ -23,6 +25,8 @@ pub struct Ksp {
     pub(super) levels: Vec<Level>,
     /// The preconditioner, if it is not PETSc's.
     pub(super) own: Option<Box<Own>>,
+    /// The coarse space of multigrid, if it is not PETSc's choice.
+    pub(super) coarse: Option<CoarseSpace>,
     applications: u64,
 }
 
@@ -78,7 +82,7 @@ impl Ksp {
         unsafe {
             let raw = Reference::new(|raw| sys::KSPCreate(communicator(), raw))?;
             check(sys::KSPSetOptionsPrefix(raw.get(), prefix.as_ptr()))?;
-            Ok(Self { raw, levels: Vec::new(), own: None, applications: 0 })
+            Ok(Self { raw, levels: Vec::new(), own: None, coarse: None, applications: 0 })
         }
     }
 
@@ -148,6 +152,19 @@ impl Ksp {
         Ok(())
     }
 
+    /// Preconditions by multigrid of two levels, whose coarse solver is one cycle of algebraic multigrid with options of the prefix
+    /// `mg_coarse_`. The coarse space is set by [`Ksp::set_coarse_space`].
+    pub fn precondition_on_two_levels(&mut self) -> Result<()> {
+        // SAFETY: the preconditioner of this solver.
+        unsafe { coarse_space::two_levels(self.preconditioner()?) }
+    }
+
+    /// Sets the coarse space of multigrid with two levels, for fields of `block` values for each node. Collective.
+    pub fn set_coarse_space(&mut self, block: usize, interpolation: Interpolation) -> Result<()> {
+        self.coarse = Some(CoarseSpace::new(block, interpolation)?);
+        Ok(())
+    }
+
     /// Stops at `relative * |b|` or at `absolute`, whichever is larger, or after this many iterations.
     pub fn set_tolerances(&mut self, relative: f64, absolute: f64, iterations: usize) -> Result<()> {
         let iterations = index(iterations, "linear iterations")?;
@@ -179,6 +196,7 @@ impl Ksp {
     /// Sets up the preconditioner; required after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
+        let is_multigrid = is_type(pc, c"mg")?;
         levels::restore_interpolations(pc, &self.levels)?;
         if let Some(own) = &self.own
             && is_type(pc, c"shell")?
@@ -186,9 +204,18 @@ impl Ksp {
             // SAFETY: the preconditioner of this solver, whose matrices are set.
             unsafe { own_preconditioner::set_up(pc, own)? };
         }
+        let mut coarse = self.coarse.as_mut().filter(|_| is_multigrid);
+        if let Some(coarse) = &mut coarse {
+            // SAFETY: multigrid with a coarse space has two levels; its matrices are set.
+            unsafe { coarse.set_up(pc)? };
+        }
         // SAFETY: live object.
         check(unsafe { sys::KSPSetUp(self.raw.get()) })?;
         self.levels = levels::in_single_precision(pc)?;
+        if let Some(coarse) = coarse {
+            // SAFETY: as before, and it is set up.
+            unsafe { coarse.reduce_precision(pc)? };
+        }
         Ok(())
     }
 
@@ -236,7 +263,7 @@ impl Ksp {
 }
 
 /// Whether a preconditioner has this type.
-fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
+pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
     let mut kind = ptr::null();
     // SAFETY: live preconditioner; PETSc's names are NUL-terminated and live as long as their object.
     unsafe {

@@ -2,11 +2,11 @@
 //! bandwidth, and single precision is accurate enough for them.
 
 use super::{
-    block_product::BlockProduct, block_transfer::BlockTransfer, check, reference::Reference, shell::Shell,
-    sys,
+    block_product::BlockProduct, block_transfer::BlockTransfer, check, ksp::is_type, reference::Reference,
+    shell::Shell, sys,
 };
 use crate::error::Result;
-use std::{ffi::CStr, ptr};
+use std::ptr;
 
 /// A level's matrices.
 #[derive(Debug, Default)]
@@ -22,21 +22,11 @@ impl Level {
     }
 }
 
-/// Whether a preconditioner is PETSc's algebraic multigrid.
-fn is_multigrid(pc: sys::PC) -> Result<bool> {
-    let mut kind = ptr::null();
-    // SAFETY: live object, which owns its name.
-    unsafe {
-        check(sys::PCGetType(pc, &mut kind))?;
-        Ok(!kind.is_null() && CStr::from_ptr(kind) == c"gamg")
-    }
-}
-
 /// Replaces the matrices of each level of a preconditioner that is set up by copies; the list is empty for preconditioners other
-/// than algebraic multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
+/// than multigrid. The preconditioner must not be applied after the levels are dropped. Collective.
 pub(super) fn in_single_precision(pc: sys::PC) -> Result<Vec<Level>> {
     let mut levels = Vec::new();
-    if !is_multigrid(pc)? {
+    if !is_type(pc, c"gamg")? && !is_type(pc, c"mg")? {
         return Ok(levels);
     }
     let mut count = 0;
@@ -79,7 +69,7 @@ pub(super) fn restore_interpolations(pc: sys::PC, levels: &[Level]) -> Result<()
 
 /// # Safety
 /// A live multigrid preconditioner with this level, a live matrix of the right layout.
-unsafe fn set_interpolation(pc: sys::PC, level: sys::PetscInt, matrix: sys::Mat) -> Result<()> {
+pub(super) unsafe fn set_interpolation(pc: sys::PC, level: sys::PetscInt, matrix: sys::Mat) -> Result<()> {
     // SAFETY: the caller's; PETSc keeps its own references.
     unsafe {
         check(sys::PCMGSetInterpolation(pc, level, matrix))?;

@@ -54,16 +54,8 @@ impl Matrix {
         if usize::try_from(rows) != Ok(coordinates.len()) || usize::try_from(size) != Ok(block) {
             return Err(Error::Internal(format!("{} coordinates for {rows} unknowns", coordinates.len())));
         }
-        let (block, all) = (index(block, "block size")?, sys::PETSC_DETERMINE);
-        // SAFETY: the coordinate vector borrows `coordinates` and is dropped before this returns; the matrix takes its own
-        // reference to the null space.
-        unsafe {
-            let points = Reference::new(|raw| {
-                sys::VecCreateMPIWithArray(communicator(), block, rows, all, coordinates.as_ptr(), raw)
-            })?;
-            let motions = Reference::new(|raw| sys::MatNullSpaceCreateRigidBody(points.get(), raw))?;
-            check(sys::MatSetNearNullSpace(self.raw.get(), motions.get()))
-        }
+        // SAFETY: a live matrix of this size.
+        unsafe { set_rigid_motions(self.raw.get(), size, coordinates) }
     }
 
     /// Accelerates later products by a copy of half the size of the matrix. Collective.
@@ -99,6 +91,28 @@ impl Matrix {
             check(sys::MatGetInfo(self.raw.get(), sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
             Ok(counts.assume_init().nz_used)
         }
+    }
+}
+
+/// Attaches the rigid motions of nodes at these coordinates to a matrix.
+///
+/// # Safety
+/// A live matrix with one row on this rank for each coordinate and this block size.
+pub(super) unsafe fn set_rigid_motions(
+    matrix: sys::Mat,
+    block: sys::PetscInt,
+    coordinates: &[f64],
+) -> Result<()> {
+    let rows = index(coordinates.len(), "unknowns of a rank")?;
+    // SAFETY: the coordinate vector borrows `coordinates` and is dropped before this returns; the matrix takes its own
+    // reference to the null space.
+    unsafe {
+        let points = Reference::new(|raw| {
+            let values = coordinates.as_ptr();
+            sys::VecCreateMPIWithArray(communicator(), block, rows, sys::PETSC_DETERMINE, values, raw)
+        })?;
+        let motions = Reference::new(|raw| sys::MatNullSpaceCreateRigidBody(points.get(), raw))?;
+        check(sys::MatSetNearNullSpace(matrix, motions.get()))
     }
 }
 

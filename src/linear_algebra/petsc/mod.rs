@@ -11,6 +11,7 @@ mod block_product;
 mod block_transfer;
 mod callback;
 mod compressed_rows;
+mod coarse_space;
 mod dense;
 mod ksp;
 mod levels;
@@ -26,6 +27,7 @@ mod snes;
 mod variational_inequality;
 mod vector;
 
+pub use coarse_space::Interpolation;
 pub use dense::{DenseCholesky, times_own_transpose};
 pub use ksp::{Ksp, LinearOutcome};
 pub use library::{Entered, Petsc, Stage, clear_option, has_option, set_default_option, set_option, within};

@@ -199,28 +199,30 @@ impl ProblemSize {
             let iterations = self.iterations(iterations);
             let messages = if self.ranks > 1 { CYCLE_MESSAGE_TIME } else { 0.0 };
             let ranks = self.ranks as f64;
-            // The constants were measured with linear cells.
-            let rows = n * (self.coupled_nodes() / self.by_dimension(7.0, 15.0));
             Cost {
                 memory: memory * self.matrix_bytes(),
-                set_up: rows * set_up / ranks + SET_UP_CYCLES * messages,
-                step: iterations * (rows * cycle / ranks + messages),
+                set_up: n * set_up / ranks + SET_UP_CYCLES * messages,
+                step: iterations * (n * cycle / ranks + messages),
             }
         };
         match preconditioner {
             Preconditioner::Auto | Preconditioner::Cholesky => self.factor(self.factor_precision()),
-            Preconditioner::Gamg => multigrid(
-                2.2,
-                self.by_dimension(7e-6, 22e-6),
-                Iterations { without: 20.0, contact: 30.0, friction: 300.0 },
-                self.by_dimension(100e-9, 180e-9),
-            ),
-            Preconditioner::Boomeramg => multigrid(
-                3.5,
-                self.by_dimension(1.5e-6, 5e-6),
-                Iterations { without: 14.0, contact: 20.0, friction: 200.0 },
-                self.by_dimension(120e-9, 300e-9),
-            ),
+            Preconditioner::Gamg => {
+                let [set_up, cycle] = if self.order == 1 {
+                    [self.by_dimension(7e-6, 22e-6), self.by_dimension(100e-9, 180e-9)]
+                } else {
+                    [self.by_dimension(7e-6, 11e-6), self.by_dimension(125e-9, 210e-9)]
+                };
+                let iterations = Iterations { without: 20.0, contact: 30.0, friction: 300.0 };
+                multigrid(2.2, set_up, iterations, cycle)
+            }
+            Preconditioner::Boomeramg => {
+                // The constants were measured with linear cells.
+                let rows = self.coupled_nodes() / self.by_dimension(7.0, 15.0);
+                let iterations = Iterations { without: 14.0, contact: 20.0, friction: 200.0 };
+                let [set_up, cycle] = [self.by_dimension(1.5e-6, 5e-6), self.by_dimension(120e-9, 300e-9)];
+                multigrid(3.5, rows * set_up, iterations, rows * cycle)
+            }
         }
     }
 

@@ -124,16 +124,17 @@ impl Preconditioner {
                 ksp.set_preconditioner("cholesky", Some("mumps"))
             }
             Self::Gamg => {
-                ksp.set_preconditioner("gamg", None)?;
                 if ranks > 2 {
                     set_default_option("matptap_via", "allatonce")?;
                 }
-                set_default_option("pc_gamg_threshold", "0.01")?;
-                set_default_option("pc_gamg_agg_nsmooths", "1")?;
-                set_default_option("pc_gamg_reuse_interpolation", "true")?;
-                set_default_option("mg_levels_ksp_type", "chebyshev")?;
-                set_default_option("mg_levels_ksp_max_it", "2")?;
-                set_default_option("mg_levels_pc_type", "jacobi")
+                set_smoother("")?;
+                if mesh.order() == 1 {
+                    ksp.set_preconditioner("gamg", None)?;
+                    return set_aggregation("");
+                }
+                ksp.precondition_on_two_levels()?;
+                set_smoother("mg_coarse_")?;
+                set_aggregation("mg_coarse_")
             }
             Self::Boomeramg => {
                 require(HAS_HYPRE, "[solver] preconditioner = \"boomeramg\"", "hypre", "use \"gamg\"")?;
@@ -147,6 +148,22 @@ impl Preconditioner {
             }
         }
     }
+}
+
+/// Sets the smoother of the levels of multigrid with this prefix of its options.
+fn set_smoother(prefix: &str) -> Result<()> {
+    for (name, value) in [("ksp_type", "chebyshev"), ("ksp_max_it", "2"), ("pc_type", "jacobi")] {
+        set_default_option(&format!("{prefix}mg_levels_{name}"), value)?;
+    }
+    Ok(())
+}
+
+/// Sets how algebraic multigrid with this prefix of its options aggregates nodes.
+fn set_aggregation(prefix: &str) -> Result<()> {
+    for (name, value) in [("threshold", "0.01"), ("agg_nsmooths", "1"), ("reuse_interpolation", "true")] {
+        set_default_option(&format!("{prefix}pc_gamg_{name}"), value)?;
+    }
+    Ok(())
 }
 
 fn seconds(time: f64) -> String {

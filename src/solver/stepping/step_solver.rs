@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    fem::{body::Body, effect::Contact, state::State},
+    fem::{body::Body, effect::Contact, space::linear_subspace, state::State},
     linear_algebra::petsc::{BlockRows, DistributedVector, Ksp, Matrix, Precision},
     parallel::{agreement::Agreed, session::Session},
 };
@@ -215,6 +215,15 @@ impl StepSolver {
         }
         drop(rows);
         if self.settings.preconditioner == Preconditioner::Gamg {
+            let ksp = match &mut self.solver {
+                Solver::Linear(ksp) => Some(ksp),
+                Solver::Newton(newton) => Some(newton.linear_solver.linear_solver()),
+                Solver::Condensed(_) => None,
+            };
+            if let Some(ksp) = ksp.filter(|_| body.mesh.order() == 2) {
+                let interpolation = session.agree(linear_subspace(session, &body.mesh, &body.held))?;
+                ksp.set_coarse_space(D, interpolation)?;
+            }
             let coordinates = body.mesh.nodes[..body.mesh.owned].as_flattened();
             with_springs.as_mut().unwrap_or(&mut matrix).attach_rigid_motions(D, coordinates)?;
         }
