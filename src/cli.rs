@@ -138,8 +138,8 @@ enum Command {
         /// The wanted error of the stress, relative to its norm.
         #[arg(long, value_name = "SHARE")]
         error: f64,
-        /// The file to write.
-        #[arg(short = 'o', value_name = "FILE.pos")]
+        /// The file to write: a Gmsh view (.pos) or mesh with sizes at its nodes (.msh).
+        #[arg(short = 'o', value_name = "FILE.pos|msh")]
         output: PathBuf,
     },
     /// Print a script with which a shell completes commands, options and files.

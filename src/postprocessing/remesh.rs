@@ -41,14 +41,19 @@ pub struct Written {
     pub new_cells: f64,
 }
 
-/// Writes the sizes that give the stress of a run the wanted relative error, as a Gmsh view (`gmsh -bgm`).
+/// Writes the sizes that give the stress of a run the wanted relative error, as a Gmsh view (`.pos`) or as the present mesh with a size
+/// at each node (`.msh`, format 2.2), both for `gmsh -bgm`.
 pub fn remesh(folder: &Path, wanted: f64, output: &Path) -> Result<Written> {
-    if output.extension().is_none_or(|extension| extension != "pos") {
-        return Err(Error::Refused(format!(
-            "{}: sizes are a Gmsh view; give a file that ends in .pos",
-            output.display()
-        )));
-    }
+    let text_of = match output.extension().and_then(|extension| extension.to_str()) {
+        Some("pos") => view,
+        Some("msh") => mesh_with_sizes,
+        _ => {
+            return Err(Error::Refused(format!(
+                "{}: sizes are a Gmsh view or mesh; give a file that ends in .pos or .msh",
+                output.display()
+            )));
+        }
+    };
     if !(wanted > 0.0 && wanted < 1.0) {
         return Err(Error::Refused(format!(
             "the wanted error is {wanted}; give one between 0 and 1, such as 0.05"
@@ -78,7 +83,7 @@ pub fn remesh(folder: &Path, wanted: f64, output: &Path) -> Result<Written> {
     let order = if snapshot.parts > 1 { 2.0 } else { 1.0 };
     let Sizes { factors, cells } = sizes(&errors, wanted / relative, order, snapshot.dimension());
     let nodal = nodal_sizes(&snapshot, &factors);
-    std::fs::write(output, view(&snapshot, &nodal))
+    std::fs::write(output, text_of(&snapshot, &nodal))
         .map_err(|error| Error::Refused(Error::unwritable(output, error).to_string()))?;
     let smallest = nodal.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = nodal.iter().copied().fold(0.0, f64::max);
@@ -146,6 +151,27 @@ fn view(snapshot: &Snapshot, nodal: &[f64]) -> String {
     text + "};\n"
 }
 
+/// The cells with the sizes at their nodes in format 2.2 of Gmsh.
+fn mesh_with_sizes(snapshot: &Snapshot, nodal: &[f64]) -> String {
+    let kind = if snapshot.dimension() == 2 { 2 } else { 4 };
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", snapshot.nodes.len());
+    // Writing to a String cannot fail.
+    for (id, [x, y, z]) in (1..).zip(&snapshot.nodes) {
+        let _ = writeln!(text, "{id} {x} {y} {z}");
+    }
+    let cells = snapshot.cells().count();
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{cells}");
+    for (id, cell) in (1..).zip(snapshot.cells()) {
+        let nodes: Vec<String> = cell.iter().map(|node| (node + 1).to_string()).collect();
+        let _ = writeln!(text, "{id} {kind} 2 1 1 {}", nodes.join(" "));
+    }
+    let _ = writeln!(text, "$EndElements\n$NodeData\n1\n\"cell size in m\"\n1\n0\n3\n0\n1\n{}", nodal.len());
+    for (id, size) in (1..).zip(nodal) {
+        let _ = writeln!(text, "{id} {size:e}");
+    }
+    text + "$EndNodeData\n"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,7 +230,14 @@ mod tests {
         };
         let nodal = nodal_sizes(&snapshot, &[0.5, 1.5]);
         nodal.iter().zip([0.5, 1.0, 1.0, 1.5]).for_each(|(found, expected)| close(*found, expected));
-        let text = view(&Snapshot { cells: vec![0, 1, 3], ..snapshot }, &[0.5, 1.0, 1.0, 1.5]);
+        let one = Snapshot { cells: vec![0, 1, 3], ..snapshot };
+        let nodal = [0.5, 1.0, 1.0, 1.5];
+        let mesh = mesh_with_sizes(&one, &nodal);
+        let with_nodes =
+            format!("$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0.5 {height} 0\n4 1.5 {height} 0\n$EndNodes\n");
+        assert!(mesh.contains(&with_nodes) && mesh.contains("$Elements\n1\n1 2 2 1 1 1 2 4\n$End"), "{mesh}");
+        assert!(mesh.ends_with("\n4\n1 5e-1\n2 1e0\n3 1e0\n4 1.5e0\n$EndNodeData\n"), "{mesh}");
+        let text = view(&one, &nodal);
         assert_eq!(
             text,
             format!("View \"cell size in m\" {{\nST(0,0,0,1,0,0,1.5,{height},0){{5e-1,1e0,1.5e0}};\n}};\n")

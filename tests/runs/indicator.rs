@@ -128,6 +128,6 @@ fn sizes_need_the_indicator_a_share_and_a_view() {
         assert!(!output.exists());
     };
     refused("0.05", "sizes.pos", "add `error_indicator = true` to [output]");
-    refused("0.05", "sizes.msh", "give a file that ends in .pos");
+    refused("0.05", "sizes.txt", "give a file that ends in .pos or .msh");
     refused("5", "sizes.pos", "the wanted error is 5");
 }
