@@ -9,7 +9,7 @@ use super::{
     sys,
 };
 use crate::error::Result;
-use std::{cell::RefCell, ffi::CStr, ptr};
+use std::{cell::RefCell, ptr};
 
 /// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
 /// before it decreases, and the condition number of a body supported by contact alone is large.
@@ -196,10 +196,10 @@ impl Ksp {
     /// Sets up the preconditioner; required after each change of its matrix. Collective.
     pub fn set_up(&mut self) -> Result<()> {
         let pc = self.preconditioner()?;
-        let is_multigrid = is_type(pc, c"mg")?;
+        let is_multigrid = levels::is_type(pc, c"mg")?;
         levels::restore_interpolations(pc, &self.levels)?;
         if let Some(own) = &self.own
-            && is_type(pc, c"shell")?
+            && levels::is_type(pc, c"shell")?
         {
             // SAFETY: the preconditioner of this solver, whose matrices are set.
             unsafe { own_preconditioner::set_up(pc, own)? };
@@ -259,16 +259,6 @@ impl Ksp {
             check(sys::KSPGetResidualNorm(self.raw.get(), &mut residual))?;
         }
         Ok(LinearOutcome { reason, iterations: usize::try_from(iterations).unwrap_or(0), residual })
-    }
-}
-
-/// Whether a preconditioner has this type.
-pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
-    let mut kind = ptr::null();
-    // SAFETY: live preconditioner; PETSc's names are NUL-terminated and live as long as their object.
-    unsafe {
-        check(sys::PCGetType(pc, &mut kind))?;
-        Ok(!kind.is_null() && CStr::from_ptr(kind) == name)
     }
 }
 

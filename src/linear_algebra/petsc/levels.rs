@@ -2,11 +2,11 @@
 //! bandwidth, and single precision is accurate enough for them.
 
 use super::{
-    block_product::BlockProduct, block_transfer::BlockTransfer, check, ksp::is_type, reference::Reference,
-    shell::Shell, sys,
+    block_product::BlockProduct, block_transfer::BlockTransfer, check, reference::Reference, shell::Shell,
+    sys,
 };
 use crate::error::Result;
-use std::ptr;
+use std::{ffi::CStr, ptr};
 
 /// A level's matrices.
 #[derive(Debug, Default)]
@@ -19,6 +19,16 @@ impl Level {
     /// Bytes moved on this rank by a product of the smoother and a restriction or interpolation; `None` for PETSc's own matrices.
     pub(super) fn bytes(&self) -> [Option<u64>; 2] {
         [self.smoother.as_ref().map(Shell::bytes), self.transfer.as_ref().map(|(shell, _)| shell.bytes())]
+    }
+}
+
+/// Whether a preconditioner has this type.
+pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
+    let mut kind = ptr::null();
+    // SAFETY: live preconditioner; PETSc's names are NUL-terminated and live as long as their object.
+    unsafe {
+        check(sys::PCGetType(pc, &mut kind))?;
+        Ok(!kind.is_null() && CStr::from_ptr(kind) == name)
     }
 }
 

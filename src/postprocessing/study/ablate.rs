@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 /// Tables that are physics.
-const PHYSICS: [&str; 7] = ["material", "region", "support", "traction", "body_force", "contact", "initial"];
+const PHYSICS: [&str; 8] =
+    ["material", "region", "support", "traction", "body_force", "gravity", "contact", "initial"];
 /// Keys that are effects without being tables.
 const PLAIN_EFFECTS: [&str; 1] = ["density"];
 /// What is compared at the end.
