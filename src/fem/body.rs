@@ -515,17 +515,17 @@ impl<const D: usize, const S: usize> Body<D, S> {
     /// The converged histories of nodes.
     pub fn node_histories(&self) -> impl Iterator<Item = History<'_>> {
         let of_effects = self.surface_effects.iter().flat_map(|effect| effect.histories());
-        of_effects.map(|store| store.history()).chain(self.friction_histories())
+        of_effects.map(|store| store.history()).chain(self.contact_histories(false))
     }
 
-    /// The histories that laws of friction keep at nodes, one for each name.
-    fn friction_histories(&self) -> impl Iterator<Item = History<'_>> {
-        let laws = self.contacts.iter().filter_map(Contact::friction);
-        let names: BTreeSet<_> = laws.filter_map(|law| Some(law.history()?.name)).collect();
+    /// The histories that friction and wear keep at nodes, one for each name.
+    fn contact_histories(&self, all: bool) -> impl Iterator<Item = History<'_>> {
+        let names: BTreeSet<_> =
+            self.contacts.iter().flat_map(|contact| contact.history_names(all)).collect();
         names.into_iter().map(|name| {
             let mut values = vec![0.0; self.mesh.owned];
             let mut bytes = 0;
-            for (node, value) in self.contacts.iter().flat_map(|contact| contact.friction_history(name)) {
+            for (node, value) in self.contacts.iter().flat_map(|contact| contact.history(name)) {
                 values[node] = value;
                 bytes += size_of::<f64>();
             }
@@ -543,13 +543,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
         self.surface_effects
             .iter()
             .flat_map(|effect| all_of(effect.histories()))
-            .chain(self.friction_histories())
+            .chain(self.contact_histories(true))
     }
 
     /// Restores the saved values of the history of this name.
     pub fn restore_history(&mut self, name: &str, values: &[f64]) {
         self.visit_histories(&mut |history| history.restore(name, values));
-        self.contacts.iter_mut().for_each(|contact| contact.restore_friction_history(name, values));
+        self.contacts.iter_mut().for_each(|contact| contact.restore_history(name, values));
     }
 
     /// Directions other than axes in which supports hold this rank's nodes or resist their motion, each with its node.

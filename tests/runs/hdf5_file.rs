@@ -41,6 +41,7 @@ impl NumberFile {
             "contact_status",
             "branch",
             "sliding_velocity",
+            "wear",
         ]
         .contains(&name);
         let ids = if at_nodes { "VTKHDF/PointData/node" } else { "VTKHDF/CellData/cell" };

@@ -210,6 +210,27 @@ fn a_restarted_run_with_rate_and_state_friction_is_the_straight_run_to_the_last_
 }
 
 #[test]
+fn a_restarted_run_with_wear_is_the_straight_run_to_the_last_bit() {
+    for scheme in ["lagged_euler", "implicit_euler", "bdf2"] {
+        let make = || {
+            saving()
+                .set("time.scheme", &format!("'{scheme}'"))
+                .set("contact.0.friction", "{ coulomb = { coefficient = 0.3 } }")
+                .set("contact.0.normal", "{ compliance = { stiffness = 100.0 } }")
+                .set("contact.0.wear", "{ coefficient = 0.1 }")
+        };
+        compare_with_straight(make, 1, scheme);
+        compare_with_straight(make, 3, scheme);
+        let case = make();
+        let results = case.run(2);
+        assert!(results.number("max_energy_imbalance") < 1e-9, "{scheme}");
+        let fields = NumberFile::open(&results.path("fields.vtkhdf"));
+        let worn = fields.field("wear", fields.times().len() - 1).into_iter().fold(0.0, f64::max);
+        assert!(worn > 1e-4, "{scheme}: {worn} m are worn off");
+    }
+}
+
+#[test]
 fn a_restarted_run_with_each_friction_law_is_the_straight_run_to_the_last_bit() {
     for law in [
         "tresca = { bound = 0.2 }",

@@ -57,6 +57,7 @@ fn table(root: &Node, path: String) -> ContactTable {
         obstacle_load: root.read(&key("obstacle_load")),
         adhesion: root.read(&key("adhesion")),
         memory: root.read(&key("memory")),
+        wear: root.read(&key("wear")),
         interface: Interface {
             normal: root.read(&key("normal")),
             friction: root.read(&key("friction")),

@@ -77,6 +77,11 @@ impl NormalLaw {
         self.gap().map(|_| format!("{}.gap", self.table()))
     }
 
+    /// Whether the law has a gap, or takes that of an obstacle.
+    pub(super) fn has_gap(&self) -> bool {
+        self.response().is_ok_and(|law| law.depends_on_displacement())
+    }
+
     /// Whether the law is a bound on the displacement or the velocity only.
     pub fn is_bound(&self) -> bool {
         self.response().is_ok_and(|law| law.velocity_bound(NodeContext::AT_THE_GAP).is_some())

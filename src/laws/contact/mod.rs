@@ -16,6 +16,7 @@ mod obstacle_motion;
 mod obstacle_shape;
 mod polyline;
 mod table;
+mod wear;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,7 @@ pub use obstacle_motion::{ObstacleMotion, Rate};
 pub use obstacle_shape::Shape;
 pub use polyline::Polyline;
 pub use table::{ContactTable, Quadrature};
+pub use wear::Wear;
 
 /// Boundaries that may touch an obstacle, and their contact laws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -67,6 +69,11 @@ pub struct Contact {
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,
+    /// Wear: the body's surface recedes where it slides under pressure, which widens the gap. The depth grows by `coefficient` times the
+    /// contact pressure times the length of sliding relative to the obstacle (Archard's law); fields have it as `wear`. Requires a friction
+    /// law and a normal law with a gap. Absent: no wear.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wear: Option<Wear>,
     /// Adhesion to an obstacle at rest: bonds that form at displacement zero, resist opening and sliding, and break. The bonding b
     /// at a node, 1 for intact and 0 for broken bonds, starts at 1 and decreases as `viscosity b' = -max(b (stiffness R(opening)^2
     /// + tangential_stiffness R(sliding)^2) - energy, 0)`, where R(s) = min(s, length). Broken bonds are not restored. The traction

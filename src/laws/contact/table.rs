@@ -2,6 +2,7 @@
 
 use super::{
     adhesion::Adhesion, interface::Interface, laws::NormalLaw, memory::Memory, obstacle_load::ObstacleLoad,
+    wear::Wear,
 };
 use crate::laws::law::LawFault;
 use schemars::JsonSchema;
@@ -32,6 +33,8 @@ pub struct ContactTable {
     pub adhesion: Option<Adhesion>,
     /// Memory of the foundation.
     pub memory: Option<Memory>,
+    /// Wear of the surface.
+    pub wear: Option<Wear>,
 }
 
 impl ContactTable {
@@ -49,6 +52,8 @@ impl ContactTable {
         faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(*has_obstacle)));
         faults.extend(self.adhesion.iter().flat_map(|law| law.faults(&self.interface)));
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
+        let has_histories = self.adhesion.is_some() || self.memory.is_some();
+        faults.extend(self.wear.iter().flat_map(|_| Wear::faults(&self.interface, has_histories)));
         if self.quadrature == Quadrature::Gauss {
             let nodal = normal.as_ref().is_some_and(NormalLaw::needs_nodes);
             let not_there = [

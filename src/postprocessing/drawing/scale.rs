@@ -97,6 +97,7 @@ pub fn unit_by_name(name: &str) -> &'static str {
         ("traction", "Pa"),
         ("gap", "m"),
         ("slip", "m"),
+        ("wear", "m"),
         ("friction_state", "s"),
     ];
     known.iter().find(|(word, _)| name.contains(word)).map_or("", |(_, unit)| unit)

@@ -115,6 +115,7 @@ mod tests {
             obstacle,
             obstacle_load: None,
             friction: None,
+            wear: None,
             adhesion: None,
             memory: None,
         };

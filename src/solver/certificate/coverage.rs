@@ -21,6 +21,12 @@ pub(super) fn not_covered<const D: usize, const S: usize>(
     if contacts.iter().any(|c| c.obstacle.is_some()) {
         words.push("a force moves an obstacle: theta holds for a given motion of the obstacle".into());
     }
+    if contacts.iter().any(|c| c.wear.is_some()) {
+        words.push(
+            "wear widens the gap between steps: theta of a step covers each step; for the continuous problem no certificate is known"
+                .into(),
+        );
+    }
     if let Some(decrease) = decrease_with_displacement {
         words.push(format!(
             "a contact law decreases with the displacement, by {decrease:.4e} Pa/m: theta of a step covers it in each step; for the \

@@ -21,7 +21,8 @@ impl<const D: usize> Contact<D> {
     ///
     /// With the penetrations `d`, the energy `e` of the law and a gap that grows by `g`, `k p v = (e(d_n) - e(d_{n-1})) + p g +
     /// (p (d_n - d_{n-1}) - e(d_n) + e(d_{n-1}))`: stored energy, work on the obstacle, numerical part. Friction `q` on an obstacle
-    /// with the velocity `w` absorbs `k q . v = k q . (v - w) + k q . w`: dissipation, work on the obstacle.
+    /// with the velocity `w` absorbs `k q . v = k q . (v - w) + k q . w`: dissipation, work on the obstacle. Where the gap grows by wear,
+    /// `p` times this growth is dissipated.
     pub fn energy_of_step(&self, velocity: &[f64], length: f64) -> [f64; 3] {
         let mut sums = [0.0; 3];
         for point in &self.points {
@@ -56,7 +57,7 @@ impl<const D: usize> Contact<D> {
     /// is NaN is ignored: the first step refuses it.
     pub fn deepest(&self, time: f64, displacement: &[f64]) -> f64 {
         let depth = |point: &Point<D>| {
-            let gap = self.gap_at(time, &point.place, &point.normal);
+            let gap = self.gap_at(time, point);
             gap.map_or(f64::NEG_INFINITY, |gap| point.normal_component(Body, displacement) - gap)
         };
         self.points.iter().map(depth).fold(f64::NEG_INFINITY, larger)
@@ -68,7 +69,7 @@ impl<const D: usize> Contact<D> {
             return Ok(0.0);
         }
         let energy = |point: &Point<D>| {
-            let gap = self.gap_at(time, &point.place, &point.normal)?;
+            let gap = self.gap_at(time, point)?;
             let stored = self.law.energy(point.normal_component(Body, displacement) - gap);
             Ok(point.weight * stored.unwrap_or(0.0))
         };

@@ -41,8 +41,7 @@ mod unknowns;
 use crate::{
     error::Result,
     fem::space::{Held, surface_points},
-    laws::contact::{Gap, NormalResponse},
-    linear_algebra::tensor::Vector,
+    laws::contact::{Gap, NormalResponse, Wear},
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -78,6 +77,8 @@ pub struct Contact<const D: usize> {
     pub gap: Gap,
     /// The motion of the obstacle, if a force moves it.
     pub obstacle: Option<LoadedObstacle<D>>,
+    /// Wear of the surface.
+    pub wear: Option<Wear>,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
     pub scale: f64,
     /// Length in s of the current step, as laws of the displacement see it.
@@ -137,6 +138,7 @@ impl<const D: usize> Contact<D> {
             law,
             gap,
             obstacle: None,
+            wear: None,
             scale,
             step_length: 0.0,
             reference,
@@ -153,10 +155,11 @@ impl<const D: usize> Contact<D> {
         self.obstacle.iter_mut().for_each(LoadedObstacle::commit);
     }
 
-    /// The gap in m at `time` of a place with this normal, where the obstacle is after the last step.
-    fn gap_at(&self, time: f64, place: &Vector<D>, normal: &Vector<D>) -> Result<f64> {
+    /// The gap in m of a point at `time`, where the obstacle is after the last step, and with the wear that this step has seen.
+    fn gap_at(&self, time: f64, point: &Point<D>) -> Result<f64> {
+        let place = &point.place;
         let seen = self.obstacle.as_ref().map_or(*place, |obstacle| obstacle.seen_before(place));
-        self.gap.at(time, &seen, normal)
+        Ok(self.gap.at(time, &seen, &point.normal)? + point.worn[1])
     }
 
     /// Whether the surface of the obstacle may move.

@@ -64,7 +64,9 @@ pub(super) struct Point<const D: usize> {
     pub context: NodeContext,
     /// `u_nu - gap` in m, with both values at the start of the step.
     pub penetration_before: f64,
-    /// Growth of the gap in the step, in m.
+    /// Depths of wear in m: the present one, and that before the last step.
+    pub worn: [f64; 2],
+    /// Growth of the gap in the step by the motion of the obstacle, in m.
     pub growth: f64,
     /// Contribution of the blend of a two-step scheme to the penetration, in m.
     pub blend_offset: f64,
@@ -94,6 +96,7 @@ impl<const D: usize> Point<D> {
             place: [0.0; D],
             context: NodeContext::default(),
             penetration_before: 0.0,
+            worn: [0.0; 2],
             growth: 0.0,
             blend_offset: 0.0,
             pressure: 0.0,

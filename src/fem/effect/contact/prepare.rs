@@ -32,8 +32,9 @@ impl<const D: usize> Contact<D> {
             let gap = self.gap.at(time, &after, &point.normal)?;
             let before = self.gap.at(time - length, &before, &point.normal)?;
             let along = point.normal_component(Body, displacement);
-            point.context = NodeContext { penetration: along - gap, step_length: length };
-            point.penetration_before = along - before;
+            let [worn, worn_before] = point.worn;
+            point.context = NodeContext { penetration: along - gap - worn, step_length: length };
+            point.penetration_before = along - before - worn_before;
             point.blend_offset = 0.0;
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };

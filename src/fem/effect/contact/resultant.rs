@@ -103,7 +103,7 @@ impl<const D: usize> Contact<D> {
                 };
             }
             if self.law.depends_on_displacement() {
-                let gap = self.gap_at(time, &point.place, &point.normal)?;
+                let gap = self.gap_at(time, point)?;
                 state.gap = gap - point.normal_component(Body, displacement);
             }
             visit(point.node(), state);

@@ -1,11 +1,15 @@
 //! The friction of a contact.
 
-use super::{Contact, friction::Friction, point::Vectors};
+use super::{
+    Contact,
+    friction::Friction,
+    point::Vectors::{self, Body},
+};
 use crate::{
     error::{Error, Result},
     fem::space::Held,
     laws::contact::FrictionLaw,
-    linear_algebra::tensor::{Vector, larger},
+    linear_algebra::tensor::{Vector, larger, norm},
     mesh::Mesh,
 };
 
@@ -54,24 +58,50 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Advances the histories of friction by a step of this length in s, at its velocities with ghosts.
+    /// Advances the histories of friction and wear by a step of this length in s, at its velocities with ghosts.
     pub fn advance_histories(&mut self, velocity: &[f64], length: f64) {
-        if let Some(friction) = &mut self.friction {
-            friction.advance_histories(velocity, length);
+        let Some(friction) = &mut self.friction else { return };
+        friction.advance_histories(velocity, length);
+        let Some(wear) = self.wear else { return };
+        for (sliding, slip) in friction.sliding(Body, velocity) {
+            let point = &mut self.points[sliding.at];
+            let pressure = point.pressure_at(&self.law, Body, velocity);
+            let [worn, _] = point.worn;
+            point.worn = [worn + wear.depth(pressure, length * norm(&slip)), worn];
         }
     }
 
-    /// The history of this name that friction keeps at each of its nodes on this rank.
-    pub fn friction_history(&self, name: &str) -> impl Iterator<Item = (usize, f64)> {
-        let friction = self.friction.iter().filter(move |friction| has_history(&friction.law, name));
-        friction.flat_map(|friction| &friction.points).map(|point| (point.node(), point.history))
+    /// The names of the histories that friction and wear keep at nodes. Fields show the first ones; `all` has those, too, that only the
+    /// next step needs.
+    pub fn history_names(&self, all: bool) -> impl Iterator<Item = &'static str> {
+        let friction = self.friction.iter().filter_map(|friction| friction.law.history());
+        let worn = self.wear.iter().flat_map(move |_| WORN.into_iter().take(if all { 2 } else { 1 }));
+        friction.map(|history| history.name).chain(worn)
+    }
+
+    /// The history of this name at each of its nodes on this rank.
+    pub fn history(&self, name: &str) -> Vec<(usize, f64)> {
+        let Some(friction) = &self.friction else { return Vec::new() };
+        if has_history(&friction.law, name) {
+            return friction.points.iter().map(|point| (point.node(), point.history)).collect();
+        }
+        let Some(at) = self.position_of_wear(name) else { return Vec::new() };
+        friction.points.iter().map(|sliding| (sliding.node(), self.points[sliding.at].worn[at])).collect()
     }
 
     /// Sets the history of this name from values at the owned nodes of the body.
-    pub fn restore_friction_history(&mut self, name: &str, nodal: &[f64]) {
+    pub fn restore_history(&mut self, name: &str, nodal: &[f64]) {
         let friction = self.friction.iter_mut().filter(|friction| has_history(&friction.law, name));
         let points = friction.flat_map(|friction| &mut friction.points);
         points.for_each(|point| point.history = nodal[point.node()]);
+        if let Some(at) = self.position_of_wear(name) {
+            self.points.iter_mut().for_each(|point| point.worn[at] = nodal[point.node()]);
+        }
+    }
+
+    /// Which of the depths of wear has this name, if there is wear.
+    fn position_of_wear(&self, name: &str) -> Option<usize> {
+        WORN.iter().position(|worn| *worn == name).filter(|_| self.wear.is_some())
     }
 
     /// Steepest descent of the friction graphs of points on this rank in Pa s/m, at the pressures in the bounds.
@@ -120,6 +150,9 @@ impl<const D: usize> Contact<D> {
         self.friction.as_ref().map_or([0.0; D], |friction| friction.part_at(node, traction))
     }
 }
+
+/// Names of the depths of wear: the present one, and that before the last step.
+const WORN: [&str; 2] = ["wear", "previous_wear"];
 
 fn has_history(law: &FrictionLaw, name: &str) -> bool {
     law.history().is_some_and(|history| history.name == name)
