@@ -171,6 +171,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "cattaneo",
+        name: "meshes",
+        job: "verification/cattaneo",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("4 mm", &["mesh.file=../../meshes/half_plane_coarse.msh"]),
+            with("2 mm", &[]),
+            with("1 mm", &["mesh.file=../../meshes/half_plane_fine.msh"]),
+        ],
+    },
+    Table {
         page: "flat-punch",
         name: "meshes",
         job: "verification/flat_punch",
