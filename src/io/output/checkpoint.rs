@@ -6,7 +6,11 @@ use super::{
 };
 use crate::{
     error::{Error, Exit, Result},
-    fem::{body::Body, effect::History, state::State},
+    fem::{
+        body::Body,
+        effect::{History, LoadedObstacle},
+        state::State,
+    },
     job::differing_keys,
     linear_algebra::petsc::DistributedVector,
     parallel::{agreement::Agreed, session::Session},
@@ -39,6 +43,9 @@ pub struct Header {
     /// For each contact whose obstacle a force moves: displacement in m and velocity in m/s after the last step, and before it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<[f64; 4]>,
+    /// For the same contacts: the stiffness in N/m against the obstacle that the last step has found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_stiffness: Vec<f64>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -63,6 +70,7 @@ impl Header {
         state: &State,
         totals: &Totals,
     ) -> Self {
+        let obstacles = || body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
         Self {
             format: FORMAT,
             version: identity.version.clone(),
@@ -72,7 +80,8 @@ impl Header {
             time: state.time,
             step_length: state.step_length,
             totals: *totals,
-            obstacles: body.contacts.iter().filter_map(|c| Some(c.obstacle.as_ref()?.saved())).collect(),
+            obstacles: obstacles().map(LoadedObstacle::saved).collect(),
+            obstacle_stiffness: obstacles().map(LoadedObstacle::stiffness).collect(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -162,7 +171,10 @@ pub fn restore<const D: usize, const S: usize>(
         kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
     }
     let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
-    obstacles.zip(&header.obstacles).for_each(|(obstacle, saved)| obstacle.restore(*saved));
+    for (at, obstacle) in obstacles.enumerate() {
+        header.obstacles.get(at).into_iter().for_each(|saved| obstacle.restore(*saved));
+        obstacle.restore_stiffness(header.obstacle_stiffness.get(at).copied().unwrap_or(0.0));
+    }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)
 }

@@ -285,6 +285,7 @@ impl Stepper {
         let mut root = IncreasingRoot::default();
         let mut all = StepOutcome::default();
         let (mut velocity, mut largest) = (0.0, 0.0);
+        let mut last: Option<[f64; 2]> = None;
         for evaluation in 0..EVALUATIONS {
             let Some(obstacle) = &mut body.contacts[contact].obstacle else { break };
             velocity = if evaluation == 0 { obstacle.start(blend) } else { obstacle.set_velocity(velocity) };
@@ -299,17 +300,21 @@ impl Stepper {
                 indefinite_solves: all.indefinite_solves + outcome.indefinite_solves,
                 ..outcome
             };
-            let contact = &body.contacts[contact];
-            let Some(obstacle) = &contact.obstacle else { break };
+            let contact = &mut body.contacts[contact];
             let own = self.trial.local().map(|trial| [contact.force_on_obstacle(&trial), contact.area()]);
             let [resultant, area] = session.sum(session.agree(own)?);
+            let scale_of_contact = contact.scale * area;
+            let Some(obstacle) = &mut contact.obstacle else { break };
             let [unbalanced, scale] = obstacle.unbalanced(step.time, resultant);
+            if let Some([before, earlier]) = last.replace([velocity, unbalanced]) {
+                obstacle.keep_slope((unbalanced - earlier) / (velocity - before));
+            }
             // A force that vanishes is compared with the contact forces of the first solutions.
             largest = f64::max(largest, scale);
             if unbalanced.abs() <= tolerance * largest {
                 return Ok(all);
             }
-            let slope = obstacle.inertia() + contact.scale * area;
+            let slope = obstacle.expected_slope().unwrap_or(obstacle.inertia() + scale_of_contact);
             match root.next(velocity, unbalanced, slope) {
                 Some(next) if next.is_finite() => velocity = next,
                 _ => break,

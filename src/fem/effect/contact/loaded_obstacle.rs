@@ -21,6 +21,8 @@ pub struct LoadedObstacle<const D: usize> {
     converged: [f64; 2],
     earlier: [f64; 2],
     trial: [f64; 2],
+    /// By how much the resultant falls per displacement, in N/m, as found in the last step and in the current one; 0 before.
+    stiffness: [f64; 2],
     blend: Blend,
 }
 
@@ -36,6 +38,7 @@ impl<const D: usize> LoadedObstacle<D> {
             converged: start,
             earlier: start,
             trial: start,
+            stiffness: [0.0; 2],
             blend: Blend::euler(0.0),
         }
     }
@@ -61,9 +64,33 @@ impl<const D: usize> LoadedObstacle<D> {
         (self.converged, self.earlier, self.trial) = ([x, w], [y, v], [x, w]);
     }
 
+    /// The stiffness of the contact in N/m as the last step has found it, 0 before, for checkpoints.
+    pub fn stiffness(&self) -> f64 {
+        self.stiffness[0]
+    }
+
+    /// Sets what [`stiffness`](Self::stiffness) gave.
+    pub fn restore_stiffness(&mut self, stiffness: f64) {
+        self.stiffness = [stiffness; 2];
+    }
+
+    /// The slope of [`unbalanced`](Self::unbalanced) in N s/m that the last step has found, if it has.
+    pub fn expected_slope(&self) -> Option<f64> {
+        (self.stiffness[0] > 0.0).then(|| self.inertia() + self.blend.length * self.stiffness[0])
+    }
+
+    /// Keeps the slope in N s/m between the last two velocities of a step for the next one.
+    pub fn keep_slope(&mut self, slope: f64) {
+        let stiffness = (slope - self.inertia()) / self.blend.length;
+        if stiffness > 0.0 && stiffness.is_finite() {
+            self.stiffness[1] = stiffness;
+        }
+    }
+
     /// Starts a step; returns the velocity in m/s after the last one.
     pub fn start(&mut self, blend: Blend) -> f64 {
         self.blend = blend;
+        self.stiffness[1] = self.stiffness[0];
         self.set_velocity(self.converged[1])
     }
 
@@ -99,6 +126,7 @@ impl<const D: usize> LoadedObstacle<D> {
     /// Commits the motion of the step.
     pub(super) fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.trial);
+        self.stiffness[0] = self.stiffness[1];
     }
 
     /// Velocity in m/s at the end of the step.
@@ -128,6 +156,27 @@ mod tests {
             mass: 3.0,
             velocity: 1.0,
         })
+    }
+
+    #[test]
+    fn the_slope_of_a_step_is_expected_in_the_next_one() {
+        let mut obstacle = falling();
+        obstacle.start(Blend::euler(0.5));
+        assert_eq!(obstacle.expected_slope(), None);
+        // 3 kg / 0.5 s and 8 N/m over 0.5 s.
+        obstacle.keep_slope(10.0);
+        assert_eq!(obstacle.expected_slope(), None, "the step may be repeated");
+        obstacle.commit();
+        obstacle.start(Blend::euler(0.25));
+        assert_eq!(obstacle.expected_slope(), Some(12.0 + 2.0));
+        obstacle.keep_slope(f64::NAN);
+        obstacle.keep_slope(1.0);
+        obstacle.commit();
+        assert_eq!(obstacle.stiffness(), 8.0, "less than the inertia: not a slope");
+        let mut other = falling();
+        other.restore_stiffness(obstacle.stiffness());
+        other.start(Blend::euler(0.25));
+        assert_eq!(other.expected_slope(), Some(14.0));
     }
 
     #[test]
