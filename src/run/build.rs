@@ -68,7 +68,6 @@ pub(super) fn body<const D: usize, const S: usize>(
     }
     let surface_effects = surface_effects(session, &job.contact, &mesh, &parts)?;
     session.agree(choose_unknowns(&mut contacts, &mesh))?;
-    session.agree(refuse_shared_histories(&contacts, &mesh))?;
     if contacts.iter().any(|contact| !contact.needs_ghosts()) {
         state.contact_traction = Some(state.velocity.like()?);
     }
@@ -340,24 +339,5 @@ fn initial<const D: usize>(job: &Job, mesh: &Mesh<D>, held: &Held<D>, state: &mu
         }
     }
     held.clear(&mut state.velocity.owned_mut()?);
-    Ok(())
-}
-
-/// Refuses nodes at which two contacts keep a history of the same name: files have one value for each node.
-fn refuse_shared_histories<const D: usize>(contacts: &[Contact<D>], mesh: &Mesh<D>) -> Result<()> {
-    let mut kept = BTreeSet::new();
-    for contact in contacts {
-        for name in contact.history_names(true) {
-            for (node, _) in contact.history(name) {
-                if !kept.insert((name, node)) {
-                    return Err(Error::Refused(format!(
-                        "{name} at {:?} m: two contact boundaries meet there, but a node stores one such history only; round the edge \
-                         with facets that turn by less than 40 degrees each, or use the law on one of the boundaries",
-                        mesh.nodes[node]
-                    )));
-                }
-            }
-        }
-    }
     Ok(())
 }
