@@ -1,7 +1,7 @@
 //! Contact laws: pure functions at a point of the contact boundary, with their keys in the job file.
 //!
-//! Each normal or friction law has a file in the folder `laws` and an entry in one of the lists in `laws.rs`; adhesion and memory
-//! have files in this folder. The file of a law defines its parameters, as in the job file, its formula and derivative, and the
+//! Each normal or friction law has a file in the folder `laws` and an entry in one of the lists in `laws.rs`; adhesion, memory and
+//! wear have files in this folder. The file of a law defines its parameters, as in the job file, its formula and derivative, and the
 //! combinations that are refused. This file also has the keys of the table `[[contact]]`.
 
 mod adhesion;
