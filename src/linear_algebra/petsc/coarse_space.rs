@@ -3,8 +3,7 @@
 use super::{
     check, index,
     levels::{self, Level},
-    library::communicator,
-    matrix::set_rigid_motions,
+    matrix::{declare_positive_definite, in_compressed_rows, set_rigid_motions},
     reference::Reference,
     sys,
 };
@@ -30,8 +29,6 @@ pub(super) struct CoarseSpace {
     interpolation: Reference<sys::_p_Mat>,
     coordinates: Vec<f64>,
     block: sys::PetscInt,
-    /// The matrix on the coarse space, if it was computed.
-    matrix: Option<Reference<sys::_p_Mat>>,
     /// The matrices of the levels of the coarse solver.
     pub(super) levels: Vec<Level>,
 }
@@ -46,20 +43,10 @@ impl CoarseSpace {
         let counts = |list: &[usize], what| list.iter().map(|&i| index(i, what)).collect::<Result<Vec<_>>>();
         let starts = counts(&starts, "entries of an interpolation")?;
         let columns = counts(&columns, "global coarse unknown")?;
-        let (rows, places, values) = (starts.as_ptr(), columns.as_ptr(), values.as_ptr());
-        let all = sys::PETSC_DETERMINE;
-        // SAFETY: PETSc copies the row arrays, which describe `own` rows with ascending global columns.
-        let interpolation = unsafe {
-            let matrix = Reference::new(|raw| sys::MatCreate(communicator(), raw))?;
-            let raw = matrix.get();
-            check(sys::MatSetSizes(raw, own, coarse, all, all))?;
-            check(sys::MatSetBlockSizes(raw, block, block))?;
-            check(sys::MatSetType(raw, c"aij".as_ptr()))?;
-            check(sys::MatSeqAIJSetPreallocationCSR(raw, rows, places, values))?;
-            check(sys::MatMPIAIJSetPreallocationCSR(raw, rows, places, values))?;
-            matrix
-        };
-        Ok(Self { interpolation, coordinates, block, matrix: None, levels: Vec::new() })
+        // SAFETY: the arrays describe `own` rows with ascending global columns.
+        let interpolation =
+            unsafe { in_compressed_rows([own, coarse], block, (&starts, &columns, &values))? };
+        Ok(Self { interpolation, coordinates, block, levels: Vec::new() })
     }
 
     /// Computes the coarse matrix from that of the preconditioner. Collective.
@@ -76,21 +63,17 @@ impl CoarseSpace {
             // The smoother may still have the matrix of the set-up before.
             check(sys::KSPSetOperators(smoother, fine, fine))?;
             levels::set_interpolation(pc, 1, self.interpolation.get())?;
-            levels::restore_interpolations(preconditioner(coarse)?, &self.levels)?;
-            self.matrix = None;
+            levels::restore_interpolations(levels::preconditioner_of(coarse)?, &self.levels)?;
             let matrix = Reference::new(|raw| {
                 let (p, first) = (self.interpolation.get(), sys::MAT_INITIAL_MATRIX);
                 sys::MatPtAP(fine, p, first, f64::from(sys::PETSC_DEFAULT), raw)
             })?;
             let raw = matrix.get();
             check(sys::MatSetBlockSize(raw, self.block))?;
-            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
-            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
+            declare_positive_definite(raw)?;
             set_rigid_motions(raw, self.block, &self.coordinates)?;
-            check(sys::KSPSetOperators(coarse, raw, raw))?;
-            self.matrix = Some(matrix);
+            check(sys::KSPSetOperators(coarse, raw, raw))
         }
-        Ok(())
     }
 
     /// Lets the levels of the coarse solver use matrices in single precision.
@@ -113,17 +96,8 @@ pub(super) unsafe fn solver_of_levels(pc: sys::PC) -> Result<sys::PC> {
     // SAFETY: the caller's promise; the solver belongs to the preconditioner.
     unsafe {
         check(sys::PCMGGetCoarseSolve(pc, &mut coarse))?;
-        preconditioner(coarse)
+        levels::preconditioner_of(coarse)
     }
-}
-
-/// # Safety
-/// A live solver.
-unsafe fn preconditioner(solver: sys::KSP) -> Result<sys::PC> {
-    let mut pc = ptr::null_mut();
-    // SAFETY: the caller's promise.
-    check(unsafe { sys::KSPGetPC(solver, &mut pc) })?;
-    Ok(pc)
 }
 
 /// Makes a preconditioner multigrid of two levels, whose coarse solver is one cycle of algebraic multigrid.
@@ -138,6 +112,6 @@ pub(super) unsafe fn two_levels(pc: sys::PC) -> Result<()> {
         check(sys::PCMGSetLevels(pc, 2, ptr::null_mut()))?;
         check(sys::PCMGGetCoarseSolve(pc, &mut coarse))?;
         check(sys::KSPSetType(coarse, c"preonly".as_ptr()))?;
-        check(sys::PCSetType(preconditioner(coarse)?, c"gamg".as_ptr()))
+        check(sys::PCSetType(levels::preconditioner_of(coarse)?, c"gamg".as_ptr()))
     }
 }

@@ -9,7 +9,7 @@ use super::{
     sys,
 };
 use crate::error::Result;
-use std::{cell::RefCell, ptr};
+use std::cell::RefCell;
 
 /// Growth of the residual that counts as divergence: with CG the residual may grow by the square root of the condition number
 /// before it decreases, and the condition number of a body supported by contact alone is large.
@@ -101,10 +101,8 @@ impl Ksp {
 
     /// The preconditioner, which belongs to the solver.
     pub(super) fn preconditioner(&self) -> Result<sys::PC> {
-        let mut pc = ptr::null_mut();
         // SAFETY: live object.
-        check(unsafe { sys::KSPGetPC(self.raw.get(), &mut pc) })?;
-        Ok(pc)
+        unsafe { levels::preconditioner_of(self.raw.get()) }
     }
 
     /// Sets the matrix of the system, from which the preconditioner is also built.
@@ -161,7 +159,12 @@ impl Ksp {
 
     /// Sets the coarse space of multigrid with two levels, for fields of `block` values for each node. Collective.
     pub fn set_coarse_space(&mut self, block: usize, interpolation: Interpolation) -> Result<()> {
-        self.coarse = Some(CoarseSpace::new(block, interpolation)?);
+        let mut coarse = CoarseSpace::new(block, interpolation)?;
+        if let Some(before) = self.coarse.take() {
+            // PETSc uses these matrices until the next set-up.
+            coarse.levels = before.levels;
+        }
+        self.coarse = Some(coarse);
         Ok(())
     }
 

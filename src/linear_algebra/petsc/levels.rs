@@ -22,6 +22,17 @@ impl Level {
     }
 }
 
+/// The preconditioner of a solver, which owns it.
+///
+/// # Safety
+/// A live solver.
+pub(super) unsafe fn preconditioner_of(solver: sys::KSP) -> Result<sys::PC> {
+    let mut pc = ptr::null_mut();
+    // SAFETY: the caller's promise.
+    check(unsafe { sys::KSPGetPC(solver, &mut pc) })?;
+    Ok(pc)
+}
+
 /// Whether a preconditioner has this type.
 pub(super) fn is_type(pc: sys::PC, name: &CStr) -> Result<bool> {
     let mut kind = ptr::null();

@@ -19,18 +19,11 @@ impl Matrix {
         let owned = rows.offsets.len() - 1;
         let (starts, columns, values) = scalar_rows(block, rows)?;
         let local = index(owned * block, "unknowns of a rank")?;
-        let (starts, columns, values) = (starts.as_ptr(), columns.as_ptr(), values.as_ptr());
-        // SAFETY: PETSc copies the row arrays, which describe `local` rows with ascending global columns.
+        // SAFETY: the arrays describe `local` rows with ascending global columns; a live matrix, which is symmetric and positive definite.
         let raw = unsafe {
-            let matrix = Reference::new(|raw| sys::MatCreate(communicator(), raw))?;
-            let raw = matrix.get();
-            check(sys::MatSetSizes(raw, local, local, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
-            check(sys::MatSetBlockSize(raw, index(block, "block size")?))?;
-            check(sys::MatSetType(raw, c"aij".as_ptr()))?;
-            check(sys::MatSeqAIJSetPreallocationCSR(raw, starts, columns, values))?;
-            check(sys::MatMPIAIJSetPreallocationCSR(raw, starts, columns, values))?;
-            check(sys::MatSetOption(raw, sys::MAT_SYMMETRIC, 1))?;
-            check(sys::MatSetOption(raw, sys::MAT_SPD, 1))?;
+            let block = index(block, "block size")?;
+            let matrix = in_compressed_rows([local; 2], block, (&starts, &columns, &values))?;
+            declare_positive_definite(matrix.get())?;
             matrix
         };
         Ok(Self { raw, blocks: None })
@@ -91,6 +84,41 @@ impl Matrix {
             check(sys::MatGetInfo(self.raw.get(), sys::MAT_GLOBAL_SUM, counts.as_mut_ptr()))?;
             Ok(counts.assume_init().nz_used)
         }
+    }
+}
+
+/// A matrix with these numbers of rows and columns on this rank and this block size. Collective.
+///
+/// # Safety
+/// The row starts, global columns and values of all rows; columns ascend within a row.
+pub(super) unsafe fn in_compressed_rows(
+    [rows, columns]: [sys::PetscInt; 2],
+    block: sys::PetscInt,
+    (starts, places, values): (&[sys::PetscInt], &[sys::PetscInt], &[f64]),
+) -> Result<Reference<sys::_p_Mat>> {
+    let (starts, places, values) = (starts.as_ptr(), places.as_ptr(), values.as_ptr());
+    // SAFETY: the caller's promise; PETSc copies the row arrays.
+    unsafe {
+        let matrix = Reference::new(|raw| sys::MatCreate(communicator(), raw))?;
+        let raw = matrix.get();
+        check(sys::MatSetSizes(raw, rows, columns, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
+        check(sys::MatSetBlockSizes(raw, block, block))?;
+        check(sys::MatSetType(raw, c"aij".as_ptr()))?;
+        check(sys::MatSeqAIJSetPreallocationCSR(raw, starts, places, values))?;
+        check(sys::MatMPIAIJSetPreallocationCSR(raw, starts, places, values))?;
+        Ok(matrix)
+    }
+}
+
+/// Tells PETSc that a matrix is symmetric and positive definite.
+///
+/// # Safety
+/// A live matrix that is so.
+pub(super) unsafe fn declare_positive_definite(matrix: sys::Mat) -> Result<()> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        check(sys::MatSetOption(matrix, sys::MAT_SYMMETRIC, 1))?;
+        check(sys::MatSetOption(matrix, sys::MAT_SPD, 1))
     }
 }
 
