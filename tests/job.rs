@@ -240,7 +240,7 @@ fn a_run_may_land_on_its_end() {
 #[test]
 fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
     let names = ["a", "b", "c", "d", "e"];
-    let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[] };
+    let mesh = |boundaries| MeshNames { dimension: 3, boundaries, regions: &[], points: &[] };
     let mut loaded = load(RICH, &[]);
     assert_eq!(loaded.warnings, Vec::<String>::new());
     loaded.check_mesh(mesh(&names)).unwrap_or_else(|error| panic!("{error}"));
@@ -248,7 +248,7 @@ fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
 
     let error = loaded.check_mesh(mesh(&names[..4])).expect_err("no boundary e").to_string();
     assert!(error.contains("the mesh has no boundary \"e\"") && error.contains("case.toml:26:7"), "{error}");
-    let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[] };
+    let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[], points: &[] };
     let error = loaded.check_mesh(plane).expect_err("2D").to_string();
     for part in [
         "a 2D body needs a hypothesis",

@@ -588,3 +588,37 @@ fn says_why(lines: &[&str], number: usize) -> bool {
     let comment = lines[..above].iter().rev().take_while(|line| line.trim_start().starts_with("//"));
     comment.into_iter().any(|line| line.contains("SAFETY:"))
 }
+
+/// The packages in a lock file.
+fn locked(path: &str) -> Vec<toml::Value> {
+    let text = std::fs::read_to_string(root().join(path)).expect("a lock file");
+    let file: toml::Table = text.parse().expect("tables");
+    file["package"].as_array().expect("packages").clone()
+}
+
+#[test]
+fn the_fuzz_targets_are_built_with_the_packages_of_the_solver() {
+    let (solver, fuzz) = (locked("Cargo.lock"), locked("fuzz/Cargo.lock"));
+    let manifest = std::fs::read_to_string(root().join("Cargo.toml")).expect("the manifest");
+    let manifest: toml::Table = manifest.parse().expect("tables");
+    for section in ["dependencies", "build-dependencies"] {
+        for (key, value) in manifest[section].as_table().expect("a table") {
+            let name = value.get("package").and_then(toml::Value::as_str).unwrap_or(key);
+            let is_there = fuzz.iter().any(|package| package["name"].as_str() == Some(name));
+            assert!(is_there, "fuzz/Cargo.lock lacks {name}: run `cargo tree` in fuzz");
+        }
+    }
+    for package in fuzz {
+        let versions: Vec<&toml::Value> = solver
+            .iter()
+            .filter(|other| other["name"] == package["name"])
+            .map(|other| &other["version"])
+            .collect();
+        assert!(
+            versions.is_empty() || versions.contains(&&package["version"]),
+            "{} is {} in fuzz/Cargo.lock and {versions:?} in Cargo.lock: run `cargo update .. --precise ..` in fuzz",
+            package["name"],
+            package["version"]
+        );
+    }
+}

@@ -65,6 +65,11 @@ impl Job {
             .map_err(|error| Error::Internal(format!("the job can't be written: {error}")))?;
         let mut keys = BTreeMap::new();
         flatten("", &value, &mut keys);
+        // The contents of a surface matter, not its file.
+        for (number, shape) in job.shapes_mut() {
+            let digest = shape.surface_digest().map(|digest| format!("{digest:016x}"));
+            digest.map(|digest| keys.insert(format!("contact.{number}.obstacle.shape.surface"), digest));
+        }
         Ok(keys)
     }
 }

@@ -10,7 +10,7 @@ use super::report::{Fault, Place, Texts};
 use super::schema::Kind;
 use super::semantic::{self, MeshNames};
 use super::source::{Node, parse};
-use super::{Job, MeshSource, set, tables, validate};
+use super::{Job, MeshSource, set, surfaces, tables, validate};
 use crate::error::{Error, Result};
 
 /// Largest size of a file in bytes.
@@ -103,7 +103,11 @@ impl Loaded {
         let warnings = findings.warnings;
         let (mut job, root, texts) = document.fill::<Job>()?;
         job.resolve_paths(folder, Path::new(name));
-        Ok(Self { job, warnings, root, texts })
+        let unread = surfaces::read(&mut job)
+            .into_iter()
+            .map(|[key, message, help]| Fault::new(root.deepest(&key).at.clone(), message, "").help(help));
+        let faults: Vec<Fault> = unread.collect();
+        if faults.is_empty() { Ok(Self { job, warnings, root, texts }) } else { Err(texts.refuse(faults)) }
     }
 
     /// A refusal at the position of `key_path` (`contact.0.on`), or of the innermost existing table on this path.
@@ -134,6 +138,9 @@ impl Job {
         let output = self.output.folder.take().unwrap_or_else(|| Path::new("out").join(stem));
         self.output.folder = Some(normal(&folder.join(output)));
         if let MeshSource::File(path) = &mut self.mesh.source {
+            *path = normal(&folder.join(&*path));
+        }
+        for path in self.shapes_mut().filter_map(|(_, shape)| Some(&mut shape.surface.as_mut()?.file)) {
             *path = normal(&folder.join(&*path));
         }
         if let Some(path) = self.initial.as_mut().and_then(|initial| initial.from.as_mut()) {

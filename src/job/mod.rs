@@ -13,6 +13,7 @@ mod schema;
 mod semantic;
 mod set;
 mod source;
+mod surfaces;
 mod tables;
 mod validate;
 

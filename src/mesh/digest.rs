@@ -3,11 +3,12 @@
 use super::{Names, piece::Piece, shape::edges_of_cell};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
-/// Different seeds for nodes, cells, facets and curved edges.
+/// Different seeds for nodes, cells, facets, curved edges and named points.
 const NODE: u64 = 1;
 const CELL: u64 = 2;
 const FACET: u64 = 3;
 const EDGE: u64 = 4;
+const POINTS: u64 = 5;
 
 /// Up to 48 bytes of numbers, little endian.
 struct Bytes {
@@ -32,7 +33,8 @@ impl Bytes {
 
 impl<const D: usize> Piece<D> {
     /// The sum modulo 2^64 of the hashes of the owned nodes (id and position), the cells (ids and region), their curved edges and the
-    /// named facets (ids and name) of this part. The sum over all parts is the digest of the mesh.
+    /// named facets (ids and name) of this part, and in the first part of the named points and curves. The sum over all parts is the
+    /// digest of the mesh.
     pub fn digest(&self, part: usize, names: &Names) -> u64 {
         let mut sum = 0_u64;
         let own = |node: &usize| self.owners[*node] as usize == part;
@@ -69,6 +71,11 @@ impl<const D: usize> Piece<D> {
             bytes.add(boundaries[boundary as usize]);
             add_nodes(&mut bytes, &self.facets[facet as usize]);
             sum = sum.wrapping_add(bytes.hash(FACET));
+        }
+        for set in names.point_sets.iter().filter(|_| part == 0) {
+            let places = set.places.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+            let bytes: Vec<u8> = set.name.bytes().chain(places).collect();
+            sum = sum.wrapping_add(xxh3_64_with_seed(&bytes, POINTS));
         }
         sum
     }

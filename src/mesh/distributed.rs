@@ -1,7 +1,7 @@
 //! One rank's part of a mesh, assembled from pieces; and the distribution of a whole mesh by rank 0.
 
 use super::{
-    Boundary, GlobalMesh, Names, Tags,
+    Boundary, GlobalMesh, Names, PointSet, Tags,
     partition::Partition,
     piece::{Cutter, Piece},
     surface::Topology,
@@ -20,6 +20,7 @@ use mpi::{
     topology::Communicator,
     traits::Root,
 };
+use std::collections::HashSet;
 
 /// The cells of this rank with their nodes: owned nodes first, then ghosts, which other ranks own.
 ///
@@ -63,6 +64,8 @@ pub struct Mesh<const D: usize> {
     pub facet_cells: Vec<u32>,
     /// The facets of this rank on named parts of the surface; the names are the same on all ranks.
     pub boundaries: Vec<Boundary>,
+    /// Named points and curves, the same on all ranks.
+    pub point_sets: Vec<PointSet>,
     /// Number of facets between ranks.
     pub edge_cut: usize,
     /// Ratio of the largest number of cells on a rank to the mean.
@@ -134,6 +137,20 @@ impl<const D: usize> Mesh<D> {
     pub fn boundary(&self, name: &str) -> Option<&Boundary> {
         self.boundaries.iter().find(|b| b.name == name)
     }
+
+    /// The owned nodes of the points and curves with these names, ascending.
+    pub fn nodes_of_point_sets(&self, names: &[&String]) -> Vec<u32> {
+        let named = self.point_sets.iter().filter(|set| names.contains(&&set.name));
+        let bits = |place: &[f64]| -> [u64; 3] {
+            std::array::from_fn(|i| place.get(i).copied().unwrap_or(0.0).to_bits())
+        };
+        let places: HashSet<[u64; 3]> = named.flat_map(|set| &set.places).map(|place| bits(place)).collect();
+        if places.is_empty() {
+            return Vec::new();
+        }
+        let owned = (0..).zip(&self.nodes[..self.owned]);
+        owned.filter(|(_, place)| places.contains(&bits(&place[..]))).map(|(node, _)| node).collect()
+    }
 }
 
 impl<const D: usize> Mesh<D> {
@@ -202,6 +219,7 @@ impl<const D: usize> Mesh<D> {
             facets: piece.facets.iter().map(|facet| facet.map(|node| local[node as usize])).collect(),
             facet_cells: piece.facet_cells,
             boundaries,
+            point_sets: names.point_sets,
             node_starts,
             ..Self::default()
         };
@@ -256,7 +274,7 @@ pub fn distribute<const D: usize>(
     let mut names = String::new();
     let piece = match whole {
         Some((mesh, partition)) => {
-            names = encode(&mesh.names());
+            names = serde_json::to_string(&mesh.names()).unwrap_or_default();
             let mut cutter = Cutter::new(&mesh, &partition, session.ranks());
             (1..session.ranks()).rev().for_each(|rank| cutter.piece(rank).send(world, rank));
             cutter.piece(0)
@@ -269,7 +287,9 @@ pub fn distribute<const D: usize>(
     let mut bytes = names.into_bytes();
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
-    let names = session.agree(decode(&String::from_utf8_lossy(&bytes)))?;
+    let names = serde_json::from_slice(&bytes);
+    let damaged = |error| Error::Internal(format!("the names of the mesh were damaged in transfer: {error}"));
+    let names = session.agree(names.map_err(damaged))?;
     Ok(Mesh { handed_out: true, ..Mesh::assemble(session, piece, names, order)? })
 }
 
@@ -312,17 +332,4 @@ impl<const D: usize> Piece<D> {
             named: named.as_chunks().0.to_vec(),
         }
     }
-}
-
-/// One name per line: the regions, an empty line, the boundaries.
-fn encode(names: &Names) -> String {
-    format!("{}\n\n{}", names.regions.join("\n"), names.boundaries.join("\n"))
-}
-
-fn decode(text: &str) -> Result<Names> {
-    let (regions, boundaries) = text
-        .split_once("\n\n")
-        .ok_or_else(|| Error::Internal("the names of the mesh were damaged in transfer".into()))?;
-    let list = |text: &str| text.lines().map(str::to_owned).collect();
-    Ok(Names { regions: list(regions), boundaries: list(boundaries) })
 }

@@ -1,6 +1,8 @@
 //! A whole mesh, as read or generated.
 
 use crate::linear_algebra::tensor::Vector;
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// Triangles in the plane (`D = 2`) or tetrahedra in space (`D = 3`), whole, as read or generated on rank 0.
 ///
@@ -26,13 +28,15 @@ pub struct GlobalMesh<const D: usize> {
     pub facet_cells: Vec<u32>,
     /// Named parts of the surface.
     pub boundaries: Vec<Boundary>,
+    /// Named points and curves.
+    pub point_sets: Vec<PointSet>,
 }
 
 impl<const D: usize> GlobalMesh<D> {
     /// Names of regions and boundaries.
     pub fn names(&self) -> Names {
         let boundaries = self.boundaries.iter().map(|boundary| boundary.name.clone()).collect();
-        Names { regions: self.regions.clone(), boundaries }
+        Names { regions: self.regions.clone(), boundaries, point_sets: self.point_sets.clone() }
     }
 }
 
@@ -45,11 +49,38 @@ pub struct Boundary {
     pub facets: Vec<u32>,
 }
 
+/// The nodes of named points and, in space, curves, with those that quadratic cells have on the edges of the curves.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PointSet {
+    /// Its name in job files.
+    pub name: String,
+    /// Coordinates in m of the nodes, exactly as in the mesh, in ascending order; 0 where the mesh has no axis.
+    pub places: Vec<[f64; 3]>,
+}
+
+impl PointSet {
+    /// The set of these places, each once.
+    pub fn new(name: &str, mut places: Vec<[f64; 3]>) -> Self {
+        let order = |a: &[f64; 3], b: &[f64; 3]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| a.total_cmp(b))
+                .find(|order| order.is_ne())
+                .unwrap_or(Ordering::Equal)
+        };
+        places.sort_unstable_by(order);
+        places.dedup();
+        Self { name: name.to_owned(), places }
+    }
+}
+
 /// Names of a mesh, the same on all ranks.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Names {
     /// Regions.
     pub regions: Vec<String>,
     /// Boundaries.
     pub boundaries: Vec<String>,
+    /// Points and curves.
+    pub point_sets: Vec<PointSet>,
 }

@@ -116,6 +116,7 @@ impl<const D: usize> Piece<D> {
             facets: self.facets,
             facet_cells: self.facet_cells,
             boundaries,
+            point_sets: names.point_sets,
         })
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn body<const D: usize, const S: usize>(
             ContactConditions { quadrature: contact.quadrature, law, gap },
             &held,
         )?;
-        laws.obstacle = contact.obstacle_load.as_ref().map(LoadedObstacle::new);
+        laws.obstacle = contact.obstacle_load.as_ref().map(|load| LoadedObstacle::new(load, laws.gap.axis()));
         laws.wear = contact.wear;
         if let Some(friction) = contact.friction {
             session.agree(laws.add_friction(friction, &mesh, &held))?;

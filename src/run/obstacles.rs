@@ -12,6 +12,9 @@ use crate::{
 /// Initial penetration, as a share of the body's size, above which a warning is given.
 const TOO_DEEP: f64 = 0.01;
 
+/// A depth of this share of the body's size is rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Warnings about contacts that can never close because the body lies behind the obstacle, and about bodies that start inside of
 /// one. Collective, with the same warnings on all ranks.
 pub(super) fn warnings<const D: usize, const S: usize>(
@@ -35,11 +38,12 @@ pub(super) fn warnings<const D: usize, const S: usize>(
                 100.0 * deepest / size
             ));
         }
-        if deepest == f64::NEG_INFINITY && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
+        if deepest <= ROUNDING * size && is_behind(session, &contact.gap, &body.mesh.nodes, size) {
             let remedy = match contact.gap {
                 Gap::Sphere(_) => "check `hollow`, which states whether the body is inside the sphere",
                 Gap::Shape(_) => {
-                    "reverse the sign of `distance`: it must be positive outside of the obstacle"
+                    "the distance must be positive outside of the obstacle: reverse the sign of `distance`, or the orientation of \
+                     the triangles of `surface`"
                 }
                 _ => "reverse the plane's `normal`: it must point out of the obstacle toward the body",
             };
@@ -70,5 +74,5 @@ fn is_behind<const D: usize>(session: &Session, gap: &Gap, nodes: &[Vector<D>], 
     let [least, most] =
         depths.fold([f64::NEG_INFINITY; 2], |[a, b], depth| [larger(a, -depth), larger(b, depth)]);
     let [least, most] = session.largest([least, most]);
-    -least >= -1e-9 * size && most > TOO_DEEP * size
+    -least >= -ROUNDING * size && most > TOO_DEEP * size
 }

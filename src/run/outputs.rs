@@ -288,12 +288,12 @@ fn profiles<const D: usize, const S: usize>(
     body: &Body<D, S>,
     job: &Job,
 ) -> Result<Profiles<D>> {
-    let along: Vec<(String, Option<usize>)> = job
-        .output
-        .profile
-        .iter()
-        .map(|p| (p.on.clone(), job.contact.iter().position(|c| c.on.contains(&p.on))))
-        .collect();
+    let contacts_on = |name: &String| {
+        let contacts = job.contact.iter().enumerate();
+        contacts.filter(|(_, contact)| contact.on.contains(name)).map(|(at, _)| at).collect()
+    };
+    let along: Vec<(String, Vec<usize>)> =
+        job.output.profile.iter().map(|profile| (profile.on.clone(), contacts_on(&profile.on))).collect();
     Profiles::new(session, body, &along)
 }
 

@@ -11,7 +11,7 @@ use crate::{
     fem::{body::Body, effect::Step, state::State},
     io::output::history::Totals,
     job::{Job, Loaded, Time},
-    linear_algebra::tensor::larger,
+    linear_algebra::{sparse::Precision, tensor::larger},
     mesh::{GlobalMesh, Mesh},
     parallel::{agreement::Agreed, session::Session},
     solver::stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
@@ -53,7 +53,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
     pub(super) fn start(
         session: &Session,
         job: &Job,
-        (body, state, scheme): (Body<D, S>, State, Stepper),
+        (body, state, mut scheme): (Body<D, S>, State, Stepper),
         totals: Option<Totals>,
     ) -> Result<Self, Agreed> {
         let totals = match totals {
@@ -63,6 +63,9 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
         let mut adaptive = steps::adaptive(job);
         if let (Some(adaptive), Some(level)) = (&mut adaptive, totals.step_level) {
             adaptive.step_level = level;
+        }
+        if totals.single_precision_failed {
+            scheme.use_double_precision();
         }
         let (time, landings) = (job.time.clone(), steps::landings(job));
         Ok(Self { body, state, scheme, totals, time, landings, adaptive })
@@ -75,6 +78,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             return Ok(None);
         }
         let target = landings.next(state.time);
+        let was_single = scheme.factor_precision() == Some(Precision::Single);
         let outcome = if let Some(adaptive) = adaptive {
             let outcome = adaptive.advance(session, scheme, body, state, target)?;
             totals.step_level = Some(adaptive.step_level);
@@ -86,6 +90,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             outcome
         };
         totals.add(&outcome);
+        totals.single_precision_failed |= was_single && scheme.factor_precision() == Some(Precision::Double);
         // The largest contact pressure under slip weakening, which the certificate bounds.
         if let Some(mine) = session.agree(body.slip_pressure(state))? {
             let [most] = session.largest([mine]);

@@ -16,7 +16,8 @@ pub(super) fn validate<const D: usize>(
 ) -> Result<(), Agreed> {
     let boundaries: Vec<&str> = mesh.boundaries.iter().map(|b| b.name.as_str()).collect();
     let regions: Vec<&str> = mesh.regions.iter().map(String::as_str).collect();
-    let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions };
+    let points: Vec<&str> = mesh.point_sets.iter().map(|set| set.name.as_str()).collect();
+    let names = MeshNames { dimension: D, boundaries: &boundaries, regions: &regions, points: &points };
     session.agree(loaded.check_mesh(names))?;
     session.agree(refuse_empty_matrix(mesh, loaded))?;
     refuse_conflicts(session, mesh, loaded)?;

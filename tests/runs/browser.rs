@@ -48,7 +48,7 @@ pub fn assert_fits(page: &Path, folder: &Path) {
               const letters = [...page.querySelectorAll('svg text')].map(each => each.getBoundingClientRect().height);
               const images = [...page.querySelectorAll('figure img')].filter(each => each.naturalWidth > 0);
               const shrunk = images.filter(each => each.getBoundingClientRect().width < each.naturalWidth / 2);
-              const drawn = [...page.querySelectorAll('figure svg'), ...images]
+              const drawn = [...page.querySelectorAll('figure > svg'), ...images]
                 .filter(each => each.getBoundingClientRect().height > 50);
               document.body.innerHTML = `<p>client ${{root.clientWidth}} scroll ${{root.scrollWidth}} beyond ${{wide.length}} ` +
                 `drawn ${{drawn.length}} legible ${{Math.min(...letters) >= 8 && shrunk.length === 0}}</p>`;

@@ -160,3 +160,141 @@ fn a_body_that_its_obstacle_releases_rests() {
         }
     }
 }
+
+/// An elastic block under two discs, each of which its own force presses on its half of the top.
+fn under_two_discs() -> Case {
+    let disc = |x: f64, part: &str, force: &str| {
+        format!(
+            "{{on = ['top'], where = '{part}', normal = {{unilateral = {{}}}}, \
+             obstacle = {{sphere = {{centre = [{x}, 0.2], radius = 0.1}}}}, \
+             obstacle_load = {{direction = [0, -1], force = '{force}', mass = 2}}}}"
+        )
+    };
+    let [left, right] = [disc(0.025, "x < 0.045", "4e5*t"), disc(0.08, "x > 0.055", "2e5*t*(2 - t)")];
+    Case::of("indented_block")
+        .without("material.viscoplasticity")
+        .set("mesh.rectangle.cells", "[12, 12]")
+        .set("mesh.rectangle.grading", "{y = 2.0, toward = ['top']}")
+        .set("contact", &format!("[{left}, {right}]"))
+        .set("output.probe", "[{name = 'between', point = [0.05, 0.1]}]")
+        .set("time.end", "1.0")
+        .set("time.step", "0.125")
+}
+
+/// The gap in a profile is that to the obstacle where its force has moved it, so that springs carry what it says.
+#[test]
+fn the_gap_of_a_profile_is_that_to_the_obstacle_where_it_is() {
+    for ranks in [1, 2] {
+        let case = under_two_discs()
+            .set("contact.0.normal", "{compliance = {stiffness = 1e10, exponent = 1}}")
+            .set("contact.1.normal", "{compliance = {stiffness = 1e10, exponent = 1}}")
+            .set("output.profile", "[{on = 'top'}]");
+        let top = case.run(ranks).table("profiles.csv");
+        let (gap, pressure) = (top.numbers("gap"), top.numbers("contact_pressure"));
+        let deepest = gap.iter().copied().fold(0.0, f64::min);
+        assert!(deepest < -1e-5, "{deepest} m");
+        for (gap, pressure) in gap.iter().zip(&pressure) {
+            let spring = 1e10 * larger(-gap, 0.0);
+            assert!((pressure - spring).abs() < 1e-6 * 1e10 * -deepest, "{pressure} Pa at a gap of {gap} m");
+        }
+    }
+}
+
+#[test]
+fn two_obstacles_are_moved_by_their_forces_together() {
+    let mut first: Option<Vec<f64>> = None;
+    for scheme in ["implicit_euler", "bdf2"] {
+        let make = || under_two_discs().set("time.scheme", &format!("'{scheme}'"));
+        let mut alone: Option<Case> = None;
+        for ranks in 1..=3 {
+            let case = make().set("checkpoint.every", "4").run_and_keep(ranks);
+            let table = case.results().table("resultants.csv");
+            let at_end =
+                |name: &str, column: &str| *table.only("source", name).numbers(column).last().expect("rows");
+            // Without momentum to speak of, each contact carries the force of its disc.
+            for (name, force) in [("contact top", 4e5), ("contact top (2)", 2e5)] {
+                let found = at_end(name, "force_y");
+                assert!((found + force).abs() < 10.0, "{scheme}, {name}: {found} N on {ranks} ranks");
+                assert!(at_end(name, "obstacle_displacement") > 1e-5);
+            }
+            let imbalance = case.results().summary()["max_energy_imbalance"].as_f64().expect("a number");
+            assert!(imbalance < 1e-9, "{scheme}: {imbalance}");
+            match &alone {
+                None => alone = Some(case),
+                Some(one) => {
+                    assert_same_answer(&one.results(), &case.results(), 1e-7, &format!("{scheme} {ranks}"))
+                }
+            }
+        }
+        let stopped = make().set("checkpoint.every", "4");
+        stopped.run_with(1, &["--set", "time.end=0.5"]).expect(0);
+        stopped.run_with(1, &["--restart"]).expect(0);
+        let alone = alone.expect("a run");
+        let straight = alone.results();
+        for name in ["history.csv", "resultants.csv"] {
+            assert_eq!(straight.text(name), stopped.results().text(name), "{scheme}: {name}");
+        }
+        let depths =
+            straight.table("resultants.csv").only("source", "contact top").numbers("obstacle_displacement");
+        let other = first.get_or_insert_with(|| depths.clone());
+        assert!(
+            other.iter().zip(&depths).all(|(a, b)| (a - b).abs() < 1e-3 * a.abs()),
+            "{other:?} {depths:?}"
+        );
+    }
+}
+
+/// A disc or a ball under a force on its axle, and about its axis none, after 0.02 s.
+fn rolling(in_space: bool) -> Case {
+    let case = Case::of("rolling_disc").set("time.end", "0.02").without("output.fields");
+    if !in_space {
+        return case;
+    }
+    case.without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set("mesh.box", "{size = [0.1, 0.06, 0.02], cells = [20, 12, 2]}")
+        .set("contact.0.obstacle.sphere", "{centre = [0.04, 0.03, 0.119], radius = 0.1, axis = [0, 2, 0]}")
+        .set("contact.0.obstacle_load.direction", "[1, 0, 0]")
+        .set("contact.0.obstacle_load.moment_of_inertia", "0.04")
+}
+
+#[test]
+fn a_disc_and_a_ball_roll_as_fast_as_their_inertia_lets_them() {
+    // F / (m + I / R^2); the ball lies deeper, so that more of it slides.
+    for (in_space, acceleration, error, turn) in [(false, 20.0, 0.01, -1.0), (true, 300.0 / 14.0, 0.02, 1.0)]
+    {
+        let straight = rolling(in_space).set("checkpoint.every", "5").run_and_keep(1);
+        let table = straight.results().table("resultants.csv").only("source", "contact top");
+        let last = |column: &str| *table.numbers(column).last().expect("rows");
+        let (velocity, angular) = (last("obstacle_velocity"), turn * last("obstacle_angular_velocity"));
+        assert!((velocity / (0.02 * acceleration) - 1.0).abs() < error, "{velocity} m/s");
+        assert!((0.1 * angular / velocity - 1.0).abs() < 0.01, "{angular} rad/s at {velocity} m/s");
+        let imbalance = straight.results().summary()["max_energy_imbalance"].as_f64().expect("a number");
+        assert!(imbalance < 1e-9, "{imbalance}");
+        for ranks in [2, 3] {
+            let case = rolling(in_space).run_and_keep(ranks);
+            let table = case.results().table("resultants.csv").only("source", "contact top");
+            for column in ["obstacle_displacement", "obstacle_rotation"] {
+                let found = *table.numbers(column).last().expect("rows");
+                assert!((found / last(column) - 1.0).abs() < 1e-6, "{column} {found} on {ranks} ranks");
+            }
+        }
+        let stopped = rolling(in_space).set("checkpoint.every", "5");
+        stopped.run_with(1, &["--set", "time.end=0.01"]).expect(0);
+        stopped.run_with(1, &["--restart"]).expect(0);
+        for name in ["history.csv", "resultants.csv"] {
+            assert_eq!(straight.results().text(name), stopped.results().text(name), "{name}");
+        }
+    }
+}
+
+#[test]
+fn contacts_with_constraints_that_share_a_node_of_a_smooth_boundary_are_refused() {
+    let case = under_two_discs().set("contact.0.where", "'x < 0.05'").set("contact.1.where", "'x >= 0.05'");
+    for ranks in [1, 2] {
+        let outcome = case.run_with(ranks, &[]).expect(2);
+        outcome
+            .says("two [[contact]] tables meet on a smooth boundary")
+            .says("leave a facet between them out of both");
+    }
+}

@@ -117,15 +117,19 @@ fn a_job_with_friction_says_so_and_one_without_has_nothing_of_it() {
         [
             "normal_velocity",
             "contact_pressure",
+            "gap",
             "friction_traction_x",
             "friction_traction_y",
             "friction_traction_z",
+            "sliding_velocity_x",
+            "sliding_velocity_y",
+            "sliding_velocity_z",
             "tangential_displacement_x",
             "tangential_displacement_y",
             "tangential_displacement_z"
         ]
     );
-    assert_eq!(b.table("profiles.csv").columns.len(), 11);
+    assert_eq!(b.table("profiles.csv").columns.len(), 12);
     let size = |r: &Results, c: &str| r.table("profiles.csv").last(c);
     assert!((size(&a, "friction_traction_x").hypot(size(&a, "friction_traction_y")) - 20.0).abs() < 1e-6);
     assert!(a.text("run.log").contains(", 20 slip  ") && !b.text("run.log").contains(" slip"));

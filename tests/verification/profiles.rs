@@ -99,7 +99,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     let uniform: Mandel<S> = std::array::from_fn(|c| 3.0 + c as f64 * if c % 2 == 0 { 1.5 } else { -2.5 });
     let of_cell =
         |cell: usize| -> Mandel<S> { std::array::from_fn(|c| 5.0 * noise((9000 + cell * S + c) as u64)) };
-    let mut profiles = Profiles::new(session, &body, &[("bottom".into(), None)]).expect("profiles");
+    let mut profiles = Profiles::new(session, &body, &[("bottom".into(), vec![])]).expect("profiles");
     let cells = body.mesh.cell_ids.iter().map(|id| *id as usize);
     let (same, changing) = (vec![uniform; body.mesh.cell_ids.len()], cells.map(of_cell).collect::<Vec<_>>());
     write(&mut profiles, &body, &state, &same);
@@ -138,7 +138,7 @@ fn written<const D: usize, const S: usize>(session: &Session, folder: &Path, mut
     let mut traction = state.velocity.like().expect("a vector");
     set_nodal(&body.mesh, &mut traction, random(3));
     state.contact_traction = Some(traction);
-    let mut profiles = Profiles::new(session, &body, &[("bottom".into(), Some(0))]).expect("profiles");
+    let mut profiles = Profiles::new(session, &body, &[("bottom".into(), vec![0])]).expect("profiles");
     write(&mut profiles, &body, &state, &same);
     if session.is_first() {
         let left = whole.boundaries.iter().find(|b| b.name == "left").expect("a boundary");

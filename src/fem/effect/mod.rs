@@ -46,8 +46,8 @@ use crate::{
 pub use crate::laws::step::{Blend, Evaluation, Step};
 pub use adhesion::{Adhesion, Bonded, DEBONDING, STORED_IN_BONDS};
 pub use contact::{
-    CONTACT, COUNTS, Contact, ContactAreas, ContactConditions, ContactNode, LoadedObstacle, PointCount,
-    PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, choose_unknowns, contact_nodes,
+    CONTACT, COUNTS, Contact, ContactAreas, ContactConditions, ContactNode, LoadedMotion, LoadedObstacle,
+    PointCount, PointState, Quadrature, ReferenceValues, STORED_IN_CONTACT, choose_unknowns, contact_nodes,
 };
 pub use contact_memory::ContactMemory;
 pub use damage::{DAMAGE, Damage};

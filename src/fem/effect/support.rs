@@ -118,41 +118,36 @@ fn constraints<'a, const D: usize>(
             names =
                 supports.iter().filter(|other| is_plain_normal(other)).flat_map(|other| &other.on).collect();
         }
-        let points = surface_points(session, mesh, &facets(mesh, names))?;
-        let around = points.chunk_by(|a: &SurfacePoint<D>, b| a.node == b.node);
-        let share = |points: &[SurfacePoint<D>]| {
-            let part = support.part.as_ref();
-            part.map_or(1.0, |part| part.evaluate(0.0, &mesh.nodes[points[0].node as usize]))
+        let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+        let directions = |normals: &[SurfacePoint<D>]| match fix {
+            Fix::Keyword(FixedDirections::All) => (0..D).map(axis).collect(),
+            Fix::Axes(axes) => axes.iter().map(|a| axis(a.index())).collect(),
+            Fix::Keyword(FixedDirections::Normal) => normals.iter().map(|point| point.normal).collect(),
         };
-        let wrong = around.clone().find(|points| share(points).is_nan());
-        session.agree(wrong.map_or(Ok(()), |points| {
-            Err(Error::Refused(format!(
-                "support on {}: `where` is not a number at {:?} m; correct the expression",
-                support.on.join(", "),
-                mesh.nodes[points[0].node as usize]
-            )))
-        }))?;
-        let nodes: Vec<(u32, Vec<Vector<D>>)> = around
-            .filter(|points| share(points) != 0.0)
-            .map(|points| {
-                let axis = |i: usize| -> Vector<D> { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
-                let directions = match fix {
-                    Fix::Keyword(FixedDirections::All) => (0..D).map(axis).collect(),
-                    Fix::Axes(axes) => axes.iter().map(|a| axis(a.index())).collect(),
-                    Fix::Keyword(FixedDirections::Normal) => {
-                        points.iter().map(|point| point.normal).collect()
-                    }
-                };
-                (points[0].node, directions)
-            })
-            .collect();
+        let points = surface_points(session, mesh, &facets(mesh, names.iter().copied()))?;
+        let around = points.chunk_by(|a: &SurfacePoint<D>, b| a.node == b.node);
+        let mut nodes: BTreeMap<u32, Vec<Vector<D>>> =
+            around.map(|points| (points[0].node, directions(points))).collect();
+        nodes.extend(mesh.nodes_of_point_sets(&names).into_iter().map(|node| (node, directions(&[]))));
+        if let Some(part) = &support.part {
+            let share = |node: u32| part.evaluate(0.0, &mesh.nodes[node as usize]);
+            let wrong = nodes.keys().find(|node| share(**node).is_nan());
+            session.agree(wrong.map_or(Ok(()), |&node| {
+                Err(Error::Refused(format!(
+                    "support on {}: `where` is not a number at {:?} m; correct the expression",
+                    support.on.join(", "),
+                    mesh.nodes[node as usize]
+                )))
+            }))?;
+            nodes.retain(|&node, _| share(node) != 0.0);
+        }
         if support.part.is_some() && session.total(nodes.len()) == 0 {
             return session.agree(Err(Error::Refused(format!(
                 "support on {}: `where` holds at no node of these boundaries; correct the expression",
                 support.on.join(", ")
             ))));
         }
-        out.push(Constraints { support, nodes });
+        out.push(Constraints { support, nodes: nodes.into_iter().collect() });
     }
     Ok(out)
 }

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Exit, Result},
     fem::{
         body::Body,
-        effect::{History, LoadedObstacle},
+        effect::{History, LoadedMotion},
         state::State,
     },
     job::differing_keys,
@@ -46,6 +46,12 @@ pub struct Header {
     /// For the same contacts: the stiffness in N/m against the obstacle that the last step has found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacle_stiffness: Vec<f64>,
+    /// For each contact whose obstacle a moment turns: angle and angular velocity in rad/s after the last step, and before it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_rotations: Vec<[f64; 4]>,
+    /// For the same contacts: the stiffness in N m against the rotation that the last step has found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_rotation_stiffness: Vec<f64>,
     /// Digest of the mesh.
     pub mesh: String,
     /// The keys of the job that affect the results, with their values.
@@ -70,7 +76,10 @@ impl Header {
         state: &State,
         totals: &Totals,
     ) -> Self {
-        let obstacles = || body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
+        let motions = |number: usize| {
+            let obstacles = body.contacts.iter().filter_map(|contact| contact.obstacle.as_ref());
+            obstacles.filter_map(move |obstacle| obstacle.motions()[number])
+        };
         Self {
             format: FORMAT,
             version: identity.version.clone(),
@@ -80,8 +89,10 @@ impl Header {
             time: state.time,
             step_length: state.step_length,
             totals: *totals,
-            obstacles: obstacles().map(LoadedObstacle::saved).collect(),
-            obstacle_stiffness: obstacles().map(LoadedObstacle::stiffness).collect(),
+            obstacles: motions(0).map(LoadedMotion::saved).collect(),
+            obstacle_stiffness: motions(0).map(LoadedMotion::stiffness).collect(),
+            obstacle_rotations: motions(1).map(LoadedMotion::saved).collect(),
+            obstacle_rotation_stiffness: motions(1).map(LoadedMotion::stiffness).collect(),
             mesh: digest(body),
             physics: identity.physics.clone(),
         }
@@ -170,10 +181,17 @@ pub fn restore<const D: usize, const S: usize>(
         let values = checkpoint.read(set, total, kept, ids)?;
         kept.iter().zip(&values).for_each(|((name, _), values)| body.restore_history(name, values));
     }
-    let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
-    for (at, obstacle) in obstacles.enumerate() {
-        header.obstacles.get(at).into_iter().for_each(|saved| obstacle.restore(*saved));
-        obstacle.restore_stiffness(header.obstacle_stiffness.get(at).copied().unwrap_or(0.0));
+    let saved = [
+        (&header.obstacles, &header.obstacle_stiffness),
+        (&header.obstacle_rotations, &header.obstacle_rotation_stiffness),
+    ];
+    for (number, (motions, stiffness)) in saved.into_iter().enumerate() {
+        let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
+        let restored = obstacles.filter_map(|obstacle| obstacle.motions_mut().into_iter().nth(number)?);
+        for (at, motion) in restored.enumerate() {
+            motions.get(at).into_iter().for_each(|saved| motion.restore(*saved));
+            motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
+        }
     }
     (state.step, state.time, state.step_length) = (header.step, header.time, header.step_length);
     Ok(header)

@@ -1,4 +1,4 @@
-//! The mesh and the newest fields of a `fields.vtkhdf`, read in one process, without MPI.
+//! The mesh and the fields of a `fields.vtkhdf` at one time, read in one process, without MPI.
 
 use super::{
     field::{Place, Shape, place_word, shape_word},
@@ -9,7 +9,7 @@ use super::{
 use crate::error::{Error, Result};
 use std::{collections::BTreeMap, path::Path};
 
-/// The body and its fields at the last time in the file.
+/// The body and its fields at one time in the file, by default the last.
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
     /// Its time in s; 0 if the file has no steps yet.
@@ -42,15 +42,20 @@ pub struct History {
 }
 
 impl Snapshot {
-    /// Reads the file.
+    /// Reads the file at its last time.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_at(path, None)
+    }
+
+    /// Reads the file at one of its [`times`](Self::times), or at the last.
+    pub fn read_at(path: &Path, step: Option<usize>) -> Result<Self> {
         std::fs::File::open(path).map_err(|error| Error::unreadable(path, error))?;
         let refused = |words: &str| Error::unreadable(path, words);
         let file = hdf5::File::open(path).map_err(|_| refused("it is not an HDF5 file, or a damaged one"))?;
         if !(file.link_exists("VTKHDF") && file.link_exists("Mesh") && file.link_exists("Fields")) {
             return Err(refused("it is not a field file of this program"));
         }
-        let snapshot = read(&file).map_err(|error| Error::unreadable(path, error))?;
+        let snapshot = read(&file, step).map_err(|error| Error::unreadable(path, error))?;
         if !snapshot.is_sound() {
             return Err(refused("its mesh and fields do not fit together"));
         }
@@ -100,7 +105,7 @@ impl Snapshot {
     }
 }
 
-fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
+fn read(file: &hdf5::File, step: Option<usize>) -> hdf5::Result<Snapshot> {
     let cells = file.dataset("Mesh/cells")?;
     let corners = cells.shape().get(1).copied().unwrap_or(0);
     let nodes = triples(&file.dataset("VTKHDF/Points")?.read_raw::<f64>()?);
@@ -119,13 +124,14 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
     let steps: i64 = file.group("VTKHDF/Steps")?.attr("NSteps")?.read_scalar()?;
     snapshot.times = file.dataset("VTKHDF/Steps/Values")?.read_raw::<f64>()?;
     snapshot.times.truncate(usize::try_from(steps).unwrap_or(0));
-    let Some(&time) = snapshot.times.last() else { return Ok(snapshot) };
+    let step = step.unwrap_or(snapshot.times.len().saturating_sub(1));
+    let Some(&time) = snapshot.times.get(step) else { return Ok(snapshot) };
     snapshot.time = time;
     for field @ OutputField { name, place, .. } in FIELDS.iter().filter(|field| field.shape != Shape::Tensor)
     {
         let group = format!("Fields/{name}");
         if file.link_exists(&group) {
-            let values = file.dataset(&format!("{group}/{}", steps - 1))?.read_raw::<f64>()?;
+            let values = file.dataset(&format!("{group}/{step}"))?.read_raw::<f64>()?;
             let repeated = if *place == Place::Cell { parts } else { 1 };
             let values = values.chunks(field.width()).flat_map(|row| row.repeat(repeated)).collect();
             snapshot.fields.insert(name, values);
@@ -141,7 +147,7 @@ fn read(file: &hdf5::File) -> hdf5::Result<Snapshot> {
         }
         let is_nodal = text("place")? == place_word(Place::Node);
         let (place, repeated) = if is_nodal { (Place::Node, 1) } else { (Place::Cell, parts) };
-        let values = group.dataset(&(steps - 1).to_string())?.read_raw::<f64>()?;
+        let values = group.dataset(&step.to_string())?.read_raw::<f64>()?;
         let values = values.iter().flat_map(|value| std::iter::repeat_n(*value, repeated)).collect();
         snapshot.histories.push(History { name, place, values });
     }

@@ -116,6 +116,9 @@ pub struct Totals {
     #[serde(default)]
     #[serde(rename = "pace")]
     pub step_level: Option<StepLevel>,
+    /// Whether factors in single precision were insufficient for a step, after which they are in double precision.
+    #[serde(default)]
+    pub single_precision_failed: bool,
 }
 
 impl Totals {

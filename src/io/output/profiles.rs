@@ -5,6 +5,7 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
+        effect::PointState,
         space::{SurfacePoint, surface_points},
         state::State,
     },
@@ -13,7 +14,7 @@ use crate::{
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
 };
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
 /// A boundary whose values are written.
 #[derive(Debug)]
@@ -21,37 +22,44 @@ struct Profile<const D: usize> {
     name: String,
     facets: Vec<u32>,
     points: Vec<SurfacePoint<D>>,
-    /// The contact of the body on this boundary, if there is one.
-    contact: Option<usize>,
+    /// The contacts of the body on this boundary, each on a part of it.
+    contacts: Vec<usize>,
+}
+
+/// The columns that only some contacts have.
+#[derive(Debug, Clone, Copy)]
+struct Columns {
+    /// A law of the displacement acts on one of the profiles.
+    gap: bool,
+    friction: bool,
 }
 
 /// The profiles of a job.
 #[derive(Debug)]
 pub struct Profiles<const D: usize> {
     profiles: Vec<Profile<D>>,
-    /// Whether there is friction on one of them.
-    with_friction: bool,
+    with: Columns,
     file: Option<CsvFile>,
 }
 
 impl<const D: usize> Profiles<D> {
-    /// Prepares profiles along these boundaries, each with the contact that acts on it. Collective.
+    /// Prepares profiles along these boundaries, each with the contacts that act on it. Collective.
     pub fn new<const S: usize>(
         session: &Session,
         body: &Body<D, S>,
-        boundaries: &[(String, Option<usize>)],
+        boundaries: &[(String, Vec<usize>)],
     ) -> Result<Self> {
-        let prepare = |(name, contact): &(String, Option<usize>)| {
+        let prepare = |(name, contacts): &(String, Vec<usize>)| {
             let facets = body.mesh.boundary(name).map(|b| b.facets.clone()).unwrap_or_default();
             let points = surface_points(session, &body.mesh, &facets)?;
-            Ok(Profile { name: name.clone(), facets, points, contact: *contact })
+            Ok(Profile { name: name.clone(), facets, points, contacts: contacts.clone() })
         };
-        let has_friction = |contact: usize| body.contacts[contact].friction().is_some();
-        Ok(Self {
-            profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?,
-            with_friction: boundaries.iter().any(|(_, contact)| contact.is_some_and(has_friction)),
-            file: None,
-        })
+        let contacts = || boundaries.iter().flat_map(|(_, contacts)| contacts).map(|at| &body.contacts[*at]);
+        let with = Columns {
+            gap: contacts().any(|contact| contact.law.depends_on_displacement()),
+            friction: contacts().any(|contact| contact.friction().is_some()),
+        };
+        Ok(Self { profiles: boundaries.iter().map(prepare).collect::<Result<_>>()?, with, file: None })
     }
 
     /// Whether there are no profiles.
@@ -66,14 +74,18 @@ impl<const D: usize> Profiles<D> {
         }
         let path = folder.join("profiles.csv");
         let axes = ["x", "y", "z"][..D].join(",");
-        let friction = ["x", "y", "z"][..if self.with_friction { D } else { 0 }]
-            .iter()
-            .map(|axis| format!(",friction_traction_{axis}"))
-            .collect::<String>();
-        let tangential = ["x", "y", "z"][..D].iter().map(|axis| format!(",tangential_displacement_{axis}"));
-        let tangential = tangential.collect::<String>();
+        let vector = |name: &str| -> String {
+            ["x", "y", "z"][..D].iter().map(|axis| format!(",{name}_{axis}")).collect()
+        };
+        let gap = if self.with.gap { ",gap" } else { "" };
+        let friction = if self.with.friction {
+            vector("friction_traction") + &vector("sliding_velocity")
+        } else {
+            String::new()
+        };
+        let tangential = vector("tangential_displacement");
         let header = format!(
-            "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{friction}{tangential}"
+            "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{gap}{friction}{tangential}"
         );
         self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
@@ -87,9 +99,9 @@ impl<const D: usize> Profiles<D> {
         state: &State,
         stress: &[Mandel<S>],
     ) -> Result<(), Agreed> {
-        let width = if self.with_friction { 3 * D + 3 } else { 2 * D + 3 };
+        let width = 2 * D + 3 + usize::from(self.with.gap) + if self.with.friction { 2 * D } else { 0 };
         for profile in &self.profiles {
-            let rows = session.agree(profile.rows(body, state, stress, self.with_friction))?;
+            let rows = session.agree(profile.rows(body, state, stress, self.with))?;
             // All rows to rank 0.
             let mut counts = vec![0; session.ranks()];
             counts[0] = rows.len();
@@ -114,26 +126,32 @@ impl<const D: usize> Profiles<D> {
 }
 
 impl<const D: usize> Profile<D> {
-    /// Position, normal displacement, normal velocity, contact pressure, friction traction `-sigma_tau` if requested, and tangential
-    /// displacement of each point on this rank.
+    /// Position, normal displacement, normal velocity, contact pressure, if requested the gap, the friction traction `-sigma_tau` and
+    /// the sliding velocity, and tangential displacement of each point on this rank.
     fn rows<const S: usize>(
         &self,
         body: &Body<D, S>,
         state: &State,
         stress: &[Mandel<S>],
-        with_friction: bool,
+        with: Columns,
     ) -> Result<Vec<f64>> {
         let by_stress =
-            if self.contact.is_none() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
+            if self.contacts.is_empty() { self.pressure_of_stress(body, state, stress)? } else { vec![] };
         let (displacement, velocity) = (state.displacement.local()?, state.velocity.local()?);
         let traction = state.contact_traction.as_ref().map(|traction| traction.owned()).transpose()?;
-        let mut out = Vec::with_capacity(self.points.len() * (3 * D + 3));
+        let mut states: HashMap<usize, Vec<(usize, PointState<D>)>> = HashMap::new();
+        for &contact in self.contacts.iter().filter(|_| with.gap || with.friction) {
+            body.contacts[contact].states(state.time, [&displacement, &velocity], |node, state| {
+                states.entry(node).or_default().push((contact, state));
+            })?;
+        }
+        let mut out = Vec::with_capacity(self.points.len() * (4 * D + 4));
         for (at, point) in self.points.iter().enumerate() {
             let node = point.node as usize;
             let along = |field: &[f64]| (0..D).map(|i| field[node * D + i] * point.normal[i]).sum::<f64>();
             let normal_velocity = along(&velocity);
-            let pressure = match self.contact {
-                Some(contact) => match &traction {
+            let pressure = match self.contacts.first() {
+                Some(&contact) => match &traction {
                     Some(traction) if !body.contacts[contact].needs_ghosts() => {
                         free_component(body, traction, point)
                     }
@@ -144,9 +162,20 @@ impl<const D: usize> Profile<D> {
             out.extend(body.mesh.nodes[node]);
             let normal_displacement = along(&displacement);
             out.extend([normal_displacement, normal_velocity, pressure]);
-            if with_friction {
-                let known = self.contact.zip(traction.as_ref());
-                out.extend(known.map_or([0.0; D], |(c, t)| body.contacts[c].friction_traction(node, t)));
+            // At an edge, a contact has a point for each direction of its facets.
+            let along_normal = |(_, state): &(usize, PointState<D>)| dot(&state.normal, &point.normal);
+            let here = states
+                .get(&node)
+                .and_then(|states| states.iter().max_by(|a, b| along_normal(a).total_cmp(&along_normal(b))));
+            if with.gap {
+                out.push(here.map_or(0.0, |(_, state)| state.gap));
+            }
+            if with.friction {
+                let rubbing =
+                    here.zip(traction.as_ref()).map_or([[0.0; D]; 2], |((contact, state), traction)| {
+                        [body.contacts[*contact].friction_traction(node, traction), state.sliding]
+                    });
+                out.extend(rubbing.concat());
             }
             out.extend(add_scaled(&point.value(&displacement), -normal_displacement, &point.normal));
         }

@@ -34,8 +34,8 @@ pub(crate) struct ResultantTable<const D: usize> {
 struct Columns {
     contact: bool,
     friction: bool,
-    /// Motion of an obstacle that a force moves.
-    obstacle: bool,
+    /// Motion of an obstacle that a force moves, and of one that a moment turns.
+    motions: [bool; 2],
 }
 
 impl<const D: usize> ResultantTable<D> {
@@ -54,8 +54,10 @@ impl<const D: usize> ResultantTable<D> {
             names.extend((1..).map(same).find(|name| !names.contains(name)));
         }
         let friction = job.contact.iter().any(|contact| contact.friction.is_some());
-        let obstacle = job.contact.iter().any(|contact| contact.obstacle_load.is_some());
-        let with = Columns { contact: !job.contact.is_empty(), friction, obstacle };
+        let loads = || job.contact.iter().filter_map(|contact| contact.obstacle_load.as_ref());
+        let motions =
+            [loads().any(|load| !load.direction.is_empty()), loads().any(|load| load.moment.is_some())];
+        let with = Columns { contact: !job.contact.is_empty(), friction, motions };
         Ok(Self { resultants, names, with, file: None })
     }
 
@@ -67,7 +69,10 @@ impl<const D: usize> ResultantTable<D> {
         let contact =
             if self.with.contact { ",touching_area,open_area,mean_pressure,largest_pressure" } else { "" };
         let friction = if self.with.friction { ",sticking_area,slipping_area" } else { "" };
-        let obstacle = if self.with.obstacle { ",obstacle_displacement,obstacle_velocity" } else { "" };
+        let of_motions =
+            [",obstacle_displacement,obstacle_velocity", ",obstacle_rotation,obstacle_angular_velocity"];
+        let there = of_motions.into_iter().zip(self.with.motions).filter(|(_, is_there)| *is_there);
+        let obstacle: String = there.map(|(columns, _)| columns).collect();
         let header = format!("step,time,source{columns}{contact}{friction}{obstacle}");
         let path = folder.join("resultants.csv");
         self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?);
@@ -93,13 +98,14 @@ impl<const D: usize> ResultantTable<D> {
                     Source::Contact(at) => body.contacts[*at].obstacle.as_ref(),
                     _ => None,
                 };
-                let path = ObstaclePath {
-                    motion: obstacle.map(|obstacle| obstacle.motion()),
-                    is_there: with.obstacle,
-                };
+                let motions = obstacle.map_or([None; 2], |obstacle| obstacle.motions());
+                let [path, turn] = [0, 1].map(|number| ObstaclePath {
+                    motion: motions[number].map(|motion| motion.motion()),
+                    is_there: with.motions[number],
+                });
                 let moment = &resultant.moment[3 - moment_axes::<D>().len()..];
                 file.row(format_args!(
-                    "{},{},{name},{},{}{areas}{path}",
+                    "{},{},{name},{},{}{areas}{path}{turn}",
                     state.step,
                     Number(state.time),
                     Numbers(&resultant.force),

@@ -38,6 +38,8 @@ fn words(header: &Header, counts: &[[u64; 4]]) -> String {
     ];
     let named = header.boundaries.iter().zip(&header.boundary_facets);
     lines.extend(named.map(|(name, facets)| format!("boundary    {name}: {facets} facets")));
+    let points = header.point_sets.iter();
+    lines.extend(points.map(|set| format!("points      {}: {} nodes", set.name, set.places.len())));
     lines.push(format!("digest      {}", header.digest));
     lines.push(format!("runs on     1 to {} ranks", header.parts));
     lines.join("\n")

@@ -31,7 +31,7 @@ pub use write::write;
 
 use crate::{
     io::output::seal::{self, Kind},
-    mesh::Names,
+    mesh::{Names, PointSet},
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -69,6 +69,9 @@ pub struct Header {
     pub boundaries: Vec<String>,
     /// Facets of each boundary.
     pub boundary_facets: Vec<usize>,
+    /// Named points and curves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub point_sets: Vec<PointSet>,
     /// Facets between parts.
     pub edge_cut: usize,
     /// Ratio of the largest number of cells in a part to the mean.
@@ -79,7 +82,8 @@ pub struct Header {
 
 impl Header {
     fn names(&self) -> Names {
-        Names { regions: self.regions.clone(), boundaries: self.boundaries.clone() }
+        let Self { regions, boundaries, point_sets, .. } = self.clone();
+        Names { regions, boundaries, point_sets }
     }
 }
 

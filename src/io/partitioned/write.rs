@@ -64,6 +64,7 @@ fn write_sealed<const D: usize>(
         digest: format!("{:016x}", digests.fold(0, u64::wrapping_add)),
         regions: names.regions,
         boundaries: names.boundaries,
+        point_sets: names.point_sets,
     };
     let file = ParallelFile::create_behind(path, seal::SEAL_BYTES, alone)?;
     let written = write_tables(&file, &header, &pieces);

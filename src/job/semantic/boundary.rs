@@ -223,7 +223,7 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     let root = findings.root;
     for table in TABLES {
         for (path, name) in names_in(root, table) {
-            check_name(findings, &path, &name, mesh.boundaries, "boundary");
+            check_place(findings, (&path, &name), mesh);
         }
     }
     for region in items(root, "region") {
@@ -250,6 +250,22 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
     check_initial_stress(findings, mesh.dimension);
     check_vector(findings, "initial.displacement", mesh.dimension);
     check_vector(findings, "initial.velocity", mesh.dimension);
+}
+
+/// Boundaries are in all tables; points and curves only in supports that hold nodes.
+fn check_place(findings: &mut Findings<'_>, (path, name): (&str, &str), mesh: MeshNames<'_>) {
+    if mesh.boundaries.contains(&name) || !mesh.points.contains(&name) {
+        return check_name(findings, path, name, mesh.boundaries, "boundary");
+    }
+    let table = path.split(".on.").next().unwrap_or_default();
+    let what = "is the name of points or curves";
+    if !table.starts_with("support") || findings.root.find(&format!("{table}.fix")).is_none() {
+        let message = format!("\"{name}\" {what}: only a support with `fix` acts on them");
+        findings.fault(path, message, "name a boundary");
+    } else if findings.root.read(&format!("{table}.fix")) == Some(Fix::Keyword(FixedDirections::Normal)) {
+        let message = format!("\"{name}\" {what}, which have no normal");
+        findings.fault(path, message, "fix all components or a list of axes");
+    }
 }
 
 /// The initial stress has the components of the dimension, and a material with elasticity.

@@ -14,7 +14,6 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     let tables: Vec<ContactTable> =
         items(root, "contact").into_iter().map(|path| table(root, path)).collect();
     check_method(findings, &tables);
-    check_loads(findings, &tables);
     check_strengths(findings, &tables);
     for table in tables {
         for fault in table.faults() {
@@ -94,15 +93,6 @@ fn check_strengths(findings: &mut Findings<'_>, tables: &[ContactTable]) {
     }
 }
 
-/// One obstacle is solved together with a step.
-fn check_loads(findings: &mut Findings<'_>, tables: &[ContactTable]) {
-    for table in tables.iter().filter(|table| table.obstacle_load.is_some()).skip(1) {
-        let key = format!("{}.obstacle_load", table.interface.path);
-        let help = "prescribe the motion of the others, or put their boundaries into one [[contact]]";
-        findings.fault_at_key(&key, "a second obstacle is moved by a force; only one can be", help);
-    }
-}
-
 /// Vectors of an obstacle.
 const OBSTACLE_VECTORS: [&str; 4] = ["plane.point", "plane.normal", "sphere.centre", "shape.centre"];
 /// Obstacles that rotate about their centre and, in space, an axis.
@@ -144,6 +134,8 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
             );
         }
     }
+    check_shape(findings, &format!("{obstacle}.shape"));
+    check_moment(findings, contact);
     let distance = format!("{obstacle}.shape.distance");
     if root.read::<Scalar>(&distance).is_some_and(|distance| distance.depends_on_time()) {
         let help = "use x, y and z only; a shape moves by its `centre`";
@@ -153,6 +145,56 @@ fn check_obstacle(findings: &mut Findings<'_>, contact: &str) {
     if normal.is_some_and(|normal| !normal.is_empty() && normal.iter().all(|&x| x == 0.0)) {
         let help = "give the normal that points out of the obstacle toward the body";
         findings.fault(&format!("{obstacle}.plane.normal"), "the normal is the zero vector", help);
+    }
+}
+
+/// A moment turns what has a centre and does not turn otherwise.
+fn check_moment(findings: &mut Findings<'_>, contact: &str) {
+    let root = findings.root;
+    let moment = format!("{contact}.obstacle_load.moment");
+    if root.find(&moment).is_none() {
+        return;
+    }
+    if root.find(&format!("{contact}.obstacle.plane")).is_some() {
+        let help = "use a sphere or a shape, or give the plane a `rotation`";
+        findings.fault_at_key(
+            &moment,
+            "a moment turns a sphere or a shape about its centre, not a plane",
+            help,
+        );
+    }
+    for rotation in rotations(&format!("{contact}.obstacle")).filter(|rotation| root.find(rotation).is_some())
+    {
+        findings.fault_at_key(
+            &rotation,
+            "the obstacle turns by a moment or by its `rotation`, not both",
+            "delete one of them",
+        );
+    }
+}
+
+/// A shape has either the expression of a distance or a surface; only a surface has a unit.
+fn check_shape(findings: &mut Findings<'_>, shape: &str) {
+    let root = findings.root;
+    if root.find(shape).is_none() {
+        return;
+    }
+    let [distance, surface, scale] = ["distance", "surface", "scale"].map(|key| format!("{shape}.{key}"));
+    let has = |path: &str| root.find(path).is_some();
+    match (has(&distance), has(&surface)) {
+        (false, false) => {
+            let help = "add distance = \"..\", an expression, or surface = \"..\", an STL file";
+            findings.fault(shape, "this shape has neither `distance` nor `surface`", help);
+        }
+        (true, true) => {
+            let help = "delete one of them";
+            findings.fault_at_key(&surface, "a shape has a distance or a surface, not both", help);
+        }
+        (true, false) if has(&scale) => {
+            let help = "delete it, or write the unit into the expression";
+            findings.fault_at_key(&scale, "only a `surface` has a scale", help);
+        }
+        _ => {}
     }
 }
 
@@ -168,6 +210,11 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
         }
         check_vector(findings, &format!("{contact}.obstacle_load.direction"), mesh.dimension);
         check_flat(findings, &format!("{contact}.obstacle.shape.distance"), mesh.dimension);
+        let surface = format!("{contact}.obstacle.shape.surface");
+        if mesh.dimension == 2 && findings.root.find(&surface).is_some() {
+            let help = "give its distance as an expression of x and y: `distance`";
+            findings.fault_at_key(&surface, "a triangulated surface is an obstacle in 3D only", help);
+        }
         check_rotation(findings, &format!("{contact}.obstacle"), mesh.dimension);
     }
 }
@@ -190,11 +237,13 @@ fn check_rotation(findings: &mut Findings<'_>, obstacle: &str, dimension: usize)
         if dimension == 2 {
             continue;
         }
-        if has(&rotation) && !has(&axis) {
+        let moment = obstacle.replace(".obstacle", ".obstacle_load.moment");
+        if (has(&rotation) || (has(&moment) && has(&format!("{obstacle}.{kind}")))) && !has(&axis) {
             let help = "add `axis = [x, y, z]`, the direction of the axis of rotation";
-            findings.fault(&rotation, "in 3D a rotation needs an axis", help);
+            let at = if has(&rotation) { &rotation } else { &moment };
+            findings.fault(at, "in 3D a rotation needs an axis", help);
         }
-        if has(&axis) && !has(&rotation) {
+        if has(&axis) && !has(&rotation) && !has(&moment) {
             let help = "add `rotation`, or delete the axis";
             findings.fault(&axis, "an axis without `rotation` has no effect", help);
         }

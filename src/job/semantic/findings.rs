@@ -12,6 +12,8 @@ pub struct MeshNames<'a> {
     pub boundaries: &'a [&'a str],
     /// Names of the regions.
     pub regions: &'a [&'a str],
+    /// Names of points and curves.
+    pub points: &'a [&'a str],
 }
 
 /// Faults and warnings found so far.

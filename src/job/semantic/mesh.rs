@@ -5,12 +5,17 @@ use super::findings::{Findings, MeshNames, items};
 use crate::job::document::Diagonal;
 use crate::job::source::Node;
 
-const RECTANGLE: MeshNames<'static> =
-    MeshNames { dimension: 2, boundaries: &["left", "right", "bottom", "top"], regions: &["body"] };
+const RECTANGLE: MeshNames<'static> = MeshNames {
+    dimension: 2,
+    boundaries: &["left", "right", "bottom", "top"],
+    regions: &["body"],
+    points: &[],
+};
 const CUBOID: MeshNames<'static> = MeshNames {
     dimension: 3,
     boundaries: &["left", "right", "front", "back", "bottom", "top"],
     regions: &["body"],
+    points: &[],
 };
 
 /// The names of a generated mesh; `None` for a file, or if the job does not define exactly one mesh.

@@ -14,6 +14,7 @@ mod obstacle;
 mod obstacle_load;
 mod obstacle_motion;
 mod obstacle_shape;
+mod obstacle_surface;
 mod polyline;
 mod table;
 mod wear;
@@ -62,8 +63,8 @@ pub struct Contact {
     /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
-    /// A force that moves the obstacle: indentation or punching by force. Its displacement and velocity are in `resultants.csv`. One
-    /// contact of a job may have it. Absent: the obstacle moves as its keys prescribe.
+    /// A force that moves the obstacle, such as indentation or punching by force, or a moment that turns it, such as rolling. Its
+    /// displacement and velocity, angle and angular velocity are in `resultants.csv`. Absent: the obstacle moves as its keys prescribe.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle_load: Option<ObstacleLoad>,
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.

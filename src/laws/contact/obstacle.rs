@@ -41,7 +41,8 @@ pub enum Gap {
     Plane(Plane),
     /// A sphere, in 2D a disc.
     Sphere(Sphere),
-    /// Any shape, given by the distance from its surface, such as a cylinder, a cone or a punch with round edges.
+    /// Any shape, given by the distance from its surface, such as a cylinder, a cone or a punch with round edges, or by a
+    /// triangulated surface.
     Shape(Shape),
 }
 
@@ -81,7 +82,7 @@ pub struct Sphere {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,
-    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` in 3D, not allowed in 2D.
+    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` or `moment` in 3D, not allowed in 2D.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = [0.0, 1.0, 0.0])]
     pub axis: Option<Vec<f64>>,
@@ -109,7 +110,7 @@ impl Gap {
             Self::Sphere(_) => "a component of the centre is not finite: correct [contact.obstacle.sphere]",
             Self::Shape(_) => {
                 "`distance` or `centre` is not finite, or `distance` changes by more than the way between two places, which \
-                 no distance does: correct [contact.obstacle.shape]"
+                 no distance does, or parts of `surface` overlap: correct [contact.obstacle.shape]"
             }
         };
         Err(Error::Failed(format!(
@@ -204,7 +205,7 @@ pub(super) mod tests {
     }
 
     fn shape(distance: &str, centre: Vec<Scalar>) -> Gap {
-        Gap::Shape(Shape { distance: expression(distance), centre, rotation: None, axis: None })
+        Gap::Shape(Shape { distance: Some(expression(distance)), centre, ..Shape::default() })
     }
 
     fn floor(height: f64) -> Gap {

@@ -61,6 +61,11 @@ pub struct ObstacleMotion<const D: usize> {
 }
 
 impl<const D: usize> ObstacleMotion<D> {
+    /// Adds an angular velocity in rad/s.
+    pub fn turn(&mut self, angular_velocity: &Vector<3>) {
+        self.angular_velocity = add_scaled(&self.angular_velocity, 1.0, angular_velocity);
+    }
+
     /// Whether the motion is a translation.
     fn is_translation(&self) -> bool {
         self.angular_velocity == [0.0; 3]
@@ -86,6 +91,25 @@ impl Gap {
             Self::Sphere(Sphere { centre, rotation, .. }) | Self::Shape(Shape { centre, rotation, .. }) => {
                 moves(centre) || turns(rotation)
             }
+        }
+    }
+
+    /// The centre in m at `time` of a sphere or shape, the point of a plane; the origin without an obstacle.
+    pub fn centre<const D: usize>(&self, time: f64) -> Vector<D> {
+        match self {
+            Self::Distance(_) => [0.0; D],
+            Self::Plane(Plane { point, .. }) => vector(point, time),
+            Self::Sphere(Sphere { centre, .. }) | Self::Shape(Shape { centre, .. }) => vector(centre, time),
+        }
+    }
+
+    /// The direction of the axis of rotation of a sphere or shape; in the plane z.
+    pub fn axis(&self) -> Vector<3> {
+        match self {
+            Self::Sphere(Sphere { axis, .. }) | Self::Shape(Shape { axis, .. }) => {
+                axis_of(axis.as_deref().unwrap_or_default())
+            }
+            Self::Distance(_) | Self::Plane(_) => axis_of(&[]),
         }
     }
 
@@ -254,10 +278,11 @@ mod tests {
     #[test]
     fn a_cylinder_given_by_its_distance_rolls() {
         let cylinder = Gap::Shape(Shape {
-            distance: expression("sqrt(x^2 + z^2) - 0.5"),
+            distance: Some(expression("sqrt(x^2 + z^2) - 0.5")),
             centre: vec![expression("2*t"), Scalar::Number(0.0), Scalar::Number(0.5)],
             rotation: Some(Scalar::Number(4.0)),
             axis: Some(vec![0.0, 1.0, 0.0]),
+            ..Shape::default()
         });
         assert!(cylinder.surface_may_move());
         let motion = cylinder.motion::<3>(STEP).unwrap();

@@ -1,26 +1,39 @@
-//! An obstacle given by the distance of a place from its surface.
+//! An obstacle given by the distance of a place from its surface: an expression, or that from a triangulated surface.
 //!
 //! The distance `f` is positive outside of the obstacle and negative inside, and changes by at most the way between two places. Along
 //! the ray from a place outside, the obstacle is therefore at least `f` away: the search goes on by this length until the surface is
 //! near, and its last part is halved (Hart, Sphere tracing, The Visual Computer 12, 1996). From a place inside, the search goes back.
 
+use super::obstacle_surface::TriangulatedSurface;
 use crate::{
     laws::expression::Scalar,
     linear_algebra::tensor::{Vector, add_scaled, larger},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::{path::PathBuf, sync::Arc};
 
-/// An obstacle of any shape, given by the distance from its surface.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// An obstacle of any shape, given by the distance from its surface: by either `distance` or `surface`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
     /// The distance from the surface, positive outside of the obstacle and negative inside, as an expression in x, y, z relative to
     /// `centre`. It may be less than the distance, not more: between two places it changes by at most the way between them, as do
     /// distances and their `min` (union) and `max` (intersection).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
-    pub distance: Scalar,
-    /// The place of the origin of the expression, one component per axis: numbers, or expressions in t. Absent: the origin.
+    pub distance: Option<Scalar>,
+    /// In 3D, an STL file (binary or ASCII) of the surface, relative to the job file, in place of `distance`. The surface must be
+    /// closed, its triangles counterclockwise as seen from outside of the obstacle, and its parts must not overlap. Coordinates are
+    /// relative to `centre`. Each triangle is flat, so that the gap of a round tool is as exact as its triangulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<PathBuf>", extend("format" = "path"), example = "../meshes/stamp.stl")]
+    pub surface: Option<Surface>,
+    /// The unit of length of `surface`. Absent: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1e-3)]
+    pub scale: Option<f64>,
+    /// The place of the origin of `distance` or `surface`, one component per axis: numbers, or expressions in t. Absent: the origin.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, 0.0, "-1.01 + 0.1*t"]))]
     pub centre: Vec<Scalar>,
@@ -30,10 +43,20 @@ pub struct Shape {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,
-    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` in 3D, not allowed in 2D.
+    /// Direction of the axis of rotation in 3D, a vector of any length. Required with `rotation` or `moment` in 3D, not allowed in 2D.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = [0.0, 1.0, 0.0])]
     pub axis: Option<Vec<f64>>,
+}
+
+/// The file of a triangulated surface, and its contents once it has been read.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Surface {
+    /// The path of the file.
+    pub file: PathBuf,
+    #[serde(skip)]
+    triangles: Option<Arc<TriangulatedSurface>>,
 }
 
 /// Below this share of the first distance, the surface is near.
@@ -57,7 +80,27 @@ impl Shape {
 
     /// The distance in m at a place relative to the centre.
     pub(super) fn distance_at<const D: usize>(&self, offset: &Vector<D>) -> f64 {
-        self.distance.evaluate(0.0, offset)
+        if let Some(distance) = &self.distance {
+            return distance.evaluate(0.0, offset);
+        }
+        let triangles = self.surface.as_ref().and_then(|surface| surface.triangles.as_ref());
+        triangles.map_or(f64::NAN, |triangles| {
+            triangles.distance(&std::array::from_fn(|i| offset.get(i).copied().unwrap_or(0.0)))
+        })
+    }
+
+    /// Sets the surface to the contents of its STL file. An error says what is wrong with it.
+    pub fn read_surface(&mut self, bytes: &[u8]) -> Result<(), String> {
+        if let Some(surface) = &mut self.surface {
+            let triangles = TriangulatedSurface::from_stl(bytes, self.scale.unwrap_or(1.0))?;
+            surface.triangles = Some(Arc::new(triangles));
+        }
+        Ok(())
+    }
+
+    /// A hash of the surface that was read.
+    pub fn surface_digest(&self) -> Option<u64> {
+        Some(self.surface.as_ref()?.triangles.as_ref()?.digest())
     }
 
     /// The length in m of the ray from a place relative to the centre, along the unit normal, to the surface; negative from inside.
@@ -81,7 +124,7 @@ impl Shape {
                 return f64::NAN;
             }
             if there <= 0.0 {
-                return side * zero_between(at, here, next);
+                return side * zero_between(at, [here, value], [next, there], ZERO * size);
             }
             if next > FARTHEST * first.abs() {
                 break;
@@ -104,19 +147,32 @@ pub(super) fn vector<const D: usize>(components: &[Scalar], time: f64) -> Vector
     std::array::from_fn(|i| components.get(i).map_or(0.0, |component| component.evaluate(time, &[])))
 }
 
-/// The zero of a function that is positive at the first and not at the second place, to all digits.
-fn zero_between(function: impl Fn(f64) -> f64, mut positive: f64, mut other: f64) -> f64 {
-    loop {
-        let middle = 0.5 * (positive + other);
-        if middle <= positive || middle >= other {
-            return other;
+/// The zero of a function that is positive at the first and not at the second place, where its value is at most `small`. On every
+/// second step the interval is halved; the others go to the zero of the chord, which is that of a flat surface.
+fn zero_between(
+    function: impl Fn(f64) -> f64,
+    mut positive: [f64; 2],
+    mut other: [f64; 2],
+    small: f64,
+) -> f64 {
+    let mut is_chord = true;
+    while -other[1] > small {
+        let middle = 0.5 * (positive[0] + other[0]);
+        if middle <= positive[0] || middle >= other[0] {
+            break;
         }
-        if function(middle) > 0.0 {
-            positive = middle;
-        } else {
-            other = middle;
+        let chord = positive[0] + (other[0] - positive[0]) * positive[1] / (positive[1] - other[1]);
+        let is_inside = positive[0] < chord && chord < other[0];
+        let next = if is_chord && is_inside { chord } else { middle };
+        let value = function(next);
+        if value.is_nan() || value.abs() <= small {
+            return if value.is_nan() { value } else { next };
         }
+        let side = if value > 0.0 { &mut positive } else { &mut other };
+        *side = [next, value];
+        is_chord = !is_chord;
     }
+    other[0]
 }
 
 #[cfg(test)]
@@ -127,7 +183,7 @@ mod tests {
 
     fn shape(distance: &str) -> Shape {
         let distance = Scalar::Expression(Expression::parse(distance).expect("an expression"));
-        Shape { distance, centre: Vec::new(), rotation: None, axis: None }
+        Shape { distance: Some(distance), ..Shape::default() }
     }
 
     const DOWN: Vector<2> = [0.0, -1.0];

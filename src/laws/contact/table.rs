@@ -49,7 +49,7 @@ impl ContactTable {
         if let Some(law) = friction {
             faults.extend(law.own_faults().into_iter().map(|fault| fault.within(law.table())));
         }
-        faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(*has_obstacle)));
+        faults.extend(self.obstacle_load.iter().flat_map(|load| load.faults(&self.interface)));
         faults.extend(self.adhesion.iter().flat_map(|law| law.faults(&self.interface)));
         faults.extend(self.memory.iter().flat_map(|_| Memory::faults(&self.interface)));
         let has_histories = self.adhesion.is_some() || self.memory.is_some();

@@ -1,6 +1,7 @@
 //! Assembles a mesh from the sections of a file.
 
 use super::document::{Block, Document};
+use super::points::name_points;
 use crate::error::{Error, Result};
 use crate::linear_algebra::tensor::{Vector, add_scaled, norm};
 use crate::mesh::shape::edges_of_cell;
@@ -65,7 +66,14 @@ pub(super) fn assemble<const D: usize>(document: &Document) -> Result<GlobalMesh
     let topology = Topology::<D>::new(&mesh.cells, mesh.nodes.len(), &tags)?;
     (mesh.facets, mesh.facet_cells) = topology.outer_facets(&mesh.cells);
     drop(topology);
-    name_boundaries(&mut mesh, document, |tag, element| Ok(ids[positions.find(tag, element)? as usize]))?;
+    let id = |tag, element| Ok(ids[positions.find(tag, element)? as usize]);
+    name_boundaries(&mut mesh, document, id)?;
+    name_points(
+        &mut mesh,
+        document,
+        |tag, element| Ok(Some(id(tag, element)?).filter(|&id| id != UNUSED)),
+        |tag, element, ends| Ok(side(ends, &document.points[positions.find(tag, element)? as usize]).0),
+    )?;
     check::nodes(&mesh, &tags)?;
     Ok(mesh)
 }
@@ -98,13 +106,9 @@ fn curve<const D: usize>(
             let [a, b] = [a, b].map(|corner| mesh.cell(cell)[corner]);
             of_edges.push(([a.min(b), a.max(b)], node, cell as u32));
             let [a, b] = [a, b].map(|corner| &mesh.nodes[corner as usize]);
-            let (at, straight) = (&document.points[node as usize], midpoint(a, b));
-            let at: Vector<D> = std::array::from_fn(|i| at[i]);
-            let size = straight.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-            let allowed = STRAIGHT * norm(&add_scaled(b, -1.0, a)) + 8.0 * f64::EPSILON * size;
-            let is_straight = norm(&add_scaled(&at, -1.0, &straight)) <= allowed;
+            let (place, is_straight) = side([a, b], &document.points[node as usize]);
             is_curved |= !is_straight;
-            mesh.curved.push(if is_straight { straight } else { at });
+            mesh.curved.push(place);
         }
     }
     of_edges.sort_unstable();
@@ -125,13 +129,22 @@ fn curve<const D: usize>(
     check::curved_cells(mesh, tags)
 }
 
+/// The place of the node on an edge between these ends, and whether the edge is straight: then it is the midpoint.
+fn side<const D: usize>([a, b]: [&Vector<D>; 2], at: &[f64; 3]) -> (Vector<D>, bool) {
+    let (at, straight): (Vector<D>, _) = (std::array::from_fn(|i| at[i]), midpoint(a, b));
+    let size = straight.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+    let allowed = STRAIGHT * norm(&add_scaled(b, -1.0, a)) + 8.0 * f64::EPSILON * size;
+    let is_straight = norm(&add_scaled(&at, -1.0, &straight)) <= allowed;
+    (if is_straight { straight } else { at }, is_straight)
+}
+
 fn blocks(document: &Document, corners: usize) -> impl Iterator<Item = &Block> {
     document.blocks.iter().filter(move |block| block.corners == corners)
 }
 
 impl Block {
     /// The tag and the node tags of each element.
-    fn elements(&self) -> impl Iterator<Item = (u64, &[u64])> {
+    pub(super) fn elements(&self) -> impl Iterator<Item = (u64, &[u64])> {
         self.tags.iter().copied().zip(self.nodes.chunks_exact(self.nodes_per_element))
     }
 }

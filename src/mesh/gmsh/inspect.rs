@@ -38,6 +38,9 @@ fn words<const D: usize>(mesh: &GlobalMesh<D>) -> String {
         let (name, count) = (&boundary.name, boundary.facets.len());
         lines.push(format!("boundary    {name}: {count} facets, {size:.6} {unit}"));
     }
+    for set in &mesh.point_sets {
+        lines.push(format!("points      {}: {} nodes", set.name, set.places.len()));
+    }
     lines.push(format!("surface     {} facets", mesh.facets.len()));
     lines.join("\n")
 }

@@ -1,6 +1,7 @@
 //! Gmsh MSH 4.1 files, ASCII and binary: triangles in the plane or tetrahedra in space, of order 1 or 2.
 //!
-//! Physical groups of the dimension of the cells name regions, those one dimension below name boundaries. The only crate for this
+//! Physical groups of the dimension of the cells name regions, those one dimension below name boundaries, those
+//! further below, if they have a name, points and curves. The only crate for this
 //! format, mshio, omits the names of physical groups and can panic on damaged files. This reader uses no count in a file before it
 //! has checked that the file is long enough.
 
@@ -8,6 +9,7 @@ mod assemble;
 mod cursor;
 mod document;
 mod inspect;
+mod points;
 
 use super::GlobalMesh;
 use crate::error::{Error, Result};

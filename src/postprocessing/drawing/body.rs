@@ -2,6 +2,7 @@
 
 use super::{
     colour::{Colour, Shades, VIRIDIS, hex},
+    common::{Common, is_uniform},
     frame::{Frame, colour_bar},
     paint::{Style, Triangle, paint},
     picture::{Picture, open_svg, text},
@@ -11,10 +12,10 @@ use super::{
 use crate::{
     error::Result,
     io::output::{
-        field_list::{DISPLACEMENT, REGION},
+        field_list::{DISPLACEMENT, FIELDS, REGION},
         field_snapshot::{History, Snapshot},
         fields::{Place, Shape},
-        output_field::{OutputField, Shading},
+        output_field::{FieldPicture, OutputField, Shading},
     },
 };
 use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
@@ -23,6 +24,8 @@ use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
 const DECADES: f64 = 1e-4;
 /// Largest drawn displacement, as a share of the size of the body.
 const VISIBLE: f64 = 0.12;
+/// Pixels per unit of the drawing, except in animations.
+const RESOLUTION: usize = 2;
 /// The smallest drawn size of a cell, as a share of its undeformed size.
 const THINNEST: f64 = 0.2;
 
@@ -31,6 +34,7 @@ const THINNEST: f64 = 0.2;
 pub struct Body<'a> {
     snapshot: &'a Snapshot,
     look: Look,
+    common: Option<&'a Common>,
     /// Magnification factor of displacements.
     pub magnification: f64,
     view: View,
@@ -72,6 +76,45 @@ pub enum Drawn {
     Uniform(String),
 }
 
+/// A quantity that has a picture.
+struct Quantity<'a> {
+    /// Name of the picture.
+    name: &'a str,
+    /// Description.
+    words: Cow<'a, str>,
+    unit: &'a str,
+    place: Place,
+    shading: Shading,
+    values: Cow<'a, [f64]>,
+}
+
+impl Quantity<'_> {
+    /// The ends of its colour scale: linear, from the 1st to the 99th percentile if the others are far from these; of errors, from
+    /// the smallest that is drawn to the largest.
+    fn range(&self) -> Option<(f64, f64)> {
+        let full @ (least, most) = extent(self.values.iter().copied())?;
+        match self.shading {
+            Shading::Errors => Some(if most > 0.0 { (least.max(1e-2 * most), most) } else { full }),
+            Shading::Linear => {
+                let shown @ (low, high) = percentiles(&self.values)?;
+                Some(if most - least > 1.05 * (high - low) { shown } else { full })
+            }
+        }
+    }
+}
+
+/// The quantity of a history.
+fn of_history(history: &History) -> Quantity<'_> {
+    Quantity {
+        name: &history.name,
+        words: history.name.replace('_', " ").into(),
+        unit: unit_by_name(&history.name),
+        place: history.place,
+        shading: Shading::Linear,
+        values: history.values.as_slice().into(),
+    }
+}
+
 /// Values to be drawn.
 struct Values<'a> {
     values: Cow<'a, [f64]>,
@@ -79,6 +122,8 @@ struct Values<'a> {
     scale: Scale,
     /// Whether the scale leaves out the extreme values.
     is_clipped: bool,
+    /// The drawings that have this scale in common, in words.
+    common: Option<&'a str>,
     /// The region of each cell, if values of cells are averaged at the nodes within regions.
     regions: Option<Cow<'a, [f64]>>,
 }
@@ -86,11 +131,20 @@ struct Values<'a> {
 impl<'a> Body<'a> {
     /// Prepares the drawing of a body.
     pub fn new(snapshot: &'a Snapshot) -> Self {
-        let magnification = magnification(snapshot);
+        let magnification = magnification(snapshot).unwrap_or(1.0);
         let view = View::of(snapshot);
         let places = places(snapshot, magnification);
         let look = Look::default();
-        Self { snapshot, look, magnification, view, axes: ["x", "y"], faces: faces(snapshot), places }
+        Self {
+            snapshot,
+            look,
+            common: None,
+            magnification,
+            view,
+            axes: ["x", "y"],
+            faces: faces(snapshot),
+            places,
+        }
     }
 
     /// The same with other names of axes.
@@ -108,51 +162,103 @@ impl<'a> Body<'a> {
         self.view.of_hidden_side(normal).map(|view| Self { view, ..self.clone() })
     }
 
+    /// The same with the colours, the magnification and the section that several drawings have in common.
+    pub fn with_common(self, common: &'a Common) -> Self {
+        let magnification = common.magnification.unwrap_or(1.0);
+        let places = places(self.snapshot, magnification);
+        Self { common: Some(common), magnification, places, ..self }
+    }
+
     /// Coloured by a field, if the field has a picture and the file contains it.
     pub fn of_field(&self, field: &OutputField) -> Result<Option<Drawn>> {
-        let (Some(picture), Some(values)) = (field.picture, self.snapshot.values(field)) else {
-            return Ok(None);
-        };
+        self.field(field).map(|quantity| self.drawn(quantity)).transpose()
+    }
+
+    /// Coloured by a history of the material.
+    pub fn of_history(&self, history: &History) -> Result<Drawn> {
+        self.drawn(of_history(history))
+    }
+
+    /// The quantity of a field.
+    fn field(&self, field: &OutputField) -> Option<Quantity<'_>> {
+        let (picture, values) = (field.picture?, self.snapshot.values(field)?);
         let values: Cow<[f64]> = match field.shape {
             Shape::Scalar => values.into(),
             Shape::Vector | Shape::Tensor => values.chunks_exact(field.width()).map(length).collect(),
         };
         let unit = field.unit(self.snapshot.dimension());
-        let look = Coloured { name: picture.name, quantity: picture.quantity, unit, shades: VIRIDIS };
-        if let Some(uniform) = uniform(look, &values) {
-            return Ok(Some(uniform));
+        let FieldPicture { name, quantity, shading } = picture;
+        Some(Quantity { name, words: quantity.into(), unit, place: field.place, shading, values })
+    }
+
+    /// Pixels per unit of the drawing.
+    fn resolution(&self) -> usize {
+        if self.common.is_some_and(|common| !common.section.is_empty()) { 1 } else { RESOLUTION }
+    }
+
+    /// The colours and the magnification that these drawings have in common; those of an animation also have one section, and fewer
+    /// pixels.
+    pub fn in_common(words: &'static str, bodies: &[&Self], is_animation: bool) -> Common {
+        let ranges = bodies.iter().flat_map(|body| body.ranges());
+        let magnification = bodies.iter().filter_map(|body| magnification(body.snapshot)).reduce(f64::min);
+        let mut common = Common::new(words, ranges, magnification);
+        let factor = magnification.unwrap_or(1.0);
+        for body in bodies.iter().filter(|_| is_animation) {
+            let [(left, right), (bottom, top)] = body.section(&places(body.snapshot, factor), &[]);
+            common.section.extend([[left, bottom], [right, top]]);
         }
-        let drawn = match picture.shading {
-            Shading::Linear => self.linear(look, field.place, values)?,
+        common
+    }
+
+    /// The ends of the colour scales of all pictures, by their names.
+    fn ranges(&self) -> BTreeMap<String, (f64, f64)> {
+        let fields = FIELDS.iter().filter_map(|field| self.field(field));
+        let histories = self.snapshot.histories.iter().filter(|history| history.place == Place::Cell);
+        let quantities = fields.chain(histories.map(of_history));
+        quantities.filter_map(|quantity| Some((quantity.name.to_owned(), quantity.range()?))).collect()
+    }
+
+    fn drawn(&self, quantity: Quantity) -> Result<Drawn> {
+        let Quantity { name, words, unit, place, shading, values } = &quantity;
+        let common = self.common.and_then(|common| Some((*common.colours.get(*name)?, common.words)));
+        let range = common.map(|(range, _)| range).or_else(|| quantity.range());
+        let (low, high) = range.unwrap_or_default();
+        if range.is_some() && is_uniform(low, high) {
+            let words = format!("{words} ({} {unit}", number(low));
+            return Ok(Drawn::Uniform(format!("{})", words.trim_end())));
+        }
+        let look = Coloured { name, quantity: words, unit, shades: VIRIDIS };
+        let common = common.map(|(_, words)| words);
+        let values: Cow<[f64]> = values.as_ref().into();
+        let drawn = match shading {
+            Shading::Linear => {
+                let beyond = extent(values.iter().copied())
+                    .map_or(0.0, |(least, most)| (low - least).max(0.0) + (most - high).max(0.0));
+                let is_clipped = beyond > 0.05 * (high - low);
+                let regions = if *place == Place::Cell { self.regions() } else { None };
+                let scale = linear(range);
+                self.picture(look, &Values { values, place: *place, scale, is_clipped, common, regions })?
+            }
             Shading::Errors => {
                 // Each part of a divided cell has the error of the cell.
                 let total = length(&values) / (self.snapshot.parts.max(1) as f64).sqrt();
-                let scale = of_errors(&values);
-                let shown = Values { values, place: Place::Cell, scale, is_clipped: false, regions: None };
+                let scale = of_errors(range);
+                let place = Place::Cell;
+                let shown = Values { values, place, scale, is_clipped: false, common, regions: None };
                 let mut drawn = self.picture(look, &shown)?;
                 drawn.caption += &format!(" Of all cells together: {} {unit}.", number(total));
                 drawn
             }
         };
-        Ok(Some(Drawn::Picture(drawn)))
-    }
-
-    /// Coloured by a history of the material.
-    pub fn of_history(&self, history: &History) -> Result<Drawn> {
-        let quantity = history.name.replace('_', " ");
-        let unit = unit_by_name(&history.name);
-        let look = Coloured { name: &history.name, quantity: &quantity, unit, shades: VIRIDIS };
-        if let Some(uniform) = uniform(look, &history.values) {
-            return Ok(uniform);
-        }
-        self.linear(look, history.place, history.values.as_slice().into()).map(Drawn::Picture)
+        Ok(Drawn::Picture(drawn))
     }
 
     /// Coloured by a quantity at the nodes.
     pub fn nodal(&self, look: Coloured, values: &[f64]) -> Result<Picture> {
         let scale = linear(extent(values.iter().copied()));
         let (place, values) = (Place::Node, values.into());
-        self.picture(look, &Values { values, place, scale, is_clipped: false, regions: None })
+        let (is_clipped, common, regions) = (false, None, None);
+        self.picture(look, &Values { values, place, scale, is_clipped, common, regions })
     }
 
     /// Coloured by the logarithms of the errors of the cells.
@@ -162,7 +268,8 @@ impl<'a> Body<'a> {
         let parts = self.snapshot.parts.max(1);
         let of_parts = values.iter().flat_map(|value| std::iter::repeat_n(*value, parts));
         let (place, values) = (Place::Cell, of_parts.collect());
-        self.picture(look, &Values { values, place, scale, is_clipped: false, regions: None })
+        let (is_clipped, common, regions) = (false, None, None);
+        self.picture(look, &Values { values, place, scale, is_clipped, common, regions })
     }
 
     /// A description of the magnification of the displacement.
@@ -172,18 +279,6 @@ impl<'a> Body<'a> {
             Some(_) if self.magnification == 1.0 => "displacement to scale".into(),
             Some(_) => format!("displacement × {}", number(self.magnification)),
         }
-    }
-
-    fn linear(&self, look: Coloured, place: Place, values: Cow<[f64]>) -> Result<Picture> {
-        let regions = if place == Place::Cell { self.regions() } else { None };
-        let shown = percentiles(&values);
-        let full = extent(values.iter().copied());
-        let is_clipped = match (shown, full) {
-            (Some((low, high)), Some((least, most))) => most - least > 1.05 * (high - low),
-            _ => false,
-        };
-        let scale = linear(if is_clipped { shown } else { full });
-        self.picture(look, &Values { values, place, scale, is_clipped, regions })
     }
 
     /// The regions within which values of cells are averaged; `None` if they are not known, or no mean is wanted.
@@ -230,13 +325,14 @@ impl<'a> Body<'a> {
         };
         let corners: Vec<[f64; 3]> =
             self.at_corners(shown).into_iter().map(|values| values.map(share)).collect();
-        let frame = self.frame(122.0, &[]);
+        let frame = self.frame(122.0, self.common.map_or(&[], |common| &common.section));
         let contours: Vec<f64> = if self.look.contours {
             scale.ticks.iter().map(|(tick, _)| (tick - scale.low) / (scale.high - scale.low)).collect()
         } else {
             Vec::new()
         };
-        let style = Style { colour: &|share| shades.at(share), contours: &contours };
+        let style =
+            Style { colour: &|share| shades.at(share), contours: &contours, resolution: self.resolution() };
         let mut svg = open_svg(frame.height);
         let heading = format!("t = {} s, {}", number(self.snapshot.time), self.magnified());
         svg += &text(6.0, 18.0, "start", &heading);
@@ -267,7 +363,7 @@ impl<'a> Body<'a> {
         let frame = self.frame(24.0, &ends);
         let mut svg = open_svg(frame.height);
         svg += &text(6.0, 18.0, "start", heading);
-        let style = Style { colour: &|_| [0xee; 3], contours: &[] };
+        let style = Style { colour: &|_| [0xee; 3], contours: &[], resolution: RESOLUTION };
         let blank = vec![[0.0; 3]; self.faces.len()];
         svg += &paint(&self.triangles(&frame, &blank), &style, frame.height)?;
         svg += &self.surroundings(&frame);
@@ -316,18 +412,22 @@ impl<'a> Body<'a> {
         seen
     }
 
-    /// Fits the deformed body, the undeformed one and these points into the drawing, with space on the right.
-    fn frame(&self, right: f64, points: &[[f64; 2]]) -> Frame {
+    /// Ranges to the right and upwards, in m, that contain the undeformed body, its nodes at these places, and these points.
+    fn section(&self, places: &[[f64; 3]], points: &[[f64; 2]]) -> [(f64, f64); 2] {
         let flat = |p: &[f64; 3]| {
             let [x, y, _] = self.view.project(*p);
             [x, y]
         };
         let all = || {
-            let bodies = self.places.iter().chain(&self.snapshot.nodes).map(flat);
+            let bodies = places.iter().chain(&self.snapshot.nodes).map(flat);
             bodies.chain(points.iter().copied())
         };
-        let ranges = [0, 1].map(|axis| extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0)));
-        Frame::around(ranges, right)
+        [0, 1].map(|axis| extent(all().map(|p| p[axis])).unwrap_or((0.0, 1.0)))
+    }
+
+    /// Fits the deformed body, the undeformed one and these points into the drawing, with space on the right.
+    fn frame(&self, right: f64, points: &[[f64; 2]]) -> Frame {
+        Frame::around(self.section(&self.places, points), right)
     }
 
     /// Axes and the undeformed outline of a 2D body; directions of the axes in 3D.
@@ -375,13 +475,11 @@ fn linear(range: Option<(f64, f64)>) -> Scale {
     Scale::linear(range.map_or([0.0; 2], |(low, high)| [low, high]).into_iter(), false)
 }
 
-/// Colours of errors, down to a hundredth of the largest.
-fn of_errors(values: &[f64]) -> Scale {
-    match extent(values.iter().copied()) {
-        Some((_, largest)) if largest > 0.0 => {
-            Scale::logarithmic(values.iter().copied().filter(|error| *error >= 1e-2 * largest))
-        }
-        _ => Scale::linear(values.iter().copied(), false),
+/// Colours of errors in this range.
+fn of_errors(range: Option<(f64, f64)>) -> Scale {
+    match range {
+        Some((low, high)) if high > 0.0 => Scale::logarithmic([low, high].into_iter()),
+        _ => linear(range),
     }
 }
 
@@ -396,14 +494,6 @@ fn size(snapshot: &Snapshot) -> f64 {
     (0..3).map(|axis| length(axis).powi(2)).sum::<f64>().sqrt()
 }
 
-/// If the values are the same everywhere, in words.
-fn uniform(look: Coloured, values: &[f64]) -> Option<Drawn> {
-    let (low, high) = extent(values.iter().copied())?;
-    let is_uniform = high - low <= 1e-12 * low.abs().max(high.abs());
-    let words = format!("{} ({} {}", look.quantity, number(low), look.unit);
-    is_uniform.then(|| Drawn::Uniform(format!("{})", words.trim_end())))
-}
-
 /// The range of the values and that of their colours, in words.
 fn words_of(shown: &Values, unit: &str) -> (String, String) {
     let (low, high) = extent(shown.values.iter().copied()).unwrap_or((0.0, 0.0));
@@ -416,9 +506,11 @@ fn words_of(shown: &Values, unit: &str) -> (String, String) {
     if shown.regions.is_some() {
         colours += ", drawn as means at the nodes";
     }
-    if shown.is_clipped {
-        let Scale { low, high, factor, .. } = shown.scale;
-        let ends = range(low / factor, high / factor);
+    let Scale { low, high, factor, .. } = shown.scale;
+    let ends = range(low / factor, high / factor);
+    if let Some(common) = shown.common {
+        colours += &format!("; colours as in {common}");
+    } else if shown.is_clipped {
         colours += &format!("; colours {}, the 1st to the 99th percentile", ends.trim_end());
     }
     (figures, colours)
@@ -457,24 +549,25 @@ fn places(snapshot: &Snapshot, magnification: f64) -> Vec<[f64; 3]> {
     snapshot.nodes.iter().enumerate().map(moved).collect()
 }
 
-/// A round factor that makes displacements visible, at least 1, and no larger than one at which cells are drawn folded.
-fn magnification(snapshot: &Snapshot) -> f64 {
+/// A round factor that makes displacements visible, at least 1, and no larger than one at which cells are drawn folded; `None`
+/// without displacements.
+fn magnification(snapshot: &Snapshot) -> Option<f64> {
     let lengths = snapshot.vectors(&DISPLACEMENT).into_iter().flatten().map(|u| length(u));
     let largest = extent(lengths).map_or(0.0, |range| range.1);
     let mut factor = VISIBLE * size(snapshot) / largest;
     if !factor.is_finite() {
-        return 1.0;
+        return None;
     }
     while factor > 1.0 {
         factor = leading_digit(factor);
         let moved = places(snapshot, factor);
         let ratio = |cell: &[u32]| measure(cell, &moved) / measure(cell, &snapshot.nodes);
         if snapshot.cells().all(|cell| ratio(cell) >= THINNEST) {
-            return factor;
+            return Some(factor);
         }
         factor *= 0.7;
     }
-    1.0
+    Some(1.0)
 }
 
 /// The number rounded down to one significant digit.
@@ -486,7 +579,7 @@ fn leading_digit(size: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::output::field_list::{FIELDS, VELOCITY, VON_MISES};
+    use crate::io::output::field_list::{VELOCITY, VON_MISES};
 
     fn square(displacement: f64) -> Snapshot {
         Snapshot {
@@ -569,12 +662,31 @@ mod tests {
         }
     }
 
+    #[test]
+    fn drawings_with_something_in_common_have_the_same_colours_and_magnification() {
+        let [low, mut high] = [square(0.04), square(0.02)];
+        high.fields.insert("von_mises", vec![2.0, 7.0]);
+        high.fields.insert("velocity", vec![0.0; 12]);
+        let bodies = [&low, &high].map(Body::new);
+        let common = Body::in_common("both", &[&bodies[0], &bodies[1]], true);
+        let drawn = |name| bodies.clone().map(|body| picture(&body.with_common(&common), name));
+        let ticks = |picture: &Picture| picture.svg.split("shades)").nth(1).expect("a bar").to_owned();
+        let stresses = drawn(&VON_MISES);
+        assert_eq!(ticks(&stresses[0]), ticks(&stresses[1]));
+        assert!(stresses.iter().all(
+            |one| one.caption.contains("displacement × 4") && one.caption.contains("colours as in both")
+        ));
+        // The speed is the same everywhere in one of them only.
+        let speeds = drawn(&VELOCITY);
+        assert_eq!(ticks(&speeds[0]), ticks(&speeds[1]));
+    }
+
     /// The values that are drawn at the corners of each face.
     fn corners(snapshot: &Snapshot, look: Look) -> Vec<[f64; 3]> {
         let body = Body::new(snapshot).with_look(look);
         let values = snapshot.values(&VON_MISES).expect("stress").into();
-        let (scale, regions) = (linear(None), body.regions());
-        body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, regions })
+        let (scale, regions, common) = (linear(None), body.regions(), None);
+        body.at_corners(&Values { values, place: Place::Cell, scale, is_clipped: false, common, regions })
     }
 
     #[test]

@@ -7,6 +7,7 @@
 pub mod body;
 pub mod chart;
 pub mod colour;
+pub mod common;
 pub mod frame;
 pub mod markup;
 mod paint;

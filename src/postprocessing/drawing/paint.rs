@@ -8,12 +8,8 @@ use crate::error::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::tiny_skia::{Pixmap, PremultipliedColorU8};
 
-/// Pixels of an image per unit of the drawing.
-const RESOLUTION: usize = 2;
-/// Samples in a pixel, in each direction.
-const SAMPLES: usize = 2;
-/// Samples per unit of the drawing.
-const FINE: f64 = (RESOLUTION * SAMPLES) as f64;
+/// Samples per unit of the drawing, in each direction.
+const FINE: usize = 4;
 /// Half the width of a mesh line or contour line, in samples.
 const LINE: f64 = 1.1;
 /// Opacity of the mesh lines of large cells.
@@ -40,23 +36,25 @@ pub(super) struct Style<'a> {
     pub colour: &'a dyn Fn(f64) -> Colour,
     /// Shares at which contour lines are drawn.
     pub contours: &'a [f64],
+    /// Pixels of the image per unit of the drawing: 1, 2 or 4.
+    pub resolution: usize,
 }
 
 /// The triangles as an SVG element. `height` is the height of the drawing.
 pub(super) fn paint(triangles: &[Triangle], style: &Style, height: f64) -> Result<String> {
     let fault = |words: String| Error::Internal(format!("the mesh cannot be drawn: {words}"));
-    let size = [WIDTH, height].map(|length| length.ceil() as usize * RESOLUTION);
-    let mut canvas = Canvas::new(size.map(|pixels| pixels * SAMPLES));
+    let [wide, high] = [WIDTH, height].map(|length| length.ceil() as usize);
+    let mut canvas = Canvas::new([wide, high].map(|length| length * FINE));
     let opacity = opacity(triangles);
     for triangle in triangles {
         canvas.draw(triangle, style, opacity);
     }
+    let (size, samples) = ([wide, high].map(|length| length * style.resolution), FINE / style.resolution);
     let mut pixels = Pixmap::new(size[0] as u32, size[1] as u32).ok_or_else(|| fault("no size".into()))?;
     for (at, pixel) in pixels.pixels_mut().iter_mut().enumerate() {
-        *pixel = canvas.pixel([at % size[0], at / size[0]]);
+        *pixel = canvas.pixel([at % size[0], at / size[0]], samples);
     }
     let png = pixels.encode_png().map_err(|error| fault(error.to_string()))?;
-    let [wide, high] = size.map(|pixels| pixels / RESOLUTION);
     Ok(format!(
         "<image x=\"0\" y=\"0\" width=\"{wide}\" height=\"{high}\" href=\"data:image/png;base64,{}\"/>\n",
         STANDARD.encode(png)
@@ -94,7 +92,7 @@ impl Canvas {
 
     /// Draws the samples whose centre is in the triangle; if there is none, the sample that contains the centre of the triangle.
     fn draw(&mut self, triangle: &Triangle, style: &Style, opacity: f64) {
-        let [a, b, c] = triangle.corners.map(|[x, y, z]| [x * FINE - 0.5, y * FINE - 0.5, z]);
+        let [a, b, c] = triangle.corners.map(|[x, y, z]| [x * FINE as f64 - 0.5, y * FINE as f64 - 0.5, z]);
         let corners = [a, b, c];
         if corners.iter().flatten().any(|x| !x.is_finite()) {
             return;
@@ -150,18 +148,18 @@ impl Canvas {
         self.colours[at] = Some(dimmed((style.colour)(share), triangle.light * (1.0 - covered)));
     }
 
-    /// The mean colour of the samples of a pixel.
-    fn pixel(&self, [column, row]: [usize; 2]) -> PremultipliedColorU8 {
+    /// The mean colour of the samples of a pixel, of which there are so many in each direction.
+    fn pixel(&self, [column, row]: [usize; 2], samples: usize) -> PremultipliedColorU8 {
         let mut sums = [0; 4];
-        for y in row * SAMPLES..(row + 1) * SAMPLES {
-            for x in column * SAMPLES..(column + 1) * SAMPLES {
+        for y in row * samples..(row + 1) * samples {
+            for x in column * samples..(column + 1) * samples {
                 if let Some(colour) = self.colours[y * self.size[0] + x] {
                     (0..3).for_each(|channel| sums[channel] += usize::from(colour[channel]));
                     sums[3] += 255;
                 }
             }
         }
-        let [red, green, blue, alpha] = sums.map(|sum| (sum / (SAMPLES * SAMPLES)) as u8);
+        let [red, green, blue, alpha] = sums.map(|sum| (sum / (samples * samples)) as u8);
         PremultipliedColorU8::from_rgba(red, green, blue, alpha).unwrap_or(PremultipliedColorU8::TRANSPARENT)
     }
 }
@@ -217,7 +215,7 @@ mod tests {
         points.iter().map(|point| at(point).expect("inside")).collect()
     }
 
-    const SMOOTH: Style<'static> = Style { colour: &GREY, contours: &[] };
+    const SMOOTH: Style<'static> = Style { colour: &GREY, contours: &[], resolution: 2 };
 
     #[test]
     fn values_are_interpolated_between_the_corners() {

@@ -1,4 +1,4 @@
-//! Pictures of quantities along a boundary, at the last time of its profile.
+//! Pictures of quantities along a boundary, at one time of its profile.
 
 use super::{
     arc::along_curve,
@@ -15,7 +15,7 @@ use super::{
 use crate::{
     error::Result,
     io::output::{
-        field_list::{CONTACT_STATUS, FIELDS, VELOCITY},
+        field_list::{CONTACT_STATUS, FIELDS},
         field_snapshot::Snapshot,
         fields::{Place, Shape},
         output_field::OutputField,
@@ -31,7 +31,7 @@ const MOST_DOTS: usize = 150;
 /// Number of arrows above which they would hide each other.
 const MOST_ARROWS: usize = 70;
 
-/// A boundary at the last time in `profiles.csv`.
+/// A boundary at one time in `profiles.csv`.
 pub(super) struct Boundary<'a> {
     /// Its name.
     pub name: &'a str,
@@ -39,8 +39,6 @@ pub(super) struct Boundary<'a> {
     pub time: f64,
     law: Option<&'a Law>,
     friction: Option<FrictionLaw>,
-    /// Length in s of the step that ended at this time.
-    step: Option<f64>,
     table: Table,
     points: Vec<[f64; 3]>,
     arc: Vec<f64>,
@@ -61,28 +59,23 @@ pub(super) struct Laws {
     pub normal: Law,
     /// The friction law.
     pub friction: Option<FrictionLaw>,
-    /// Times in s at the ends of the steps, and their lengths in s.
-    pub steps: Vec<[f64; 2]>,
 }
 
 impl<'a> Boundary<'a> {
-    /// The profile with this name, and the laws on its boundary.
+    /// The rows of a profile at one time, and the laws on its boundary.
     pub(super) fn new(
-        profiles: &Table,
+        table: Table,
         name: &'a str,
         laws: Option<&'a Laws>,
         snapshot: Option<&'a Snapshot>,
     ) -> Self {
         let (law, friction) = (laws.map(|laws| &laws.normal), laws.and_then(|laws| laws.friction));
-        let table = profiles.of(name).last("time");
         let dimension = if table.header().iter().any(|column| column == "z") { 3 } else { 2 };
         let axes = ["x", "y", "z"].map(|axis| table.column(axis).unwrap_or_else(|| vec![0.0; table.len()]));
         let points: Vec<[f64; 3]> = (0..table.len()).map(|n| [0, 1, 2].map(|axis| axes[axis][n])).collect();
         let time = table.column("time").and_then(|times| times.last().copied()).unwrap_or(0.0);
-        let steps = laws.iter().flat_map(|laws| &laws.steps);
-        let step = steps.into_iter().find(|[end, _]| *end == time).map(|[_, length]| *length);
         let mut boundary =
-            Self { name, time, law, friction, step, table, points, arc: vec![], dimension, behind: None };
+            Self { name, time, law, friction, table, points, arc: vec![], dimension, behind: None };
         if dimension == 2 {
             let (order, arc) = along_curve(&boundary.points);
             boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
@@ -126,7 +119,7 @@ impl<'a> Boundary<'a> {
                 out.push(picture);
             }
         }
-        out.extend(self.on_law()?);
+        out.extend(self.on_law(&[])?);
         out.extend(self.on_friction()?);
         Ok(out)
     }
@@ -175,7 +168,8 @@ impl<'a> Boundary<'a> {
         self.drawn(column, &self.table.column(column).unwrap_or_default(), snapshot)
     }
 
-    /// Values at the nodes along the boundary; no picture of what is zero everywhere.
+    /// Values at the nodes along the boundary; no picture of what is zero everywhere. A gap is infinite where the normal meets no
+    /// obstacle: such nodes are left out of a curve, and there is no map of such values.
     fn drawn(&self, column: &str, values: &[f64], snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
         if values.iter().all(|value| *value == 0.0) {
             return Ok(None);
@@ -183,9 +177,16 @@ impl<'a> Boundary<'a> {
         let (quantity, unit) = (column.replace('_', " "), unit_by_name(column));
         let name = format!("{}_{column}", self.name);
         if self.dimension == 3 {
+            if values.iter().any(|value| !value.is_finite()) {
+                return Ok(None);
+            }
             return self.map(&name, &quantity, unit, values, snapshot);
         }
-        let points: Vec<[f64; 2]> = self.arc.iter().zip(values).map(|(s, v)| [*s, *v]).collect();
+        let points = self.arc.iter().zip(values).filter(|(_, value)| value.is_finite());
+        let points: Vec<[f64; 2]> = points.map(|(s, v)| [*s, *v]).collect();
+        if points.is_empty() {
+            return Ok(None);
+        }
         let place =
             ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
         let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
@@ -262,21 +263,24 @@ impl<'a> Boundary<'a> {
     fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<usize>)> {
         let law = self.law?;
         let column = |name: &str| self.table.column(name);
-        let (u, v, p) =
-            (column("normal_displacement")?, column("normal_velocity")?, column("contact_pressure")?);
-        if law.needs_normals() && self.behind.is_none() {
-            return None;
-        }
-        let normal = |n: usize| self.behind.as_ref().map_or([0.0; 3], |behind| behind.normals[n]);
-        let node = |n: usize| [law.abscissa(self.time, (&self.points[n], &normal(n)), u[n], v[n]), p[n]];
+        let (v, p) = (column("normal_velocity")?, column("contact_pressure")?);
+        let gap = if law.needs_gap() { column("gap")? } else { vec![0.0; v.len()] };
+        let node = |n: usize| [law.abscissa(gap[n], v[n]), p[n]];
         let nodes: Vec<[f64; 2]> = (0..self.points.len()).map(node).collect();
         let on = law.branches_of(&nodes);
         (!nodes.is_empty()).then_some((nodes, on))
     }
 
-    fn on_law(&self) -> Result<Option<Picture>> {
+    /// The nodes in the plane of the law's graph: abscissa and pressure.
+    pub(super) fn law_nodes(&self) -> Vec<[f64; 2]> {
+        self.on_branches().map_or(Vec::new(), |(nodes, _)| nodes)
+    }
+
+    /// The nodes on the graph of the law, which also reaches these other nodes.
+    pub(super) fn on_law(&self, others: &[[f64; 2]]) -> Result<Option<Picture>> {
         let (Some(law), Some((nodes, on))) = (self.law, self.on_branches()) else { return Ok(None) };
-        let line = Series { colour: [0x55; 3], ..Series::new(0, "", Look::Line, law.line(&nodes)) };
+        let reached = [&nodes, others].concat();
+        let line = Series { colour: [0x55; 3], ..Series::new(0, "", Look::Line, law.line(&reached)) };
         let mut series = vec![line];
         let mut counts = Vec::new();
         for (at, branch) in law.branches().iter().enumerate() {
@@ -330,31 +334,21 @@ impl<'a> Boundary<'a> {
 
     /// The nodes on the graph of the friction law.
     fn on_friction(&self) -> Result<Option<Picture>> {
-        let (Some(law), Some(Behind { snapshot, nodes, normals })) = (&self.friction, &self.behind) else {
-            return Ok(None);
+        let Some(law) = &self.friction else { return Ok(None) };
+        let sizes = |vector: &str| -> Vec<f64> {
+            let parts = ["x", "y", "z"].map(|axis| self.table.column(&format!("{vector}_{axis}")));
+            let squares = |n: usize| parts.iter().flatten().map(|part| part[n] * part[n]).sum::<f64>();
+            let has_any = parts.iter().any(Option::is_some);
+            if has_any { (0..self.table.len()).map(|n| squares(n).sqrt()).collect() } else { Vec::new() }
         };
-        let Some(velocity) = snapshot.vectors(&VELOCITY) else { return Ok(None) };
         let pressure = self.table.column("contact_pressure").unwrap_or_default();
-        let tractions: Vec<Vec<f64>> = ["x", "y", "z"]
-            .iter()
-            .filter_map(|axis| self.table.column(&format!("friction_traction_{axis}")))
-            .collect();
-        if tractions.is_empty() || pressure.len() != nodes.len() {
+        let (traction, speed) = (sizes("friction_traction"), sizes("sliding_velocity"));
+        if traction.is_empty() || speed.is_empty() {
             return Ok(None);
         }
-        let sliding = |n: usize| {
-            let (v, normal) = (velocity[nodes[n]], normals[n]);
-            let beside = (&self.points[n], &normal);
-            let obstacle =
-                self.law.zip(self.step).map(|(law, step)| law.obstacle_velocity(self.time, step, beside));
-            let v = obstacle.map_or(v, |obstacle| std::array::from_fn(|i| v[i] - obstacle[i]));
-            let along: f64 = (0..3).map(|i| v[i] * normal[i]).sum();
-            (0..3).map(|i| (v[i] - along * normal[i]).powi(2)).sum::<f64>().sqrt()
-        };
-        let size = |n: usize| tractions.iter().map(|t| t[n] * t[n]).sum::<f64>().sqrt();
-        let rubbing: Vec<Rubbing> = (0..nodes.len())
-            .map(|n| Rubbing { speed: sliding(n), traction: size(n), pressure: pressure[n] })
-            .collect();
+        let rubbing = pressure.into_iter().zip(traction).zip(speed);
+        let rubbing: Vec<Rubbing> =
+            rubbing.map(|((pressure, traction), speed)| Rubbing { speed, traction, pressure }).collect();
         friction::picture(self.name, self.time, law, &rubbing)
     }
 

@@ -2,11 +2,12 @@
 
 use super::{
     artifacts::Found,
+    body::Body,
     facts,
     markup::{escape, paragraph, table},
     page::Page,
     picture::Picture,
-    run::{Options, Sections, drawn_sections, title},
+    run::{Options, Sections, drawn_body, drawn_sections, title},
 };
 use crate::error::Result;
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -17,7 +18,11 @@ pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
     let titles = [0, 1].map(|run| title(&found[run]));
     let mut page =
         Page::new(&titles.join(" and "), paragraph(&format!("Left: {}. Right: {}.", names[0], names[1])));
-    let [left, right] = [drawn_sections(&found[0], options)?, drawn_sections(&found[1], options)?];
+    let bodies = [0, 1].map(|run| drawn_body(&found[run], options));
+    let common = Body::in_common("the other run", &bodies.iter().flatten().collect::<Vec<_>>(), false);
+    let bodies = bodies.map(|body| body.map(|body| body.with_common(&common)));
+    let [left, right] = [0, 1].map(|run| drawn_sections(&found[run], bodies[run].as_ref()));
+    let (left, right) = (left?, right?);
     for (heading, pairs) in paired(left, right) {
         let mut html = String::from("<div class=\"pairs\">\n");
         for pair in pairs {

@@ -4,7 +4,7 @@ use super::scale::{extent, number};
 use crate::{
     error::Result,
     job::Contact,
-    laws::contact::{Branch, Gap, NodeContext, NormalResponse, Rate},
+    laws::contact::{Branch, NodeContext, NormalResponse},
     run::normal_law,
 };
 
@@ -12,54 +12,30 @@ use crate::{
 #[derive(Debug, Clone)]
 pub(super) struct Law {
     law: NormalResponse,
-    /// The initial gap, if the law depends on the displacement.
-    gap: Option<Gap>,
+    /// Whether the pressure depends on the displacement, and not on the velocity.
+    is_of_displacement: bool,
 }
 
 impl Law {
     /// The law of a contact of a job.
     pub(super) fn of(contact: &Contact) -> Result<Self> {
-        let (law, gap) = normal_law(contact)?;
-        let gap = law.depends_on_displacement().then_some(gap);
-        Ok(Self { law, gap })
+        let (law, _) = normal_law(contact)?;
+        Ok(Self { is_of_displacement: law.depends_on_displacement(), law })
     }
 
     /// The quantity on which the pressure depends, and its unit.
     pub(super) fn quantity(&self) -> (&'static str, &'static str) {
-        if self.gap.is_some() { ("penetration", "m") } else { ("normal velocity", "m/s") }
+        if self.is_of_displacement { ("penetration", "m") } else { ("normal velocity", "m/s") }
     }
 
-    /// The value of that quantity at a node with this outward normal; NaN where there is no gap.
-    pub(super) fn abscissa(
-        &self,
-        time: f64,
-        (point, normal): (&[f64; 3], &[f64; 3]),
-        displacement: f64,
-        velocity: f64,
-    ) -> f64 {
-        let Some(gap) = &self.gap else { return velocity };
-        gap.at(time, point, normal).map_or(f64::NAN, |gap| displacement - gap)
+    /// The value of that quantity at a node with this gap and normal velocity.
+    pub(super) fn abscissa(&self, gap: f64, velocity: f64) -> f64 {
+        if self.is_of_displacement { -gap } else { velocity }
     }
 
-    /// Velocity in m/s of the obstacle's material at the point where the normal of a node meets it, at the end of a step of this
-    /// length; zero if it is unknown.
-    pub(super) fn obstacle_velocity(
-        &self,
-        time: f64,
-        length: f64,
-        (point, normal): (&[f64; 3], &[f64; 3]),
-    ) -> [f64; 3] {
-        let moving = self.gap.as_ref().filter(|gap| gap.surface_may_move());
-        let velocity = moving.and_then(|gap| {
-            let motion = gap.motion(Rate::euler(time, length)).ok()?;
-            gap.velocity_along(&motion, time, point, normal).ok()
-        });
-        velocity.unwrap_or_default()
-    }
-
-    /// Whether the law depends on the normals of the nodes.
-    pub(super) fn needs_normals(&self) -> bool {
-        self.gap.as_ref().is_some_and(|gap| !matches!(gap, Gap::Distance(_)))
+    /// Whether the profile must have a gap.
+    pub(super) fn needs_gap(&self) -> bool {
+        self.is_of_displacement
     }
 
     /// Descriptions of its branches, from left to right.
@@ -75,7 +51,7 @@ impl Law {
         let steep = if steep.is_finite() && steep > 0.0 { steep } else { 1.0 };
         let c = steep.max(2.0 * self.law.monotonicity_constant(1.0));
         // A node that has not touched the wall may be beyond it by rounding.
-        let is_wall = self.gap.is_some() && self.law.has_vertical_parts();
+        let is_wall = self.is_of_displacement && self.law.has_vertical_parts();
         let slack = if is_wall { 1e-9 * c * reach(0) } else { 0.0 };
         let branch = |s: f64| self.law.resolve(s, c, NodeContext::AT_THE_GAP).branch;
         nodes.iter().map(|[x, p]| branch(c * x + p - slack)).collect()
@@ -98,12 +74,10 @@ mod tests {
     use super::*;
     use crate::{
         job::{Quadrature, Scalar},
-        laws::contact::{Bound, Compliance, DampedResponse, NormalLaw, Plane, Sphere, Symmetry, Unilateral},
+        laws::contact::{Bound, Compliance, DampedResponse, NormalLaw, Symmetry, Unilateral},
     };
 
-    const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
-
-    fn against(normal: NormalLaw, obstacle: Option<Gap>) -> Law {
+    fn law(normal: NormalLaw) -> Law {
         let on = vec!["bottom".into()];
         let quadrature = Quadrature::Nodal;
         let contact = Contact {
@@ -112,7 +86,7 @@ mod tests {
             quadrature,
             normal,
             redistribute_mass: false,
-            obstacle,
+            obstacle: None,
             obstacle_load: None,
             friction: None,
             wear: None,
@@ -120,10 +94,6 @@ mod tests {
             memory: None,
         };
         Law::of(&contact).expect("law")
-    }
-
-    fn law(normal: NormalLaw) -> Law {
-        against(normal, None)
     }
 
     fn paper() -> Law {
@@ -158,8 +128,8 @@ mod tests {
     fn nodes_at_a_rigid_wall_are_closed_and_others_open() {
         let gap = Some(Scalar::Number(0.01));
         let law = law(NormalLaw::Unilateral(Unilateral { bound: Bound::Displacement, gap }));
-        let at = |u: f64| law.abscissa(0.0, (&[0.0; 3], &DOWN), u, 0.0);
-        let nodes = [[at(0.01), 5.0], [at(0.004), 0.0], [f64::NEG_INFINITY, 0.0]];
+        let at = |u: f64| law.abscissa(0.01 - u, 0.0);
+        let nodes = [[at(0.01), 5.0], [at(0.004), 0.0], [law.abscissa(f64::INFINITY, 0.0), 0.0]];
         assert_eq!(law.branches_of(&nodes), [1, 0, 0], "the last has nothing to touch");
         let line = law.line(&[[at(0.01), 5.0], [at(0.004), 0.0]]);
         assert_eq!((line[2][0], line[2][1] > 5.0), (0.0, true));
@@ -169,38 +139,10 @@ mod tests {
     fn springs_are_felt_beyond_their_gap() {
         let spring = Compliance { stiffness: 100.0, exponent: 2.0, gap: Some(Scalar::Number(0.1)) };
         let law = law(NormalLaw::Compliance(spring));
-        let at = |u: f64| law.abscissa(0.0, (&[0.0; 3], &DOWN), u, 0.0);
+        let at = |u: f64| law.abscissa(0.1 - u, 0.0);
         assert_eq!(law.branches_of(&[[at(0.3), 4.0], [at(0.05), 0.0]]), [1, 0]);
         assert_eq!(law.quantity().0, "penetration");
-        assert!(!law.needs_normals());
-    }
-
-    #[test]
-    fn the_gap_to_a_plane_that_moves_is_measured_along_the_normal() {
-        let numbers = |values: [f64; 2]| values.map(Scalar::Number).to_vec();
-        let plane = Plane { point: numbers([0.0, -0.5]), normal: numbers([0.0, 1.0]), rotation: None };
-        let spring = Compliance { stiffness: 100.0, exponent: 1.0, gap: None };
-        let law = against(NormalLaw::Compliance(spring), Some(Gap::Plane(plane)));
-        assert!(law.needs_normals());
-        assert!((law.abscissa(0.0, (&[3.0, 0.0, 0.0], &DOWN), 0.6, 0.0) - 0.1).abs() < 1e-15);
-        assert_eq!(law.obstacle_velocity(1.0, 0.1, (&[3.0, 0.0, 0.0], &DOWN)), [0.0; 3]);
-    }
-
-    #[test]
-    fn a_disc_that_turns_moves_where_the_normal_of_a_node_meets_it() {
-        let disc = Sphere {
-            centre: [0.0, -2.0].map(Scalar::Number).to_vec(),
-            radius: 2.0,
-            hollow: false,
-            rotation: Some(Scalar::Number(3.0)),
-            axis: None,
-        };
-        let law = against(
-            NormalLaw::Compliance(Compliance { stiffness: 100.0, exponent: 1.0, gap: None }),
-            Some(Gap::Sphere(disc)),
-        );
-        // The material at the top of the disc moves to the left, for any height of the node above it.
-        let found = law.obstacle_velocity(1.0, 0.1, (&[0.0, 0.5, 0.0], &DOWN));
-        assert!((found[0] + 6.0).abs() < 1e-14 && found[1] == 0.0 && found[2] == 0.0, "{found:?}");
+        assert!(law.needs_gap());
+        assert_eq!((paper().needs_gap(), paper().abscissa(0.1, 2.0)), (false, 2.0));
     }
 }

@@ -8,6 +8,7 @@ mod artifacts;
 mod friction;
 mod history;
 mod law;
+mod motion;
 mod page;
 mod run;
 mod study;

@@ -7,6 +7,7 @@ use super::{
     facts, history,
     law::Law,
     markup::{escape, paragraph},
+    motion,
     page::Page,
     picture::Picture,
 };
@@ -18,8 +19,12 @@ use crate::{
         field_snapshot::Snapshot,
         fields::Place,
     },
+    job::Contact,
 };
 use std::fmt::Write;
+
+/// Heading of the section with pictures of the body.
+const BODY: &str = "Body";
 
 /// What a report draws.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -41,8 +46,14 @@ pub(super) fn title(found: &Found) -> String {
 /// The page of a run.
 pub(super) fn page(found: &Found, options: Options) -> Result<Page> {
     let mut page = Page::new(&title(found), head(found));
-    for (heading, words, pictures) in drawn_sections(found, options)? {
+    let body = drawn_body(found, options);
+    for (heading, words, pictures) in drawn_sections(found, body.as_ref())? {
+        let is_body = heading == BODY;
         page.section(&heading, &words, pictures);
+        if is_body && let Some(motion) = motion::picture(found, look(found, options), &contact_laws(found)?)?
+        {
+            page.section("Motion", "", vec![motion]);
+        }
     }
     if let Some(summary) = &found.summary {
         page.section("Summary", &facts::summary(summary), vec![]);
@@ -65,18 +76,25 @@ pub(super) type Sections = Vec<Section>;
 /// Heading, HTML, pictures.
 pub(super) type Section = (String, String, Vec<Picture>);
 
+/// How bodies are drawn.
+fn look(found: &Found, options: Options) -> body::Look {
+    let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
+    let Options { per_cell, contours } = options;
+    body::Look { per_cell, contours, several_materials }
+}
+
+/// The body at the last time, if there are fields.
+pub(super) fn drawn_body(found: &Found, options: Options) -> Option<Body<'_>> {
+    found.snapshot.as_ref().map(|snapshot| Body::new(snapshot).with_look(look(found, options)))
+}
+
 /// The sections of the body, the boundaries and the quantities over time.
-pub(super) fn drawn_sections(found: &Found, options: Options) -> Result<Sections> {
+pub(super) fn drawn_sections(found: &Found, body: Option<&Body>) -> Result<Sections> {
     let mut sections = Sections::new();
-    let body = found.snapshot.as_ref().map(|snapshot| {
-        let several_materials = found.job.as_ref().is_some_and(|job| !job.region.is_empty());
-        let Options { per_cell, contours } = options;
-        Body::new(snapshot).with_look(body::Look { per_cell, contours, several_materials })
-    });
-    if let (Some(body), Some(snapshot)) = (&body, &found.snapshot) {
+    if let (Some(body), Some(snapshot)) = (body, &found.snapshot) {
         sections.push(body_section(found, body, snapshot)?);
     }
-    boundary_sections(&mut sections, found, body.as_ref())?;
+    boundary_sections(&mut sections, found, body)?;
     time_sections(&mut sections, found)?;
     Ok(sections)
 }
@@ -148,7 +166,7 @@ fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Secti
              values are averaged at the nodes.",
         );
     }
-    Ok(("Body".into(), words, pictures))
+    Ok((BODY.into(), words, pictures))
 }
 
 /// The mean outward normals of the contact boundaries of a solid that have a profile.
@@ -158,26 +176,29 @@ fn contact_directions(found: &Found, snapshot: &Snapshot) -> Vec<[f64; 3]> {
     };
     let names = profiles.names();
     let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
-    touching.filter_map(|name| Boundary::new(profiles, name, None, Some(snapshot)).direction()).collect()
+    let rows = |name| profiles.of(name).last("time");
+    touching.filter_map(|name| Boundary::new(rows(name), name, None, Some(snapshot)).direction()).collect()
+}
+
+/// The boundaries of each contact and its laws.
+fn contact_laws(found: &Found) -> Result<Vec<(&[String], Laws)>> {
+    let of = |contact| {
+        let &Contact { ref on, friction, .. } = contact;
+        Ok((on.as_slice(), Laws { normal: Law::of(contact)?, friction }))
+    };
+    found.job.iter().flat_map(|job| &job.contact).map(of).collect()
 }
 
 fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>) -> Result<()> {
-    let mut contacts: Vec<(&[String], Laws)> = Vec::new();
-    for contact in found.job.iter().flat_map(|job| &job.contact) {
-        let friction = contact.friction;
-        let steps = match (&found.history, &contact.obstacle) {
-            (Some(history), Some(_)) => history.curve("time", "dt"),
-            _ => Vec::new(),
-        };
-        contacts.push((&contact.on, Laws { normal: Law::of(contact)?, friction, steps }));
-    }
+    let contacts = contact_laws(found)?;
     let mut seen = Vec::new();
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
         seen = profiles.names();
         for name in &seen {
             let contact = contacts.iter().find(|(on, _)| on.contains(name));
             let snapshot = found.snapshot.as_ref();
-            let boundary = Boundary::new(profiles, name, contact.map(|(_, laws)| laws), snapshot);
+            let rows = profiles.of(name).last("time");
+            let boundary = Boundary::new(rows, name, contact.map(|(_, laws)| laws), snapshot);
             let mut pictures = boundary.pictures(snapshot)?;
             if let Some(body) = body.filter(|_| contact.is_some()) {
                 pictures.extend(boundary.arrows(body)?);

@@ -105,8 +105,13 @@ impl Table {
     /// The rows with the largest number in this column.
     pub(super) fn last(&self, column: &str) -> Self {
         let values = self.column(column).unwrap_or_default();
-        let last = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        self.filtered(|at| values.get(at) == Some(&last))
+        self.at(column, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+    }
+
+    /// The rows with this number in this column.
+    pub(super) fn at(&self, column: &str, number: f64) -> Self {
+        let values = self.column(column).unwrap_or_default();
+        self.filtered(|at| values.get(at) == Some(&number))
     }
 
     fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {

@@ -108,9 +108,9 @@ impl Newton {
         system: System<'_>,
         trial: &mut DistributedVector,
     ) -> Result<StepOutcome> {
-        write_branches(problem.body, system.converged, &mut self.branches_before)?;
         self.counts.restart();
         if let Some(bounded) = &mut self.bounded {
+            write_branches(problem.body, system.converged, &mut self.branches_before)?;
             let iterations = bounded.solve(problem, system, trial)?;
             return self.check_inclusion(problem, trial, iterations);
         }
@@ -120,6 +120,11 @@ impl Newton {
         write_steepest_decreases(problem.session, &problem.body.contacts, &mut self.steepest_decreases);
         let mut fallbacks = self.conditions(&problem.body.contacts).fallbacks();
         let mut next = fallbacks.next();
+        // With these parameters, whatever those of the last step were: a restarted run does not know them.
+        if let Some(first) = next {
+            self.set_graph_parameters(&mut problem.body.contacts, first);
+        }
+        write_branches(problem.body, system.converged, &mut self.branches_before)?;
         let (mut iterations, mut failure) = (0, String::new());
         loop {
             let Some(fallback) = next else { return Err(problem.failed(&failure, REMEDY)) };

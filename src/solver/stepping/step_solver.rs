@@ -102,6 +102,13 @@ impl StepSolver {
         }
     }
 
+    /// Lets the next factors of condensed steps be in double precision.
+    pub(super) fn use_double_precision(&mut self) {
+        if let Solver::Condensed(condensed) = &mut self.solver {
+            condensed.precision = Precision::Double;
+        }
+    }
+
     /// Whether the matrices belong to these lengths.
     pub(super) fn is_prepared_for(&self, lengths: Lengths) -> bool {
         self.prepared == Some(lengths)

@@ -2,6 +2,7 @@
 
 use super::{
     StepOutcome,
+    balance::Balance,
     contacts::{commit_tractions, prepare_contacts, prepare_gaps},
     factor_cache::nearest_cached_length,
     integrator::Integrator,
@@ -9,7 +10,6 @@ use super::{
     linear_solver::{Preconditioner, SolverSettings},
     multistart::solve_and_search,
     problem::StepProblem,
-    root::IncreasingRoot,
     step_clock::{Stages, StepClock, StepTraffic},
     step_error::{ErrorWorkspace, SolvedStep, StepError},
     step_solver::{Lengths, StepSolver},
@@ -19,7 +19,7 @@ use crate::{
     error::{Error, Result},
     fem::{
         body::{Body, PassBytes},
-        effect::{Step, WORK},
+        effect::{LoadedMotion, Step, WORK},
         resultants::VelocityChange,
         state::State,
     },
@@ -56,6 +56,9 @@ pub struct Stepper {
     load_is_current: bool,
     right_hand_side: DistributedVector,
     moving_supports: Option<MovingSupports>,
+    /// The motions of obstacles that forces drive: the contact and the number of each; and the search for their velocities.
+    loaded: Vec<[usize; 2]>,
+    balance: Balance,
     trial: DistributedVector,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
     is_finished: bool,
@@ -114,6 +117,8 @@ impl Stepper {
             load_is_current: false,
             right_hand_side: state.velocity.like()?,
             moving_supports: MovingSupports::new(body, state)?,
+            loaded: Vec::new(),
+            balance: Balance::default(),
             trial: state.velocity.like()?,
             is_finished: false,
             workspace: ErrorWorkspace::default(),
@@ -160,6 +165,11 @@ impl Stepper {
     /// The precision of factors, if steps are condensed to the contact.
     pub fn factor_precision(&self) -> Option<Precision> {
         self.solver.factor_precision()
+    }
+
+    /// Lets the next factors of condensed steps be in double precision.
+    pub fn use_double_precision(&mut self) {
+        self.solver.use_double_precision();
     }
 
     /// The matrix of a first step of this length in s. Preconditioners are built for this length and powers of two times it.
@@ -234,9 +244,19 @@ impl Stepper {
         let solving = Instant::now();
         self.clock.history += solving - start;
         let stage = self.stages.solve.enter()?;
-        let outcome = match body.contacts.iter().position(|contact| contact.obstacle.is_some()) {
-            Some(contact) => self.solve_with_obstacle(session, body, state, (step, contact)),
-            None => self.solve(session, body, state, step),
+        self.loaded.clear();
+        for (at, contact) in body.contacts.iter().enumerate() {
+            let motions = contact.obstacle.iter().flat_map(|obstacle| obstacle.motions()).enumerate();
+            self.loaded
+                .extend(motions.filter(|(_, motion)| motion.is_some()).map(|(number, _)| [at, number]));
+        }
+        let outcome = if self.loaded.is_empty() {
+            self.solve(session, body, state, step)
+        } else {
+            let mut balance = std::mem::take(&mut self.balance);
+            let outcome = self.solve_with_obstacles(session, body, state, (step, &mut balance));
+            self.balance = balance;
+            outcome
         };
         if let Some(supports) = &self.moving_supports {
             supports.set(body, &mut self.trial)?;
@@ -271,24 +291,25 @@ impl Stepper {
         }
     }
 
-    /// Solves the started step together with the motion of the obstacle of this contact: repeats the step with other velocities of
-    /// the obstacle until its momentum is balanced. Collective.
-    fn solve_with_obstacle<const D: usize, const S: usize>(
+    /// Solves the started step together with the loaded motions of obstacles: repeats the step with other velocities of the obstacles
+    /// until the momentum of each motion is balanced. Collective.
+    fn solve_with_obstacles<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
         body: &mut Body<D, S>,
         state: &State,
-        (step, contact): (Step, usize),
+        (step, balance): (Step, &mut Balance),
     ) -> Result<StepOutcome> {
         let blend = self.integrator.blend(step.length);
         let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
-        let mut root = IncreasingRoot::default();
         let mut all = StepOutcome::default();
-        let (mut velocity, mut largest) = (0.0, 0.0);
-        let mut last: Option<[f64; 2]> = None;
+        balance.start(self.loaded.len());
         for evaluation in 0..EVALUATIONS {
-            let Some(obstacle) = &mut body.contacts[contact].obstacle else { break };
-            velocity = if evaluation == 0 { obstacle.start(blend) } else { obstacle.set_velocity(velocity) };
+            for (&motion, velocity) in self.loaded.iter().zip(&mut balance.velocities) {
+                let Some(motion) = loaded_motion(body, motion) else { continue };
+                *velocity =
+                    if evaluation == 0 { motion.start(blend) } else { motion.set_velocity(*velocity) };
+            }
             let prepared = prepare_gaps(body, state, step);
             let prepared = prepared.and_then(|()| self.integrator.prepare_contacts(body, state, step));
             session.agree(prepared)?;
@@ -300,30 +321,39 @@ impl Stepper {
                 indefinite_solves: all.indefinite_solves + outcome.indefinite_solves,
                 ..outcome
             };
-            let contact = &mut body.contacts[contact];
-            let own = self.trial.local().map(|trial| [contact.force_on_obstacle(&trial), contact.area()]);
-            let [resultant, area] = session.sum(session.agree(own)?);
-            let scale_of_contact = contact.scale * area;
-            let Some(obstacle) = &mut contact.obstacle else { break };
-            let [unbalanced, scale] = obstacle.unbalanced(step.time, resultant);
-            if let Some([before, earlier]) = last.replace([velocity, unbalanced]) {
-                obstacle.keep_slope((unbalanced - earlier) / (velocity - before));
+            for (at, &motion) in self.loaded.iter().enumerate() {
+                let [contact, number] = motion;
+                let contact = &body.contacts[contact];
+                let own = self.trial.local().map(|trial| contact.resultants_on_obstacle(&trial)[number]);
+                let [resultant, area] = session.sum([session.agree(own)?, contact.area()]);
+                let [arm] = session.largest([contact.longest_arm()]);
+                let scale_of_contact = contact.scale * area * if number == 0 { 1.0 } else { arm * arm };
+                let Some(motion) = loaded_motion(body, motion) else { continue };
+                let [value, scale] = motion.unbalanced(step.time, resultant);
+                if let Some([velocity, earlier]) = balance.before.get(at) {
+                    motion.keep_slope((value - earlier) / (balance.velocities[at] - velocity));
+                }
+                balance.values[at] = value;
+                balance.slopes[at] = motion.expected_slope().unwrap_or(motion.inertia() + scale_of_contact);
+                // A force that vanishes is compared with the contact forces of the first solutions.
+                balance.scales[at] = f64::max(balance.scales[at], scale);
             }
-            // A force that vanishes is compared with the contact forces of the first solutions.
-            largest = f64::max(largest, scale);
-            if unbalanced.abs() <= tolerance * largest {
+            let is_small = |(value, scale): (&f64, &f64)| value.abs() <= tolerance * scale;
+            if balance.values.iter().zip(&balance.scales).all(is_small) {
                 return Ok(all);
             }
-            let slope = obstacle.expected_slope().unwrap_or(obstacle.inertia() + scale_of_contact);
-            match root.next(velocity, unbalanced, slope) {
-                Some(next) if next.is_finite() => velocity = next,
-                _ => break,
+            if !balance.advance() {
+                break;
             }
         }
         let Step { time, length, .. } = step;
+        let tried: Vec<String> =
+            balance.before.iter().map(|[velocity, _]| format!("{velocity:.3e}")).collect();
         Err(Error::Failed(format!(
-            "step to t = {time:.6e} s (length {length:.3e} s) failed: no motion of the obstacle balances its force; the last velocity \
-             tried was {velocity:.3e} m/s; let the force press the obstacle against the body, give it a mass, or take a smaller step"
+            "step to t = {time:.6e} s (length {length:.3e} s) failed: no motion of the obstacles balances their forces and moments; the \
+             last velocities tried were {} m/s or rad/s; let the forces press the obstacles against the body, give them a mass, or take a \
+             smaller step",
+            tried.join(", ")
         )))
     }
 
@@ -476,6 +506,14 @@ impl Stepper {
         }
         Ok(())
     }
+}
+
+/// A motion of an obstacle, by the contact and the number of the motion.
+fn loaded_motion<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    [contact, number]: [usize; 2],
+) -> Option<&mut LoadedMotion> {
+    body.contacts[contact].obstacle.as_mut()?.motions_mut().into_iter().nth(number)?
 }
 
 /// Whether two velocities are available for extrapolation.

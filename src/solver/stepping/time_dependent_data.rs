@@ -59,7 +59,8 @@ impl<const D: usize> TimeDependentData<D> {
             add("a support", std::slice::from_ref(value), true);
         }
         for contact in &body.contacts {
-            let forces = contact.obstacle.iter().map(|obstacle| obstacle.force());
+            let motions = contact.obstacle.iter().flat_map(|obstacle| obstacle.motions()).flatten();
+            let forces = motions.map(|motion| motion.force());
             forces.for_each(|force| add("the force on an obstacle", std::slice::from_ref(force), true));
             contact.gap.expressions().into_iter().for_each(|values| add("an obstacle", values, false));
         }

@@ -1,23 +1,23 @@
-//! An obstacle that a force moves along a direction.
+//! An obstacle that a force moves along a direction, or that a moment turns about its centre.
 //!
 //! With the displacement `x` of the obstacle along the direction `d`, the force `F` and the contact tractions, `m x'' = F + R`, where `R`
 //! is the resultant of the tractions on the obstacle along `d`. In a step the displacement and the velocity `w` change as those of the
 //! body: `x = x~ + k' w` and `m (w - w~) / k' = F + R`, with the blends `x~` and `w~` of earlier states and the length `k'` of the
-//! scheme. `R` depends on `w`, through the gaps at the end of the step.
+//! scheme. `R` depends on `w`, through the gaps at the end of the step. The same holds for the angle, the angular velocity, the moment of
+//! inertia and the moments about the centre.
 
 use crate::{
     fem::effect::Blend,
     laws::{contact::ObstacleLoad, expression::Scalar},
-    linear_algebra::tensor::{Vector, add_scaled, norm},
+    linear_algebra::tensor::{Vector, add_scaled, cross, norm},
 };
 
-/// An obstacle with the force that moves it.
+/// A motion with one degree of freedom and the force, or the moment, that drives it.
 #[derive(Debug)]
-pub struct LoadedObstacle<const D: usize> {
-    direction: Vector<D>,
+pub struct LoadedMotion {
     force: Scalar,
     mass: f64,
-    /// Displacement in m and velocity in m/s after the last step, before it, and at the end of the current one.
+    /// Displacement in m (angle) and velocity in m/s (rad/s) after the last step, before it, and at the end of the current one.
     converged: [f64; 2],
     earlier: [f64; 2],
     trial: [f64; 2],
@@ -26,21 +26,101 @@ pub struct LoadedObstacle<const D: usize> {
     blend: Blend,
 }
 
+/// An obstacle with the force and the moment that move it.
+#[derive(Debug)]
+pub struct LoadedObstacle<const D: usize> {
+    translation: Option<(Vector<D>, LoadedMotion)>,
+    rotation: Option<(Vector<3>, LoadedMotion)>,
+}
+
 impl<const D: usize> LoadedObstacle<D> {
-    /// The obstacle at time 0.
-    pub fn new(load: &ObstacleLoad) -> Self {
+    /// The obstacle at time 0; `axis` is the direction of its axis of rotation.
+    pub fn new(load: &ObstacleLoad, axis: Vector<3>) -> Self {
         let direction: Vector<D> = std::array::from_fn(|i| load.direction.get(i).copied().unwrap_or(0.0));
-        let start = [0.0, load.velocity];
-        Self {
-            direction: direction.map(|x| x / norm(&direction)),
-            force: load.force.clone(),
-            mass: load.mass,
-            converged: start,
-            earlier: start,
-            trial: start,
-            stiffness: [0.0; 2],
-            blend: Blend::euler(0.0),
-        }
+        let translation = (!load.direction.is_empty()).then(|| {
+            let motion = LoadedMotion::new(load.force.clone(), load.mass, load.velocity);
+            (direction.map(|x| x / norm(&direction)), motion)
+        });
+        let rotation = load.moment.as_ref().map(|moment| {
+            let motion = LoadedMotion::new(moment.clone(), load.moment_of_inertia, load.angular_velocity);
+            (axis.map(|x| x / norm(&axis)), motion)
+        });
+        Self { translation, rotation }
+    }
+
+    /// The motions: along the direction, and about the axis.
+    pub fn motions(&self) -> [Option<&LoadedMotion>; 2] {
+        [
+            self.translation.as_ref().map(|(_, motion)| motion),
+            self.rotation.as_ref().map(|(_, motion)| motion),
+        ]
+    }
+
+    /// The same to be changed.
+    pub fn motions_mut(&mut self) -> [Option<&mut LoadedMotion>; 2] {
+        [
+            self.translation.as_mut().map(|(_, motion)| motion),
+            self.rotation.as_mut().map(|(_, motion)| motion),
+        ]
+    }
+
+    /// The component along the direction of a force on the obstacle, and that of its moment at this place relative to the centre.
+    pub fn resultants(&self, force: &Vector<D>, arm: &Vector<D>) -> [f64; 2] {
+        let in_space = |vector: &Vector<D>| -> Vector<3> {
+            std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+        };
+        let along = self.translation.as_ref().map_or(0.0, |(direction, _)| dot(direction, force));
+        let about = self.rotation.as_ref();
+        [along, about.map_or(0.0, |(axis, _)| dot(axis, &cross(&in_space(arm), &in_space(force))))]
+    }
+
+    /// Commits the motion of the step.
+    pub(super) fn commit(&mut self) {
+        self.motions_mut().into_iter().flatten().for_each(LoadedMotion::commit);
+    }
+
+    /// Velocity in m/s at the end of the step.
+    pub(super) fn velocity(&self) -> Vector<D> {
+        self.translation
+            .as_ref()
+            .map_or([0.0; D], |(direction, motion)| direction.map(|x| motion.trial[1] * x))
+    }
+
+    /// Angular velocity in rad/s at the end of the step.
+    pub(super) fn angular_velocity(&self) -> Vector<3> {
+        self.rotation.as_ref().map_or([0.0; 3], |(axis, motion)| axis.map(|x| motion.trial[1] * x))
+    }
+
+    /// Whether a moment turns the obstacle.
+    pub(super) fn turns(&self) -> bool {
+        self.rotation.is_some()
+    }
+
+    /// Places as seen from the obstacle: after the last step.
+    pub(super) fn seen_before(&self, place: &Vector<D>) -> Vector<D> {
+        self.seen(place, |motion| motion.converged[0])
+    }
+
+    /// Places as seen from the obstacle: at the end of the current step.
+    pub(super) fn seen_after(&self, place: &Vector<D>) -> Vector<D> {
+        self.seen(place, |motion| motion.trial[0])
+    }
+
+    fn seen(&self, place: &Vector<D>, displacement: impl Fn(&LoadedMotion) -> f64) -> Vector<D> {
+        let Some((direction, motion)) = &self.translation else { return *place };
+        add_scaled(place, -displacement(motion), direction)
+    }
+}
+
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    (0..N).map(|i| a[i] * b[i]).sum()
+}
+
+impl LoadedMotion {
+    fn new(force: Scalar, mass: f64, velocity: f64) -> Self {
+        let start = [0.0, velocity];
+        let (converged, earlier, trial) = (start, start, start);
+        Self { force, mass, converged, earlier, trial, stiffness: [0.0; 2], blend: Blend::euler(0.0) }
     }
 
     /// The force as a function of time.
@@ -48,7 +128,7 @@ impl<const D: usize> LoadedObstacle<D> {
         &self.force
     }
 
-    /// Displacement in m and velocity in m/s along the direction after the last step.
+    /// Displacement in m and velocity in m/s after the last step.
     pub fn motion(&self) -> [f64; 2] {
         self.converged
     }
@@ -118,30 +198,9 @@ impl<const D: usize> LoadedObstacle<D> {
         self.mass / self.blend.length
     }
 
-    /// The component along the direction of a force on the obstacle.
-    pub fn along(&self, force: &Vector<D>) -> f64 {
-        (0..D).map(|i| self.direction[i] * force[i]).sum()
-    }
-
-    /// Commits the motion of the step.
-    pub(super) fn commit(&mut self) {
+    fn commit(&mut self) {
         (self.earlier, self.converged) = (self.converged, self.trial);
         self.stiffness[0] = self.stiffness[1];
-    }
-
-    /// Velocity in m/s at the end of the step.
-    pub(super) fn velocity(&self) -> Vector<D> {
-        self.direction.map(|x| self.trial[1] * x)
-    }
-
-    /// Places as seen from the obstacle: after the last step.
-    pub(super) fn seen_before(&self, place: &Vector<D>) -> Vector<D> {
-        add_scaled(place, -self.converged[0], &self.direction)
-    }
-
-    /// Places as seen from the obstacle: at the end of the current step.
-    pub(super) fn seen_after(&self, place: &Vector<D>) -> Vector<D> {
-        add_scaled(place, -self.trial[0], &self.direction)
     }
 }
 
@@ -149,13 +208,37 @@ impl<const D: usize> LoadedObstacle<D> {
 mod tests {
     use super::*;
 
-    fn falling() -> LoadedObstacle<2> {
-        LoadedObstacle::new(&ObstacleLoad {
+    fn falling() -> LoadedMotion {
+        LoadedMotion::new(Scalar::Number(6.0), 3.0, 1.0)
+    }
+
+    #[test]
+    fn a_disc_that_falls_and_turns_is_loaded_by_forces_and_their_moments() {
+        let load = ObstacleLoad {
             direction: vec![0.0, -2.0],
-            force: Scalar::Number(6.0),
-            mass: 3.0,
             velocity: 1.0,
-        })
+            moment: Some(Scalar::Number(0.0)),
+            angular_velocity: -3.0,
+            ..ObstacleLoad::default()
+        };
+        let mut disc = LoadedObstacle::<2>::new(&load, [0.0, 0.0, 5.0]);
+        // At its lowest point, half a metre below its centre.
+        assert_eq!(disc.resultants(&[5.0, -7.0], &[0.0, -0.5]), [7.0, 2.5]);
+        assert_eq!(
+            (disc.velocity(), disc.angular_velocity(), disc.turns()),
+            ([0.0, -1.0], [0.0, 0.0, -3.0], true)
+        );
+        let [falling, turning] = disc.motions_mut().map(|motion| motion.expect("both"));
+        for motion in [falling, turning] {
+            motion.start(Blend::euler(0.5));
+            motion.set_velocity(2.0);
+        }
+        assert_eq!(disc.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
+        assert_eq!(disc.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
+        disc.commit();
+        assert_eq!(disc.motions().map(|motion| motion.expect("both").motion()), [[1.0, 2.0]; 2]);
+        let fixed = LoadedObstacle::<2>::new(&ObstacleLoad { direction: vec![], ..load }, [0.0, 0.0, 1.0]);
+        assert_eq!((fixed.seen_after(&[1.0, 0.0]), fixed.velocity()), ([1.0, 0.0], [0.0, 0.0]));
     }
 
     #[test]
@@ -187,9 +270,6 @@ mod tests {
         // 3 kg (2 - 1) m/s / 0.5 s = 6 N.
         assert_eq!(obstacle.unbalanced(0.5, 0.0), [0.0, 12.0]);
         assert_eq!(obstacle.unbalanced(0.5, -2.0)[0], 2.0);
-        assert_eq!(obstacle.seen_after(&[1.0, 0.0]), [1.0, 1.0]);
-        assert_eq!(obstacle.seen_before(&[1.0, 0.0]), [1.0, 0.0]);
-        assert_eq!((obstacle.velocity(), obstacle.along(&[5.0, -7.0])), ([0.0, -2.0], 7.0));
         obstacle.commit();
         assert_eq!(obstacle.motion(), [1.0, 2.0]);
         // The second-order formula: x~ = 4/3 1, w~ = 4/3 2 - 1/3 1 = 7/3, k' = 1/3 s; 3 m/s are 3 (3 - 7/3) / (1/3) = 6 N.

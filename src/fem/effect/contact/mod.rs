@@ -42,6 +42,7 @@ use crate::{
     error::Result,
     fem::space::{Held, surface_points},
     laws::contact::{Gap, NormalResponse, Wear},
+    linear_algebra::tensor::{Vector, larger, norm},
     mesh::Mesh,
     parallel::session::Session,
 };
@@ -52,7 +53,7 @@ pub use crate::laws::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
 pub use directions::{ContactNode, contact_nodes};
 pub use energy::{CONTACT, STORED_IN_CONTACT};
-pub use loaded_obstacle::LoadedObstacle;
+pub use loaded_obstacle::{LoadedMotion, LoadedObstacle};
 pub use reference::ReferenceValues;
 pub use resultant::{ContactAreas, PointState};
 pub use unknowns::choose_unknowns;
@@ -77,6 +78,8 @@ pub struct Contact<const D: usize> {
     pub gap: Gap,
     /// The motion of the obstacle, if a force moves it.
     pub obstacle: Option<LoadedObstacle<D>>,
+    /// For an obstacle that a moment turns: for each point, the place that touches it relative to the centre.
+    arms: Vec<Vector<D>>,
     /// Wear of the surface.
     pub wear: Option<Wear>,
     /// `c` in the parameter `s = c v + p` of the law's graph, in Pa s/m.
@@ -138,6 +141,7 @@ impl<const D: usize> Contact<D> {
             law,
             gap,
             obstacle: None,
+            arms: Vec::new(),
             wear: None,
             scale,
             step_length: 0.0,
@@ -167,13 +171,28 @@ impl<const D: usize> Contact<D> {
         self.obstacle.is_some() || self.gap.surface_may_move()
     }
 
-    /// The resultant in N of the tractions on the obstacle along the direction of its motion, of points on this rank in the step just
-    /// solved, at its velocities with ghosts; 0 if no force moves it.
-    pub fn force_on_obstacle(&self, velocity: &[f64]) -> f64 {
-        let Some(obstacle) = &self.obstacle else { return 0.0 };
-        let mut sum = 0.0;
-        self.forces(velocity, |_, force| sum -= obstacle.along(&force));
-        sum
+    /// The resultants of the tractions on the obstacle for its [motions](LoadedObstacle::motions), in N and N m, of points on this rank
+    /// in the step just solved, at its velocities with ghosts; 0 for motions that it does not have.
+    pub fn resultants_on_obstacle(&self, velocity: &[f64]) -> [f64; 2] {
+        let Some(obstacle) = &self.obstacle else { return [0.0; 2] };
+        let mut sums = [0.0; 2];
+        let mut add = |at: usize, force: Vector<D>| {
+            let arm = self.arms.get(at).copied().unwrap_or([0.0; D]);
+            let parts = obstacle.resultants(&force, &arm);
+            (0..2).for_each(|i| sums[i] -= parts[i]);
+        };
+        for (at, point) in self.points.iter().enumerate() {
+            point.forces(point.pressure_at(&self.law, Body, velocity), |_, force| add(at, force));
+        }
+        for point in self.friction.iter().flat_map(|friction| &friction.points) {
+            add(point.at, point.traction.map(|q| -point.weight * q));
+        }
+        sums
+    }
+
+    /// The largest distance in m of a point on this rank from the centre of an obstacle that a moment turns.
+    pub fn longest_arm(&self) -> f64 {
+        self.arms.iter().fold(0.0, |most, arm| larger(most, norm(arm)))
     }
 
     /// Whether velocities of ghost nodes are read and forces on them are written.

@@ -39,7 +39,30 @@ impl<const D: usize> Contact<D> {
             // Without an obstacle at the start of the step, the gap is taken as closed there: equal to the displacement.
             point.growth = if before.is_finite() { gap - before } else { gap - along };
         }
+        self.set_arms(time)?;
         self.set_obstacle_velocities(Rate::euler(time, length))
+    }
+
+    /// Sets the places at which the rays along the normals meet an obstacle that a moment turns, relative to its centre; zero where
+    /// they do not meet it.
+    fn set_arms(&mut self, time: f64) -> Result<()> {
+        let Some(obstacle) = self.obstacle.as_ref().filter(|obstacle| obstacle.turns()) else {
+            return Ok(());
+        };
+        let (gap, centre) = (&self.gap, self.gap.centre(time));
+        let arm = |point: &Point<D>| -> Result<Vector<D>> {
+            let seen = obstacle.seen_after(&point.place);
+            let reach = gap.at(time, &seen, &point.normal)?;
+            if reach == f64::INFINITY {
+                return Ok([0.0; D]);
+            }
+            Ok(add_scaled(&add_scaled(&seen, reach, &point.normal), -1.0, &centre))
+        };
+        self.arms.clear();
+        for point in &self.points {
+            self.arms.push(arm(point)?);
+        }
+        Ok(())
     }
 
     /// To be called after [`Contact::prepare`]: the displacement at the end is `u_{n-1} + shift + length v_n` with the length of
@@ -90,8 +113,9 @@ impl<const D: usize> Contact<D> {
         let Some(friction) = self.friction.as_mut().filter(|_| may_move) else {
             return Ok(());
         };
-        let (gap, points, motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
         let obstacle = self.obstacle.as_ref();
+        let (gap, points, mut motion) = (&self.gap, &self.points, self.gap.motion::<D>(rate)?);
+        motion.turn(&obstacle.map_or([0.0; 3], LoadedObstacle::angular_velocity));
         let velocity = |point: &Point<D>| {
             let seen = obstacle.map_or(point.place, |obstacle| obstacle.seen_after(&point.place));
             let prescribed = gap.velocity_along(&motion, rate.time, &seen, &point.normal)?;

@@ -31,6 +31,8 @@ pub struct ContactAreas {
 /// The state of a nodal point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointState<const D: usize> {
+    /// Outward unit normal of the boundary.
+    pub normal: Vector<D>,
     /// Contact pressure in Pa.
     pub pressure: f64,
     /// Distance to the obstacle in m; 0 if the law has no gap.
@@ -45,7 +47,7 @@ pub struct PointState<const D: usize> {
 
 impl<const D: usize> Default for PointState<D> {
     fn default() -> Self {
-        Self { pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding: [0.0; D] }
+        Self { normal: [0.0; D], pressure: 0.0, gap: 0.0, branch: 0, sticks: None, sliding: [0.0; D] }
     }
 }
 
@@ -88,7 +90,7 @@ impl<const D: usize> Contact<D> {
             friction.into_iter().flat_map(|friction| friction.sliding(Body, velocity)).peekable();
         let mut motions = friction.into_iter().flat_map(|friction| friction.motions(Body, velocity));
         for (at, point) in self.points.iter().enumerate() {
-            let mut state = PointState::default();
+            let mut state = PointState { normal: point.normal, ..PointState::default() };
             while let Some((_, sliding)) = moving.next_if(|(tangential, _)| tangential.at == at) {
                 state.sliding = sliding;
                 state.sticks = motions.next().map(|(motion, _)| motion == Motion::Sticks);

@@ -10,6 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Cosine below which directions at a node count as orthogonal.
 const ORTHOGONAL: f64 = 1e-9;
+/// Cosine of 40 degrees, the angle by which facets of a smooth boundary turn at most.
+const SMOOTH: f64 = 0.766;
 
 /// Selects the velocity as the unknown at points where directions at a node are not orthogonal; refuses laws
 /// with vertical parts there and at Gauss points.
@@ -39,24 +41,33 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         if !skew {
             continue;
         }
-        if with_friction.contains(&node) {
+        let is_sharp = places.iter().any(|&(number, _)| contacts[number].law.has_vertical_parts());
+        let acting = match (with_friction.contains(&node), is_sharp) {
+            (true, _) => "friction acts",
+            (_, true) => "a law with jumps or constraints acts",
+            _ => "",
+        };
+        if !acting.is_empty() {
+            let is_smooth = (1..places.len()).any(|i| {
+                places[..i].iter().any(|other| dot(&direction(other), &direction(&places[i])) > SMOOTH)
+            });
+            let (meeting, remedy) = if is_smooth {
+                (
+                    "two [[contact]] tables meet on a smooth boundary",
+                    "leave a facet between them out of both, or use one table",
+                )
+            } else {
+                (
+                    "boundaries meet at an angle other than 90 degrees",
+                    "round the edge with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
+                )
+            };
+            let place = mesh.nodes[node];
             return Err(Error::Refused(format!(
-                "contact at {:?} m: boundaries meet at an angle other than 90 degrees, and friction acts there; round the edge \
-                 with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
-                mesh.nodes[node]
+                "contact at {place:?} m: {meeting}, and {acting} there; {remedy}"
             )));
         }
-        for (number, at) in places {
-            if contacts[number].law.has_vertical_parts() {
-                return Err(Error::Refused(format!(
-                    "contact at {:?} m: boundaries meet at an angle other than 90 degrees, and a law with jumps or \
-                     constraints acts there; round the edge with facets that turn by less than 40 degrees each, or leave \
-                     one of the boundaries out of contact",
-                    mesh.nodes[node]
-                )));
-            }
-            contacts[number].points[at].unknown = Unknown::Velocity;
-        }
+        places.into_iter().for_each(|(number, at)| contacts[number].points[at].unknown = Unknown::Velocity);
     }
     Ok(())
 }

@@ -1,0 +1,99 @@
+//! Supports on named points and curves of a mesh.
+
+use crate::{
+    case::Case,
+    launch,
+    results::{assert_same_answer, relative_difference},
+};
+use std::path::{Path, PathBuf};
+
+fn mesh(kind: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/meshes/quarter_{kind}.msh"))
+}
+
+/// A quarter of a disc that is held on its rim and at the lower end of its axis and loaded on its top; the upper end of the axis moves.
+fn quarter(mesh: &Path, order: usize) -> Case {
+    Case::cube(3)
+        .without("mesh.box")
+        .without("contact")
+        .set("output.probe", "[{name = 'tip', point = [0.4, 0.4, 0.2]}]")
+        .set("mesh.file", &format!("{mesh:?}"))
+        .set("mesh.order", &order.to_string())
+        .set("time.end", "0.125")
+        .set(
+            "support",
+            "[{on = ['rim'], fix = 'all'}, {on = ['axis'], fix = ['z'], displacement = ['-0.01*t']}]",
+        )
+        .set("traction", "[{on = ['top'], value = [0, 0, -10]}]")
+}
+
+/// The same supports as parts of boundaries.
+fn by_place(case: Case) -> Case {
+    let rim = "((abs(hypot(x, y) - 1) < 0.05) + (hypot(x, y) < 1e-3))*(z < 1e-6)";
+    case.set("support.0.on", "['mantle', 'bottom']")
+        .set("support.0.where", &format!("\"{rim}\""))
+        .set("support.1.on", "['top']")
+        .set("support.1.where", "\"hypot(x, y) < 1e-3\"")
+}
+
+#[test]
+fn named_points_and_curves_hold_their_nodes_on_any_number_of_ranks() {
+    for (kind, order) in [("straight", 1), ("straight", 2), ("curved", 1), ("curved", 2)] {
+        let make = || quarter(&mesh(kind), order);
+        let alone = make().run_and_keep(1);
+        let placed = by_place(make()).run_and_keep(1);
+        for (file, column) in [
+            ("resultants.csv", "force_z"),
+            ("probes.csv", "displacement_x"),
+            ("history.csv", "elastic_energy"),
+        ] {
+            let [one, other] = [&placed, &alone].map(|case| case.results().table(file).numbers(column));
+            let off = relative_difference(&one, &other);
+            assert!(off < 1e-9, "{kind} {order}: {column} differs by {off}");
+        }
+        for ranks in [2, 3] {
+            let found = make().run_and_keep(ranks);
+            assert_same_answer(&alone.results(), &found.results(), 1e-8, &format!("{kind} {order} {ranks}"));
+        }
+    }
+}
+
+#[test]
+fn the_parts_of_a_mesh_know_its_points_and_a_mesh_with_others_is_another() {
+    let straight = quarter(&mesh("straight"), 1).run_and_keep(1);
+    let file = straight.folder().join("parts.h5");
+    let text = |path: &Path| path.to_str().expect("a path").to_owned();
+    let (from, to) = (text(&mesh("straight")), text(&file));
+    launch::run_alone(&["partition", &from, "-n", "3", "-o", &to]).expect(0);
+    for file in [&from, &to] {
+        let outcome = launch::run_alone(&["inspect", file]).expect(0);
+        outcome.says("points      axis: 1 nodes").says("points      rim: ");
+    }
+    for ranks in [1, 3] {
+        let found = quarter(&file, 1).run_and_keep(ranks);
+        assert_same_answer(&straight.results(), &found.results(), 1e-8, &format!("{ranks} ranks"));
+    }
+    let case = quarter(&mesh("straight"), 1).set("checkpoint.every", "1").run_and_keep(1);
+    let renamed =
+        std::fs::read_to_string(mesh("straight")).expect("a mesh").replace("0 6 \"rim\"", "0 6 \"hub\"");
+    let other = case.folder().join("other.msh");
+    std::fs::write(&other, renamed).expect("written");
+    let case = case.set("mesh.file", "'other.msh'");
+    case.run_with(2, &["--restart", "--set", "time.end=0.25"]).expect(2).says("mesh");
+}
+
+#[test]
+fn points_are_refused_where_boundaries_are_meant() {
+    let refused = |case: Case, place: &str| {
+        case.run_with(2, &[]).expect(2).says(place);
+    };
+    let make = || quarter(&mesh("straight"), 1);
+    refused(
+        make().set("traction.0.on", "['rim']"),
+        "\"rim\" is the name of points or curves: only a support with `fix`",
+    );
+    refused(make().set("support.0.fix", "'normal'"), "which have no normal");
+    let spring = make().without("support.0.fix").set("support.0.stiffness", "{ normal = 1e3 }");
+    refused(spring, "only a support with `fix` acts on them");
+    refused(make().set("support.1.on", "['axle']"), "the mesh has no boundary \"axle\"");
+}

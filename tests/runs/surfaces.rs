@@ -1,0 +1,111 @@
+//! Obstacles with a triangulated surface.
+
+use crate::{case::Case, launch, results::assert_same_answer};
+
+/// Half the sides of a box in mm, which an STL file can hold exactly.
+const HALF: [f32; 3] = [4.0, 2.5, 1.5];
+/// The distance from this box in m.
+const DISTANCE: &str = "max(max(abs(x) - 4e-3, abs(y) - 2.5e-3), abs(z) - 1.5e-3)";
+
+/// A binary STL file of the box, larger by a factor, in mm; `order` rearranges the corners of each triangle.
+fn stl(factor: f32, order: [usize; 3]) -> Vec<u8> {
+    let corner = |number: usize| -> [f32; 3] {
+        std::array::from_fn(|axis| factor * if number >> axis & 1 == 0 { -HALF[axis] } else { HALF[axis] })
+    };
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[usize; 3]> =
+        sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let mut bytes = vec![0; 80];
+    bytes.extend(u32::try_from(triangles.len()).expect("a count").to_le_bytes());
+    for triangle in triangles {
+        let corners = order.map(|place| corner(triangle[place]));
+        let numbers = [0.0; 3].into_iter().chain(corners.into_iter().flatten());
+        bytes.extend(numbers.flat_map(f32::to_le_bytes));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// The stamped block under a box that moves, elastic, with the file box.stl beside the job.
+fn under_a_box() -> Case {
+    let case = Case::of("stamped_block")
+        .without("material.viscoplasticity")
+        .set("time.scheme", "'bdf2'")
+        .set("time.step", "0.125")
+        .set("output.probe", "[{name = 'middle', point = [7e-3, 0, 2e-3]}]")
+        .set("material.density", "1000.0")
+        .set("contact.0.obstacle.shape.surface", "'box.stl'")
+        .set("contact.0.obstacle.shape.centre", "['7e-3 + 1e-3*t', 0.0, '5.5e-3 - 0.05e-3*min(t, 1 - t)']");
+    write(&case, stl(1.0, [0, 1, 2]));
+    case
+}
+
+fn write(case: &Case, bytes: Vec<u8>) {
+    std::fs::write(case.folder().join("box.stl"), bytes).expect("written");
+}
+
+#[test]
+fn a_box_of_triangles_presses_as_its_distance_says_on_any_number_of_ranks() {
+    let make = || under_a_box().set("time.end", "0.75");
+    let given = make()
+        .without("contact.0.obstacle.shape.surface")
+        .without("contact.0.obstacle.shape.scale")
+        .set("contact.0.obstacle.shape.distance", &format!("'{DISTANCE}'"))
+        .run_and_keep(1);
+    let contact = given.results().table("resultants.csv").only("source", "contact top");
+    assert!(contact.numbers("touching_area").iter().any(|area| *area > 0.0));
+    for ranks in [1, 2, 3, 4] {
+        let found = make().run_and_keep(ranks);
+        assert_same_answer(&given.results(), &found.results(), 1e-6, &format!("{ranks} ranks"));
+    }
+}
+
+#[test]
+fn a_run_continues_with_the_surface_it_had_wherever_its_file_is() {
+    let straight = under_a_box().set("checkpoint.every", "4").run_and_keep(1);
+    let case = under_a_box().set("checkpoint.every", "4");
+    case.run_with(1, &["--set", "time.end=0.5"]).expect(0);
+    let elsewhere = case.folder().join("elsewhere.stl");
+    std::fs::rename(case.folder().join("box.stl"), &elsewhere).expect("moved");
+    case.run_with(1, &["--restart"]).expect(2).says("cannot read").says("box.stl");
+    write(&case, stl(1.25, [0, 1, 2]));
+    let changed = case.run_with(2, &["--restart"]).expect(2);
+    changed.says("belongs to another problem").says("contact.0.obstacle.shape.surface: checkpoint");
+    let moved = case.set("contact.0.obstacle.shape.surface", "'elsewhere.stl'");
+    moved.run_with(1, &["--restart"]).expect(0);
+    for table in ["history.csv", "resultants.csv"] {
+        assert_eq!(straight.results().text(table), moved.results().text(table), "{table}");
+    }
+}
+
+#[test]
+fn a_surface_that_faces_inward_is_warned_of() {
+    for ranks in [1, 2] {
+        let case = under_a_box();
+        write(&case, stl(1.0, [0, 2, 1]));
+        let job = case.written();
+        launch::run(ranks, &["check", job.to_str().expect("a path")])
+            .expect(0)
+            .says("the body lies behind its obstacle")
+            .says("the orientation of the triangles of `surface`");
+    }
+}
+
+#[test]
+fn files_that_hold_no_closed_surface_are_refused() {
+    let open = {
+        let mut bytes = stl(1.0, [0, 1, 2]);
+        bytes.truncate(84 + 11 * 50);
+        bytes[80] = 11;
+        bytes
+    };
+    for (bytes, words) in [
+        (b"solid nothing\nendsolid nothing\n".to_vec(), "0 triangles"),
+        (b"neither text nor numbers of a surface".to_vec(), "it is not an STL file"),
+        (open, "belongs to one triangle only: the surface is not closed (3 such edges)"),
+    ] {
+        let case = under_a_box();
+        write(&case, bytes);
+        case.run_with(2, &[]).expect(2).says("box.stl: ").says(words).says("export it again");
+    }
+}
