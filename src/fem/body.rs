@@ -118,7 +118,7 @@ impl<const D: usize, const S: usize> Body<D, S> {
         }
         flags.update_ghosts()?;
         let is_massless: Vec<bool> = flags.local()?.iter().step_by(D).map(|flag| *flag > 0.0).collect();
-        let mass = RedistributedMass::new(&self.mesh, &is_massless, add_mass);
+        let mass = RedistributedMass::new(&self.mesh, is_massless, add_mass);
         self.redistributed_mass = Some(mass);
         Ok(())
     }
@@ -231,6 +231,14 @@ impl<const D: usize, const S: usize> Body<D, S> {
             });
             Ok((energy, squares.peaks()))
         })?
+    }
+
+    /// The energies of [`Body::energy`], without the forces at supports, which remain those of the call before.
+    pub fn energy_beside(&self, state: &State, step: Step) -> Result<(Energy, Peaks)> {
+        let forces = self.at_supports.take();
+        let energy = self.energy(state, step);
+        self.at_supports.replace(forces);
+        energy
     }
 
     /// What the effects are in the linearised equation of motion.
@@ -435,39 +443,37 @@ impl<const D: usize, const S: usize> Body<D, S> {
     }
 
     /// Passes on the forces at the local nodes of stress and inertia in the requested runs of cells after a committed step whose energy
-    /// was computed: minus what all other forces must balance there. In the step the velocity has changed since `velocity_before` by
-    /// `length` in s times its rate.
+    /// was computed: minus what all other forces must balance there. The velocity, with ghosts, is `velocity`, and has changed since
+    /// `before` by `length` in s times its rate.
     pub fn with_support_forces<T>(
         &self,
-        state: &State,
-        (velocity_before, length): (&[f64], f64),
+        [velocity, before]: [&[f64]; 2],
+        length: f64,
         read: impl FnOnce(&[f64]) -> T,
-    ) -> Result<T> {
+    ) -> T {
         let SupportForces { runs, forces } = &mut *self.at_supports.borrow_mut();
         let inertia = Called::filter(&self.effects, |effect| effect.term().form() == Some(Form::Mass));
         if !inertia.is_empty() {
             let needs = Needs { velocity_change: true, ..Needs::default() };
             let requested = (0..runs.len()).filter(|number| runs[*number]);
-            with_nodal(state, |nodal| {
-                let nodal = Nodal { previous_velocity: velocity_before, ..nodal };
-                let cells = (&self.mesh, &self.geometry);
-                Batch::for_each(requested, cells, nodal, needs, |batch: &mut Batch<D, S>| {
-                    batch.velocity = batch.velocity_change;
-                    inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
-                    // Quadratic cells have all their inertia at the first point.
-                    let nodes = if batch.point == 0 { self.mesh.nodes_per_cell() } else { 0 };
-                    for force in &mut batch.force[..nodes] {
-                        force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= -1.0 / length);
-                    }
-                    batch.scatter(&self.mesh, forces);
-                });
-                if let Some(mass) = &self.redistributed_mass {
-                    let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
-                    mass.add_product(-1.0 / length, change, forces);
+            let nodal = Nodal { previous_velocity: before, ..Nodal::all(velocity) };
+            let cells = (&self.mesh, &self.geometry);
+            Batch::for_each(requested, cells, nodal, needs, |batch: &mut Batch<D, S>| {
+                batch.velocity = batch.velocity_change;
+                inertia.select(&self.effects).for_each(|effect| effect.term().add_force(batch));
+                // Quadratic cells have all their inertia at the first point.
+                let nodes = if batch.point == 0 { self.mesh.nodes_per_cell() } else { 0 };
+                for force in &mut batch.force[..nodes] {
+                    force.0.as_flattened_mut().iter_mut().for_each(|force| *force *= -1.0 / length);
                 }
-            })?;
+                batch.scatter(&self.mesh, forces);
+            });
+            if let Some(mass) = &self.redistributed_mass {
+                let change = |at: usize| nodal.velocity[at] - nodal.previous_velocity[at];
+                mass.add_product(-1.0 / length, change, forces);
+            }
         }
-        Ok(read(forces))
+        read(forces)
     }
 
     /// Strain of the displacement, one a cell: the mean over its points.
@@ -498,6 +504,13 @@ impl<const D: usize, const S: usize> Body<D, S> {
     pub fn commit(&mut self) {
         self.visit_histories(&mut |history| history.commit());
         self.contacts.iter_mut().for_each(Contact::commit);
+    }
+
+    /// Extrapolates the histories of cells from the midpoint of a step, which was committed, to its end.
+    pub fn extrapolate_histories(&mut self) {
+        self.effects
+            .iter_mut()
+            .for_each(|effect| effect.visit_histories(&mut |history| history.extrapolate()));
     }
 
     fn visit_histories(&mut self, visit: &mut dyn FnMut(&mut dyn HistoryStore)) {

@@ -48,10 +48,17 @@ pub enum Source {
     Momentum,
 }
 
-/// The change of the velocity in the step just committed, as the scheme has it: `(velocity - before) / length` is its rate.
+/// The motion at which the forces of the step just committed are balanced, with `(velocity - before) / length` as acceleration. Vectors
+/// have ghosts.
 #[derive(Debug, Clone, Copy)]
-pub struct VelocityChange<'a> {
-    /// In m/s, with ghosts.
+pub struct BalancedMotion<'a> {
+    /// Time in s.
+    pub time: f64,
+    /// Displacement in m.
+    pub displacement: &'a DistributedVector,
+    /// Velocity in m/s.
+    pub velocity: &'a DistributedVector,
+    /// Velocity in m/s from which it has changed.
     pub before: &'a DistributedVector,
     /// In s.
     pub length: f64,
@@ -173,10 +180,10 @@ impl<const D: usize> Resultants<D> {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        change: VelocityChange<'_>,
+        motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<(), Agreed> {
-        session.agree(self.collect(body, state, change, load))?;
+        session.agree(self.collect(body, state, motion, load))?;
         let [mine, all] = &mut self.sums;
         if !mine.is_empty() {
             session.world().all_reduce_into(&mine[..], &mut all[..], SystemOperation::sum());
@@ -190,7 +197,7 @@ impl<const D: usize> Resultants<D> {
         &mut self,
         body: &Body<D, S>,
         state: &State,
-        change: VelocityChange<'_>,
+        motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<()> {
         let Self { sources, held, slanted, masses, steady, surface, sums, largest } = self;
@@ -198,14 +205,14 @@ impl<const D: usize> Resultants<D> {
         let (resultants, areas) = sums[0].split_at_mut(sources.len() * Resultant::<D>::WIDTH);
         resultants.fill(0.0);
         let mut sums = Sums { sources, held, slanted, directions: &body.held, mesh, values: resultants };
-        let velocity = state.velocity.local()?;
-        let before = change.before.local()?;
+        let BalancedMotion { time, displacement, velocity, before, length } = motion;
+        let (displacement, velocity, before) = (displacement.local()?, velocity.local()?, before.local()?);
         if let Some(load) = load {
             let load = load.owned()?;
             if let Some(steady) = steady {
                 sums.values.copy_from_slice(steady);
             } else {
-                sums.add_loads(body, state.time, &load)?;
+                sums.add_loads(body, time, &load)?;
                 if body.load.is_steady() {
                     *steady = Some(sums.values.to_vec());
                 }
@@ -213,11 +220,11 @@ impl<const D: usize> Resultants<D> {
             sums.react_to_all(&load);
         }
         if !(held.is_empty() && slanted.is_empty()) {
-            body.with_support_forces(state, (&before, change.length), |forces| sums.react_to_all(forces))?;
+            let velocities = [&velocity[..], &before[..]];
+            body.with_support_forces(velocities, length, |forces| sums.react_to_all(forces));
         }
         if !body.elastic_support.points.is_empty() {
-            let displacement = state.displacement.local()?;
-            let lag = if body.is_explicit() { change.length } else { 0.0 };
+            let lag = if body.is_explicit() { length } else { 0.0 };
             body.elastic_support.forces(&displacement, &velocity, lag, |support, node, force| {
                 sums.add_and_react(Source::Support(support), node, &force);
             });
@@ -243,7 +250,7 @@ impl<const D: usize> Resultants<D> {
             let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
             let changes = velocity.chunks_exact(D).zip(before.chunks_exact(D));
             for ((mass, centre), (now, before)) in masses.iter().zip(changes) {
-                let rate: Vector<D> = std::array::from_fn(|i| (now[i] - before[i]) / change.length);
+                let rate: Vector<D> = std::array::from_fn(|i| (now[i] - before[i]) / length);
                 (0..D).for_each(|i| force[i] += mass * rate[i]);
                 let own = moment_of(centre, &rate);
                 (0..3).for_each(|i| moment[i] += own[i]);

@@ -66,4 +66,22 @@ impl State {
         self.step += 1;
         Ok(())
     }
+
+    /// Extrapolates velocity and displacement, committed at the midpoint of a step of this length in s, to its end. The velocity of local
+    /// nodes without mass remains that at the midpoint.
+    pub fn extrapolate<const D: usize>(
+        &mut self,
+        length: f64,
+        is_massless: impl Fn(usize) -> bool,
+    ) -> Result<()> {
+        let mut displacement = self.displacement.local_mut()?;
+        let (mut velocity, before) = (self.velocity.local_mut()?, self.previous_velocity.local()?);
+        for (at, v) in velocity.iter_mut().enumerate() {
+            displacement[at] += 0.5 * length * *v;
+            if !is_massless(at / D) {
+                *v += *v - before[at];
+            }
+        }
+        Ok(())
+    }
 }

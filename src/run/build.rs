@@ -91,6 +91,7 @@ pub(super) fn body<const D: usize, const S: usize>(
         let facets: Vec<u32> = given.flat_map(|(_, facets)| facets).copied().collect();
         let points = surface_points(session, &body.mesh, &facets)?;
         session.agree(body.redistribute_mass(&points, &state.velocity))?;
+        session.agree(refuse_remaining_mass(job, &body))?;
     }
     if job.time.adaptive.is_some() || job.time.scheme.is_two_step() {
         body.keep_earlier();
@@ -99,6 +100,18 @@ pub(super) fn body<const D: usize, const S: usize>(
         body.restore_history("viscoplastic_history", initial_stress.as_flattened());
     }
     Ok((body, state))
+}
+
+/// With the midpoint rule every contact node must be without mass.
+fn refuse_remaining_mass<const D: usize, const S: usize>(job: &Job, body: &Body<D, S>) -> Result<()> {
+    let keeps_mass = body.redistributed_mass.as_ref().and_then(|mass| mass.keeps_mass);
+    let Some(cell) = keeps_mass.filter(|_| job.time.scheme.is_midpoint()) else { return Ok(()) };
+    Err(Error::Refused(format!(
+        "scheme \"{}\": all nodes of the cell with a corner at {:?} m are on contact boundaries, so that they keep their mass; use another \
+         mesh there (in a rectangle another `diagonal`), or scheme \"bdf2\"",
+        job.time.scheme.name(),
+        body.mesh.corners(cell)[0]
+    )))
 }
 
 /// The law of a contact, and the gap beyond which it acts.

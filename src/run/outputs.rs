@@ -130,8 +130,7 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
             written = history.row(state.step, state.time, state.step_length, outcome, totals);
         }
         session.agree(written)?;
-        let change = scheme.velocity_change(state);
-        self.resultants.write(session, body, state, change, scheme.load())?;
+        self.resultants.write(session, body, state, scheme.balanced_motion(state), scheme.load())?;
         if !self.probes.is_empty() {
             session.agree(self.probes.write(session, state))?;
         }

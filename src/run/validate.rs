@@ -95,13 +95,20 @@ fn material_of<'a>(job: &'a Job, region: &str) -> &'a Material {
 /// Refuses materials whose velocity the scheme can't determine.
 fn refuse_empty_matrix<const D: usize>(mesh: &Mesh<D>, loaded: &Loaded) -> Result<()> {
     let scheme = loaded.job.time.scheme;
-    if scheme.is_implicit() {
-        return Ok(());
-    }
     for region in &mesh.regions {
         let material = material_of(&loaded.job, region);
-        if material.density.is_none() && material.viscosity.is_none() {
-            let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
+        let place = if loaded.job.region.is_empty() { "" } else { &*format!(" of region \"{region}\"") };
+        if scheme.is_midpoint() && material.density.is_none() {
+            return Err(loaded.fault(
+                "time.scheme",
+                format!(
+                    "scheme \"{}\" is for bodies with inertia, and the material{place} has no density",
+                    scheme.name()
+                ),
+                "give [material] density, or use scheme \"bdf2\"",
+            ));
+        }
+        if !scheme.is_implicit() && material.density.is_none() && material.viscosity.is_none() {
             return Err(loaded.fault(
                 "time.scheme",
                 format!(

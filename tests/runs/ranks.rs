@@ -116,6 +116,18 @@ fn a_square_that_flows_under_each_implicit_scheme_is_the_same_on_any_number_of_r
 }
 
 #[test]
+fn an_impact_under_the_midpoint_rule_is_the_same_on_any_number_of_ranks() {
+    let make = || {
+        Case::square(12)
+            .set("time.scheme", "'midpoint'")
+            .set("contact.0.redistribute_mass", "true")
+            .set("contact.0.normal", "{ unilateral = { gap = 0.003 } }")
+            .set("contact.0.friction", "{ coulomb = { coefficient = 0.3 } }")
+    };
+    compare(make, "midpoint");
+}
+
+#[test]
 fn a_cube_factorised_with_gauss_points_is_the_same_on_any_number_of_ranks() {
     cube("cholesky", "gauss");
 }

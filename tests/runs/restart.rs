@@ -272,6 +272,24 @@ fn a_restarted_run_under_each_scheme_is_the_straight_run_to_the_last_bit() {
 }
 
 #[test]
+fn a_restarted_run_under_the_midpoint_rule_is_the_straight_run_to_the_last_bit() {
+    let flow = "{ perzyna = { relaxation = 100, yield_stress = 9, hardening_modulus = 300 } }";
+    for (friction, order) in [("coulomb = { coefficient = 0.3 }", "1"), ("tresca = { bound = 0.2 }", "2")] {
+        let make = || {
+            saving()
+                .set("time.scheme", "'midpoint'")
+                .set("mesh.order", order)
+                .set("material.viscoplasticity", flow)
+                .set("contact.0.redistribute_mass", "true")
+                .set("contact.0.normal", "{ unilateral = { gap = '0.004 - 0.01*t' } }")
+                .set("contact.0.friction", &format!("{{ {friction} }}"))
+        };
+        compare_with_straight(make, 1, friction);
+        compare_with_straight(make, 3, friction);
+    }
+}
+
+#[test]
 fn a_restarted_cube_is_the_straight_cube_to_the_last_bit() {
     let make = || Case::cube(4).set("checkpoint.every", "4").set("output.profile", "[{on = 'bottom'}]");
     compare_with_straight(make, 3, "cube");

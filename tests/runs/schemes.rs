@@ -1,6 +1,10 @@
 //! Time schemes in complete runs.
 
-use crate::{case::Case, results::relative_difference};
+use crate::{
+    case::Case,
+    results::{Results, relative_difference},
+};
+use clarke::linear_algebra::tensor::larger;
 
 const IMPLICIT: [&str; 2] = ["implicit_euler", "bdf2"];
 
@@ -88,5 +92,54 @@ fn a_law_that_never_flows_gives_the_elastic_body_under_each_scheme() {
         let plain = of(under(Case::square(6), scheme).without("material.viscoplasticity"));
         let idle = of(under(Case::square(6), scheme).set("material.viscoplasticity", law));
         assert!(relative_difference(&plain, &idle) < 1e-8, "{scheme}");
+    }
+}
+
+/// The sum of the stored energies less the work of the loads, in each step.
+fn total_energy(results: &Results) -> Vec<f64> {
+    let table = results.table("history.csv");
+    let [kinetic, elastic, work] =
+        ["kinetic_energy", "elastic_energy", "external_work"].map(|column| table.numbers(column));
+    (0..work.len()).map(|step| kinetic[step] + elastic[step] - work[step]).collect()
+}
+
+#[test]
+fn the_energy_of_a_bouncing_bar_never_grows_under_the_midpoint_rule() {
+    let bar = || Case::of("bouncing_bar").set("mesh.rectangle.cells", "[1, 50]");
+    let solid = bar()
+        .without("mesh.rectangle")
+        .without("material.hypothesis")
+        .set("mesh.box", "{ size = [0.2, 0.2, 10], cells = [1, 1, 50] }")
+        .set("support", "[{on = ['left', 'right'], fix = ['x']}, {on = ['front', 'back'], fix = ['y']}]")
+        .set("gravity.acceleration", "[0, 0, -10]")
+        .set("output.probe", "[]");
+    // A wave crosses a cell in 1/150 s.
+    let cases = [
+        (bar(), "eight steps for the way of a wave through a cell"),
+        (bar().set("time.step", &format!("{}", 1.0 / 150.0)), "one step"),
+        (bar().set("time.step", "0.02"), "a third of a step"),
+        (bar().set("mesh.order", "2"), "quadratic cells"),
+        (solid, "in space"),
+    ];
+    for (case, what) in cases {
+        let results = case.run(1);
+        let energy = total_energy(&results);
+        // 100 J are turned over in the impact; what remains is the tolerance of the solver.
+        let mut most: f64 = 0.0;
+        for (step, now) in energy.iter().enumerate() {
+            assert!(*now <= most + 1e-7, "{what}, step {}: {most} J, then {now} J", step + 1);
+            most = most.min(*now);
+        }
+        assert!(energy.len() > 100 && most > -0.01, "{what}: {most} J at the end");
+        let pressures =
+            results.table("resultants.csv").only("source", "contact bottom").numbers("largest_pressure");
+        let first = pressures.iter().copied().find(|pressure| *pressure > 0.0).expect("contact");
+        let largest = pressures.into_iter().fold(0.0, larger);
+        // 300 Pa at first and 500 Pa at last; the mesh adds its waves.
+        assert!(
+            first < 2.0 * 300.0 && largest < 1.5 * 500.0 && largest > 400.0,
+            "{what}: {first} Pa, {largest} Pa"
+        );
+        assert!(results.number("max_energy_imbalance") < 1e-8, "{what}");
     }
 }

@@ -45,8 +45,8 @@ fn last<const D: usize, const S: usize>(
     let mut resultants =
         Resultants::new(session, &run.body, &run.state, &supports(text)).expect("resultants");
     while run.advance(session).expect("a step").is_some() {
-        let change = run.scheme.velocity_change(&run.state);
-        resultants.update(session, &run.body, &run.state, change, run.scheme.load()).expect("resultants");
+        let motion = run.scheme.balanced_motion(&run.state);
+        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
     }
     let areas = resultants.rows().find_map(|(_, areas)| areas).expect("a contact");
     let rows = resultants.sources().iter().zip(resultants.rows());

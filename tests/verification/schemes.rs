@@ -18,7 +18,12 @@ use clarke::{
 use std::path::Path;
 
 fn under(scheme: &str, job: &str) -> String {
-    job.replacen("[time]\n", &format!("[time]\nscheme = \"{scheme}\"\n"), 1)
+    let job = job.replacen("[time]\n", &format!("[time]\nscheme = \"{scheme}\"\n"), 1);
+    if scheme == "midpoint" {
+        job.replacen("[[contact]]", "[[contact]]\nredistribute_mass = true", 1)
+    } else {
+        job
+    }
 }
 
 /// Takes steps to `end` whose lengths alternate as 1 and `ratio`.
@@ -31,6 +36,12 @@ fn advance(session: &Session, run: &mut Simulation<2, 3>, steps: usize, ratio: f
         let step = Step { time, length: lengths[number % 2], previous_length };
         run.scheme.advance(session, &mut run.body, &mut run.state, step).expect("step");
     }
+}
+
+/// The orders of velocity and displacement that are those of a scheme: under the midpoint rule viscous motions that are fast against the
+/// steps alternate in the velocity, and boundaries without mass have that of the midpoint.
+pub fn judged<'a>(scheme: &str, orders: &'a [f64; 2]) -> &'a [f64] {
+    if scheme == "midpoint" { &orders[1..] } else { orders }
 }
 
 /// The observed orders of velocity and displacement, from the differences of runs with halved steps.
@@ -58,7 +69,7 @@ pub fn observed(session: &Session, fields: &[[Vec<f64>; 2]; 3]) -> [f64; 2] {
 pub fn orders(session: &Session) {
     let end = 0.5;
     let flow = "viscoplasticity.maxwell = { relaxation_time = 0.4, volumetric_relaxation_time = 2 }";
-    for (scheme, expected) in [("implicit_euler", 1.0), ("bdf2", 2.0)] {
+    for (scheme, expected) in [("implicit_euler", 1.0), ("bdf2", 2.0), ("midpoint", 2.0)] {
         for extra in ["", flow] {
             for ratio in [1.0, 2.0] {
                 let job = under(scheme, &job::<2>("plane_stress", "nodal", extra, end, 0.01));
@@ -66,7 +77,7 @@ pub fn orders(session: &Session) {
                 println!(
                     "{scheme}, steps 1:{ratio}, {extra:?}: orders {orders:.3?} (velocity, displacement)"
                 );
-                for order in orders {
+                for order in judged(scheme, &orders) {
                     assert!((order - expected).abs() < 0.25, "{scheme}, 1:{ratio}, {extra:?}: {orders:?}");
                 }
             }
@@ -169,7 +180,7 @@ pub fn closed_forms(session: &Session) {
 }
 
 #[test]
-fn implicit_euler_is_of_first_and_bdf2_of_second_order_over_equal_and_unequal_steps() {
+fn implicit_euler_is_of_first_order_bdf2_and_the_midpoint_rule_of_second_over_equal_and_unequal_steps() {
     run_on(&[1], "scheme_orders");
 }
 

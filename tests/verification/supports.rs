@@ -48,8 +48,8 @@ fn moved<const D: usize, const S: usize>(
     let mut run: Simulation<D, S> = simulation(session, job, mesh);
     let mut resultants = Resultants::new(session, &run.body, &run.state, &supports(job)).expect("resultants");
     while run.advance(session).unwrap_or_else(|e| panic!("{e}\n{job}")).is_some() {
-        let change = run.scheme.velocity_change(&run.state);
-        resultants.update(session, &run.body, &run.state, change, run.scheme.load()).expect("resultants");
+        let motion = run.scheme.balanced_motion(&run.state);
+        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
         let (mut sum, mut largest) = ([0.0; 6], 0.0);
         for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
             let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };

@@ -168,6 +168,14 @@ impl<const W: usize> HistoryStore for CellHistory<W> {
         std::mem::swap(&mut self.converged, &mut self.trial);
     }
 
+    fn extrapolate(&mut self) {
+        debug_assert!(self.earlier.is_none(), "the trial values are those before the step");
+        for (converged, before) in self.converged.iter_mut().zip(&self.trial) {
+            let both = converged.0.as_flattened_mut().iter_mut().zip(before.0.as_flattened());
+            both.for_each(|(value, before)| *value += *value - before);
+        }
+    }
+
     fn restore(&mut self, name: &str, values: &[f64]) {
         let target = match &mut self.earlier {
             _ if name == self.name => &mut self.converged,

@@ -51,6 +51,9 @@ pub trait HistoryStore {
     /// Makes the trial values the converged ones.
     fn commit(&mut self);
 
+    /// Adds to the converged values the change in the step just committed once more; not where earlier values are kept.
+    fn extrapolate(&mut self);
+
     /// Replaces the converged values, or those before the last step, if `name` is theirs; laid out as in [`History::values`].
     fn restore(&mut self, name: &str, values: &[f64]);
 }

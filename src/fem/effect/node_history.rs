@@ -66,6 +66,11 @@ impl HistoryStore for NodeHistory {
         std::mem::swap(&mut self.converged, &mut self.trial);
     }
 
+    fn extrapolate(&mut self) {
+        debug_assert!(self.earlier.is_none(), "the trial values are those before the step");
+        self.converged.iter_mut().zip(&self.trial).for_each(|(value, before)| *value += *value - before);
+    }
+
     fn restore(&mut self, name: &str, values: &[f64]) {
         let target = match &mut self.earlier {
             _ if name == self.name => &mut self.converged,

@@ -19,6 +19,13 @@ pub struct Peaks {
     pub strain: f64,
 }
 
+impl Peaks {
+    /// The larger ones of two.
+    pub fn or(self, other: Self) -> Self {
+        Self { von_mises: larger(self.von_mises, other.von_mises), strain: larger(self.strain, other.strain) }
+    }
+}
+
 /// Squares of the largest values over the cells visited so far, lane by lane.
 #[derive(Debug, Default)]
 pub struct PeakSquares {

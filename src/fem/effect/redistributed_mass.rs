@@ -12,6 +12,10 @@ use crate::{fem::space::CellMatrix, mesh::Mesh};
 #[derive(Debug, Clone, PartialEq)]
 pub struct RedistributedMass<const D: usize> {
     cells: Vec<Change>,
+    /// Whether the mass is taken from each local node.
+    is_massless: Vec<bool>,
+    /// A cell that keeps its mass, because it is to be taken from all of its nodes.
+    pub keeps_mass: Option<usize>,
 }
 
 /// The change of the mass matrix of a cell.
@@ -28,24 +32,33 @@ impl<const D: usize> RedistributedMass<D> {
     /// cell that has no other nodes keeps its mass.
     pub fn new(
         mesh: &Mesh<D>,
-        is_massless: &[bool],
+        is_massless: Vec<bool>,
         mut add_mass: impl FnMut(usize, &mut CellMatrix<D>),
     ) -> Self {
         let mut matrix = CellMatrix::new(mesh);
         let mut cells = Vec::new();
+        let mut keeps_mass = None;
         for cell in 0..mesh.cell_count() {
             let nodes: Vec<u32> = mesh.cell_nodes(cell).collect();
-            let is_massless: Vec<bool> = nodes.iter().map(|node| is_massless[*node as usize]).collect();
-            let others = is_massless.iter().filter(|massless| !**massless).count();
+            let of_cell: Vec<bool> = nodes.iter().map(|node| is_massless[*node as usize]).collect();
+            let others = of_cell.iter().filter(|massless| !**massless).count();
+            if others == 0 {
+                keeps_mass = Some(cell);
+            }
             if others == 0 || others == nodes.len() {
                 continue;
             }
             matrix.clear();
             add_mass(cell, &mut matrix);
             let mass = |a: usize, b: usize| matrix.blocks[a][b][0][0];
-            cells.push(Change { cell, entries: change(&is_massless, mass), nodes });
+            cells.push(Change { cell, entries: change(&of_cell, mass), nodes });
         }
-        Self { cells }
+        Self { cells, is_massless, keeps_mass }
+    }
+
+    /// Whether the mass is taken from a local node.
+    pub fn is_massless(&self, node: usize) -> bool {
+        self.is_massless[node]
     }
 
     /// Adds `factor` times the change of the mass matrix times the nodal values that `x` gives to `forces`; both with ghosts.
@@ -127,7 +140,7 @@ mod tests {
         let geometry = Geometry::new(mesh);
         let is_massless: Vec<bool> = (0..mesh.nodes.len()).map(|node| node % (D + 2) == 0).collect();
         let add_mass = |cell: usize, matrix: &mut CellMatrix<D>| matrix.add_mass(geometry.cell_at(cell), 1.7);
-        let redistributed = RedistributedMass::new(mesh, &is_massless, add_mass);
+        let redistributed = RedistributedMass::new(mesh, is_massless.clone(), add_mass);
         let times_mass = |x: &[f64]| {
             let mut force = vec![0.0; x.len()];
             let mut matrix = CellMatrix::new(mesh);

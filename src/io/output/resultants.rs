@@ -6,7 +6,7 @@ use crate::{
     fem::{
         body::Body,
         effect::ContactAreas,
-        resultants::{Resultants, Source, VelocityChange},
+        resultants::{BalancedMotion, Resultants, Source},
         state::State,
     },
     job::Job,
@@ -85,10 +85,10 @@ impl<const D: usize> ResultantTable<D> {
         session: &Session,
         body: &Body<D, S>,
         state: &State,
-        change: VelocityChange<'_>,
+        motion: BalancedMotion<'_>,
         load: Option<&DistributedVector>,
     ) -> Result<(), Agreed> {
-        self.resultants.update(session, body, state, change, load)?;
+        self.resultants.update(session, body, state, motion, load)?;
         let Self { resultants, names, with, file } = self;
         let written: Result<()> = file.as_mut().map_or(Ok(()), |file| {
             let rows = resultants.sources().iter().zip(resultants.rows());

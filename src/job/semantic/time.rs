@@ -1,7 +1,8 @@
 //! Checks of time, solver and checkpoints.
 
-use super::findings::Findings;
+use super::findings::{Findings, items};
 use crate::job::{report::Fault, source::Value};
+use crate::laws::schemes::Scheme;
 
 /// Largest accepted number of fixed steps.
 const MOST_STEPS: f64 = 1e12;
@@ -11,6 +12,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     check_steps(findings);
     check_landings(findings);
     check_checkpoint(findings);
+    check_midpoint(findings);
     if let Some(Value::Table(options)) = findings.root.find("solver.petsc").map(|node| &node.value) {
         for (key, node) in options {
             if key.is_empty() || key.starts_with('-') || key.contains(char::is_whitespace) {
@@ -98,5 +100,38 @@ fn check_checkpoint(findings: &mut Findings<'_>) {
     if !["every", "interval", "at", "wall_limit", "margin"].into_iter().any(present) {
         let help = "add every = 64 (steps) or interval = 1800.0 (seconds of wall time)";
         findings.fault("checkpoint", "[checkpoint] does not state when to save", help);
+    }
+}
+
+/// What cannot be extrapolated from the midpoint of a step is refused: histories that change in one direction only, and velocities that
+/// jump.
+fn check_midpoint(findings: &mut Findings<'_>) {
+    let root = findings.root;
+    let scheme: Scheme = root.read("time.scheme").unwrap_or_default();
+    if !scheme.is_midpoint() {
+        return;
+    }
+    let materials = std::iter::once("material".to_owned());
+    let materials =
+        materials.chain(items(root, "region").into_iter().map(|region| format!("{region}.material")));
+    let keys = |tables: Vec<String>, keys: &'static [&'static str]| {
+        tables.into_iter().flat_map(move |table| keys.iter().map(move |key| format!("{table}.{key}")))
+    };
+    let unsupported = keys(materials.collect(), &["damage"])
+        .chain(keys(items(root, "contact"), &["adhesion", "memory", "obstacle_load"]))
+        .chain(keys(items(root, "support"), &["displacement", "velocity"]))
+        .chain(["time.adaptive".to_owned()]);
+    for path in unsupported.filter(|path| root.find(path).is_some()) {
+        let message = format!("`{path}` is not available with scheme \"{}\"", scheme.name());
+        findings.fault_at_key(&path, message, "use [time] scheme = \"bdf2\", or delete the key");
+    }
+    for contact in items(root, "contact") {
+        if !root.read(&format!("{contact}.redistribute_mass")).unwrap_or(false) {
+            let message = format!(
+                "with scheme \"{}\" nodes with mass would rebound from the obstacle in each step",
+                scheme.name()
+            );
+            findings.fault_at_key(&contact, message, "add redistribute_mass = true, or use another scheme");
+        }
     }
 }

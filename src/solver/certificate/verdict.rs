@@ -97,7 +97,9 @@ impl Verdict {
         );
         self.words.push(found.clone());
         let largest = unique_step.map_or_else(
-            || "no step is small enough without [material] density".to_owned(),
+            || "no step is small enough where contact boundaries have no inertia, for want of [material] density or by \
+             redistribute_mass"
+                .to_owned(),
             |largest| format!("the largest step with one solution is {largest:.4e} s"),
         );
         self.judge(

@@ -15,8 +15,8 @@ use crate::{
     error::Result,
     fem::{
         body::Body,
-        effect::{Blend, Energy, Evaluation, Form, Step},
-        resultants::VelocityChange,
+        effect::{Blend, ENERGIES, Energy, Evaluation, Form, NUMERICAL, Peaks, Role, Step},
+        resultants::BalancedMotion,
         space::Nodal,
         state::State,
     },
@@ -27,6 +27,8 @@ use crate::{
 /// Work vectors, and the energy terms of a step that depend on the state before it.
 pub(super) struct Implicit {
     formula: fn(Step) -> Blend,
+    /// Whether the equations hold at the midpoint of a step.
+    is_midpoint: bool,
     /// The blend of the current step.
     blend: Blend,
     /// `u~` and `v~`, with ghosts.
@@ -44,10 +46,11 @@ pub(super) struct Implicit {
 
 impl Implicit {
     /// Vectors with the layout of those of the state.
-    pub(super) fn new(state: &State, formula: fn(Step) -> Blend) -> Result<Self> {
+    pub(super) fn new(state: &State, formula: fn(Step) -> Blend, is_midpoint: bool) -> Result<Self> {
         let like = || state.velocity.like();
         Ok(Self {
             formula,
+            is_midpoint,
             blend: Blend::euler(0.0),
             displacement: like()?,
             velocity: like()?,
@@ -61,6 +64,17 @@ impl Implicit {
     /// `k'`.
     pub(super) fn matrix_length(&self, step: Step) -> f64 {
         (self.formula)(step).length
+    }
+
+    /// The part of a step at whose end its equations hold.
+    fn balanced(&self, step: Step) -> Step {
+        let length = 0.5 * step.length;
+        if self.is_midpoint { Step { time: step.time - length, length, ..step } } else { step }
+    }
+
+    /// The time in s at which the equations of a step hold.
+    pub(super) fn balanced_time(&self, step: Step) -> f64 {
+        self.balanced(step).time
     }
 
     /// Adds `M v~ / k' - B^T s~`.
@@ -83,7 +97,8 @@ impl Implicit {
             velocity: &velocity,
             previous_velocity: &velocity,
         };
-        (_, self.squares) = body.add_start_forces(Evaluation::Start(self.blend), nodal, step, forces);
+        let at = Evaluation::Start(self.blend);
+        (_, self.squares) = body.add_start_forces(at, nodal, self.balanced(step), forces);
         Ok(())
     }
 
@@ -145,7 +160,7 @@ impl Implicit {
             velocity: &velocity,
             previous_velocity: &previous_velocity,
         };
-        body.add_implicit_energy(nodal, step, &mut self.solved);
+        body.add_implicit_energy(nodal, self.balanced(step), &mut self.solved);
         Ok(())
     }
 
@@ -154,9 +169,53 @@ impl Implicit {
         state.commit(solved, Some(&self.end), step)
     }
 
-    /// The change of the velocity from the start of the step just committed.
-    pub(super) fn velocity_change(&self) -> VelocityChange<'_> {
-        VelocityChange { before: &self.velocity, length: self.blend.length }
+    /// The motion at which the forces of the step just committed are balanced, given the solved velocity.
+    pub(super) fn balanced_motion<'a>(
+        &'a self,
+        state: &State,
+        velocity: &'a DistributedVector,
+    ) -> BalancedMotion<'a> {
+        let step = Step { time: state.time, length: state.step_length, previous_length: 0.0 };
+        BalancedMotion {
+            time: self.balanced_time(step),
+            displacement: &self.end,
+            velocity,
+            before: &self.velocity,
+            length: self.blend.length,
+        }
+    }
+
+    /// Adds the energies of the solved step that need the state before it to those of the step just committed.
+    ///
+    /// Those of a midpoint are of half a step. Energies are quadratic in what is extrapolated from it, so that their changes in the whole
+    /// step are the works at the midpoint: of the terms of the scheme only those of contact remain.
+    pub(super) fn add_solved(&self, energy: &mut Energy) {
+        *energy += self.solved;
+        if self.is_midpoint {
+            *energy += self.solved;
+            energy[NUMERICAL] = 0.0;
+        }
+    }
+
+    /// Extrapolates a step committed at its midpoint to its end. Stored energies become those at the end; gives the peaks there.
+    pub(super) fn extrapolate<const D: usize, const S: usize>(
+        &self,
+        body: &mut Body<D, S>,
+        state: &mut State,
+        step: Step,
+        energy: &mut Energy,
+    ) -> Result<Peaks> {
+        if !self.is_midpoint {
+            return Ok(Peaks::default());
+        }
+        let mass = body.redistributed_mass.as_ref();
+        state.extrapolate::<D>(step.length, |node| mass.is_some_and(|mass| mass.is_massless(node)))?;
+        body.extrapolate_histories();
+        let (end, peaks) = body.energy_beside(state, step)?;
+        for &kind in ENERGIES.iter().filter(|kind| kind.role == Role::Stored) {
+            energy[kind] = end[kind];
+        }
+        Ok(peaks)
     }
 
     /// `M v_n . (v_n - v_{n-1} - k v'_n)` of this rank's cells; 0 for steps of implicit Euler.

@@ -9,7 +9,7 @@ use crate::{
     fem::{
         body::Body,
         effect::{Blend, Energy, Evaluation, NUMERICAL, Peaks, Step},
-        resultants::VelocityChange,
+        resultants::BalancedMotion,
         state::State,
     },
     job::Scheme,
@@ -34,7 +34,7 @@ impl Integrator {
     pub(super) fn new(scheme: Scheme, state: &State) -> Result<Self> {
         Ok(match scheme.formula() {
             None => Self::LaggedEuler(LaggedEuler::default()),
-            Some(blend) => Self::Implicit(Box::new(Implicit::new(state, blend)?)),
+            Some(blend) => Self::Implicit(Box::new(Implicit::new(state, blend, scheme.is_midpoint())?)),
         })
     }
 
@@ -124,33 +124,50 @@ impl Integrator {
         }
     }
 
-    /// The change of the velocity in the step just committed.
-    pub(super) fn velocity_change<'a>(&'a self, state: &'a State) -> VelocityChange<'a> {
+    /// The time in s at which the equations of a step hold.
+    pub(super) fn balanced_time(&self, step: Step) -> f64 {
         match self {
-            Self::LaggedEuler(_) => {
-                VelocityChange { before: &state.previous_velocity, length: state.step_length }
-            }
-            Self::Implicit(scheme) => scheme.velocity_change(),
+            Self::LaggedEuler(_) => step.time,
+            Self::Implicit(scheme) => scheme.balanced_time(step),
         }
     }
 
-    /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks.
-    /// Collective.
-    pub(super) fn energy<const D: usize, const S: usize>(
+    /// The motion at which the forces of the step just committed are balanced, given the solved velocity.
+    pub(super) fn balanced_motion<'a>(
+        &'a self,
+        state: &'a State,
+        solved: &'a DistributedVector,
+    ) -> BalancedMotion<'a> {
+        match self {
+            Self::LaggedEuler(_) => BalancedMotion {
+                time: state.time,
+                displacement: &state.displacement,
+                velocity: &state.velocity,
+                before: &state.previous_velocity,
+                length: state.step_length,
+            },
+            Self::Implicit(scheme) => scheme.balanced_motion(state, solved),
+        }
+    }
+
+    /// Energies of the step just committed without the work of the loads, and its largest stress and strain, over all ranks; extrapolates
+    /// a step that was solved at its midpoint to its end. Collective.
+    pub(super) fn complete<const D: usize, const S: usize>(
         &mut self,
         session: &Session,
-        body: &Body<D, S>,
-        state: &State,
+        body: &mut Body<D, S>,
+        state: &mut State,
         step: Step,
     ) -> Result<(Energy, Peaks)> {
-        let (mut energy, peaks) = body.energy(state, step)?;
-        energy += match self {
-            Self::LaggedEuler(scheme) => scheme.explicit,
-            Self::Implicit(scheme) => scheme.solved,
-        };
+        let (mut energy, mut peaks) = body.energy(state, step)?;
+        match self {
+            Self::LaggedEuler(scheme) => energy += scheme.explicit,
+            Self::Implicit(scheme) => scheme.add_solved(&mut energy),
+        }
         add_contact_energy(body, state, step, &mut energy)?;
         if let Self::Implicit(scheme) = self {
             energy[NUMERICAL] += scheme.momentum_term(body, state, step)?;
+            peaks = peaks.or(scheme.extrapolate(body, state, step, &mut energy)?);
         }
         Ok(over_ranks(session, energy, peaks))
     }

@@ -20,7 +20,7 @@ use crate::{
     fem::{
         body::{Body, PassBytes},
         effect::{LoadedMotion, Step, WORK},
-        resultants::VelocityChange,
+        resultants::BalancedMotion,
         state::State,
     },
     job::{Accept, Scheme},
@@ -152,9 +152,9 @@ impl Stepper {
         self.load.as_ref()
     }
 
-    /// The change of the velocity in the step just committed to the state.
-    pub fn velocity_change<'a>(&'a self, state: &'a State) -> VelocityChange<'a> {
-        self.integrator.velocity_change(state)
+    /// The motion at which the forces of the step just committed to the state are balanced.
+    pub fn balanced_motion<'a>(&'a self, state: &'a State) -> BalancedMotion<'a> {
+        self.integrator.balanced_motion(state, &self.trial)
     }
 
     /// The preconditioner in use, and the reason for it.
@@ -420,11 +420,11 @@ impl Stepper {
         let balancing = Instant::now();
         self.clock.solve += balancing - solving;
         let _stage = self.stages.balance.enter()?;
-        (outcome.energy, outcome.peaks) = self.integrator.energy(session, body, state, step)?;
+        (outcome.energy, outcome.peaks) = self.integrator.complete(session, body, state, step)?;
         self.traffic.balance += self.passes.energy;
         outcome.energy[WORK] += work;
         if let Some(load) = &self.load {
-            outcome.energy[WORK] += step.length * load.dot(&state.velocity)?;
+            outcome.energy[WORK] += step.length * load.dot(&self.trial)?;
             self.traffic.balance += 2 * vector_bytes(body);
         }
         self.clock.balance += balancing.elapsed();
@@ -442,7 +442,7 @@ impl Stepper {
         if let Some(load) = &mut self.load
             && !self.load_is_current
         {
-            session.agree(body.write_loads(step.time, load))?;
+            session.agree(body.write_loads(self.integrator.balanced_time(step), load))?;
             self.load_is_current = body.load.is_steady();
         }
         {
