@@ -1,21 +1,21 @@
 #!/bin/bash
-# Runs a job under PBS (OpenPBS, PBS Professional) and, when the time limit comes first, submits itself again to continue
-# from the checkpoint.
+# Runs a job under PBS (OpenPBS, PBS Professional). If the time limit comes first, the script resubmits itself to continue from
+# the checkpoint.
 #
 #   qsub -v JOB=job.toml jobs/cluster/pbs.sh
 #   qsub -v JOB=job.toml -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 jobs/cluster/pbs.sh
 #
 # Paths are relative to the folder of the submission. More variables for -v:
 #   SOLVER     the binary (default: solver)
-#   LAUNCHER   what starts the ranks (default: mpirun; where Open MPI was built without PBS support,
+#   LAUNCHER   the command that starts the ranks (default: mpirun; if Open MPI was built without PBS support,
 #              "mpirun --hostfile $PBS_NODEFILE", already expanded)
-#   OUTPUT     the job's output folder (default: what `solver check` says, which sets the problem up once more)
+#   OUTPUT     the job's output folder (default: asks `solver check`, which repeats the set-up of the problem)
 #   RESTART    yes: continue from a checkpoint (set by the resubmission)
 #   SCRIPT     this file, for the resubmission (default: jobs/cluster/pbs.sh)
 #   MARGIN     seconds before the limit at which the ranks are asked to stop (default: 120)
 #
-# Not yet run under a real PBS, only with stand-ins for qstat and qsub. Some clusters refuse qsub on compute nodes: then
-# submit again by hand with -v RESTART=yes.
+# Tested only with substitutes for qstat and qsub, not under a real PBS. Some clusters refuse qsub on compute nodes: resubmit by
+# hand with -v RESTART=yes.
 #
 #PBS -N clarke
 #PBS -l select=1:ncpus=2:mpiprocs=2
