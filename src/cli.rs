@@ -130,8 +130,8 @@ enum Command {
         #[arg(long)]
         contours: bool,
     },
-    /// Write the cell sizes with which the stress of a run would have a wanted error, for `gmsh -bgm`. The run needs `[output]
-    /// error_indicator = true`.
+    /// Write the cell sizes for a target error of the stress of a run, for `gmsh -bgm`. The run needs `[output] error_indicator =
+    /// true`.
     Remesh {
         /// Output folder of the run.
         folder: PathBuf,

@@ -7,16 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::job::Scalar;
 
-/// A support: boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots. A support
-/// has `fix`, or one or more of `stiffness`, `damping` and `absorbing`.
+/// A support: boundaries with fixed or prescribed components of the displacement, or with springs and dashpots. A support has
+/// `fix`, or one or more of `stiffness`, `damping` and `absorbing`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
     /// The names of the boundaries; with `fix` also of points and, in 3D, curves: Gmsh's physical points and curves that have a name.
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
-    /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not 0,
-    /// such as those of an edge or a single one; otherwise the facets at whose centre it is not 0. Absent: the whole boundaries.
+    /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not
+    /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. Absent: the whole
+    /// boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
     #[schemars(example = "x < 1", example = "hypot(x - 1, y) < 1e-6")]
     pub part: Option<Scalar>,
@@ -26,9 +27,9 @@ pub struct Support {
     #[schemars(example = &"all", example = ["x"])]
     pub fix: Option<Fix>,
     /// The displacement of the fixed components, one number or expression in t, x, y, z for each of them: in the order of the list
-    /// `fix`, along x, y, z for "all", one along the outward normal for "normal". It holds at time 0, too, in place of the initial
-    /// displacement; after `initial.from` the first step reaches it. The work of the support is part of `external_work`. Absent: the
-    /// components do not move.
+    /// `fix`, along x, y, z for "all", one along the outward normal for "normal". At time 0 it replaces the initial displacement;
+    /// after `initial.from` it applies from the end of the first step. The work of the support is part of `external_work`. Absent:
+    /// the components do not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = ["0.01*min(t/0.1, 1)"])]
     pub displacement: Option<Vec<Scalar>>,
@@ -44,9 +45,9 @@ pub struct Support {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "Pa s/m"))]
     pub damping: Option<Resistance>,
-    /// Whether waves leave the body through these boundaries. Adds the dashpots of Lysmer and Kuhlemeyer (1969): density times the
-    /// speed of pressure waves along the normal, density times the speed of shear waves along the boundary, of the elastic material
-    /// behind the boundary. Waves are absorbed completely where they arrive along the normal.
+    /// Whether the boundary absorbs waves (dashpots of Lysmer and Kuhlemeyer). Adds the dashpots of Lysmer and Kuhlemeyer (1969):
+    /// density times the speed of pressure waves along the normal, density times the speed of shear waves along the boundary, of
+    /// the elastic material behind the boundary. Waves at normal incidence are absorbed completely.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub absorbing: bool,
 }
@@ -85,8 +86,8 @@ pub enum Fix {
 pub enum FixedDirections {
     /// All components.
     All,
-    /// The normal component. Where the boundary is curved, a node has the mean normal of the facets around it; where facets turn by more
-    /// than 40 degrees it is held along the normals of both.
+    /// The normal component. Where the boundary is curved, a node has the mean normal of the adjacent facets; where their normals
+    /// differ by more than 40 degrees, it is fixed along each of them.
     Normal,
 }
 
@@ -151,9 +152,9 @@ pub struct BodyForce {
 #[serde(deny_unknown_fields)]
 pub struct Initial {
     /// The last state of another run, from which this one starts at time 0: a checkpoint, or an output folder for its newest
-    /// checkpoint. The mesh must be the same; loads, supports, contacts, laws and scheme may differ. Histories that this job does not
-    /// have are dropped, those that only this job has start at rest; the log names both. Components held by supports keep the saved
-    /// displacement. Not together with the other keys of this table.
+    /// checkpoint. The mesh must be the same; loads, supports, contacts, laws and scheme may differ. Histories that this job does
+    /// not have are dropped, those that only this job has start from their initial values; the log names both. Components held by
+    /// supports keep the saved displacement. Not together with the other keys of this table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("format" = "path"), example = "out/first_stage", example = "out/first_stage/checkpoint-64.h5")]
     pub from: Option<PathBuf>,

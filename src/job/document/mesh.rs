@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 /// The mesh of the body: a generated rectangle or box, or a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mesh {
-    /// Order of the shape functions of displacement and velocity. 1: linear, with constant strain in a cell. 2: quadratic, with a node
-    /// on each edge and 3 (triangle) or 4 (tetrahedron) stress points in a cell; such cells do not lock for nearly incompressible
-    /// bodies and volume-preserving flow, and one costs as much as about 4 (triangle) or 8 (tetrahedron) linear ones.
+    /// Order of the shape functions of displacement and velocity. 1: linear, with constant strain in a cell. 2: quadratic, with a
+    /// node on each edge and 3 (triangle) or 4 (tetrahedron) integration points in a cell. Quadratic cells hardly lock in nearly
+    /// incompressible bodies and isochoric flow; one costs as much as about 4 (triangle) or 8 (tetrahedron) linear cells.
     #[serde(default = "linear", skip_serializing_if = "is_linear")]
     #[schemars(range(min = 1, max = 2))]
     pub order: u8,
@@ -73,7 +73,7 @@ pub enum Partition {
     Auto,
     /// Rank 0 generates the whole mesh, METIS partitions its cells, and rank 0 sends each rank its part.
     Metis,
-    /// Each rank generates the cells of its own box; no rank holds the whole mesh. Suitable for large meshes.
+    /// Each rank generates the cells of its own box; no rank stores the whole mesh. Suitable for large meshes.
     Grid,
 }
 

@@ -39,7 +39,7 @@ pub struct Job {
     pub mesh: Mesh,
     /// The material of all cells that belong to no `[[region]]`.
     pub material: Material,
-    /// Parts of the body with another material, named by the physical groups of the mesh.
+    /// Regions of the body with their own material, named by the physical groups of the mesh.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub region: Vec<Region>,
     /// Boundaries on which components of the displacement are held or moved, or which rest on springs and dashpots.

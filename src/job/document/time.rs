@@ -68,13 +68,13 @@ pub struct Solver {
     pub method: Method,
     /// The preconditioner of the linear systems.
     pub preconditioner: Preconditioner,
-    /// The precision of the matrix factor for steps with contact. It applies with preconditioner cholesky on one rank, and on
-    /// several ranks with at most 50,000 velocity components; otherwise factors are in double precision.
+    /// The precision of the matrix factor for steps with contact. It applies with preconditioner cholesky; factors of MUMPS are in
+    /// double precision.
     pub factor_precision: FactorPrecision,
     /// Number of Newton iterations after which a step fails.
     #[schemars(range(min = 1))]
     pub max_newton_iterations: u32,
-    /// How the dependence of friction bounds on the contact pressure is solved (laws coulomb and slip_weakening).
+    /// How the dependence of friction bounds on the contact pressure is solved (all laws except tresca).
     pub friction: FrictionIteration,
     /// Limits of the certificates, which `solver check` prints, that the job may exceed. Without an entry in this list, such a job
     /// is refused.
@@ -140,8 +140,8 @@ pub enum FactorPrecision {
     /// Single precision for large 3D problems in which it is faster, double precision otherwise.
     #[default]
     Auto,
-    /// Single precision, which needs half the memory and half the time of a solve. Solutions are refined until the residual in
-    /// double precision is small. If the refinement fails, the matrix is factored again in double precision.
+    /// Single precision: half the memory, and half the time of a solve. Solutions are refined until the residual in double
+    /// precision is small. If the refinement fails, the matrix is factored again in double precision.
     Single,
     /// Double precision, as all other numbers.
     Double,

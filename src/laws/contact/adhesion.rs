@@ -46,10 +46,10 @@ pub struct Adhesion {
     /// Dupré's energy of adhesion: the energy that separates a unit of area slowly.
     #[schemars(range(min = 0), extend("unit" = "J/m^2"), example = 10.0)]
     pub energy: f64,
-    /// Largest normal traction of the bonds, as in a bilinear cohesive law: the traction grows with `stiffness` up to `strength`, then
-    /// decreases linearly, and vanishes at the opening `2 energy / strength`. Where the opening shrinks, the traction follows the
-    /// straight line to the origin. Sliding counts as the opening that stores the same energy. Requires `energy` above
-    /// `strength^2 / (2 stiffness)`; excludes `viscosity` and `length`. Absent: bonds give way as `energy` and `viscosity` determine.
+    /// Largest normal traction of the bonds, as in a bilinear cohesive law: the traction grows with `stiffness` up to `strength`,
+    /// then decreases linearly, and vanishes at the opening `2 energy / strength`. Unloading follows the secant to the origin.
+    /// Sliding counts as the opening that stores the same energy. Requires `energy` above `strength^2 / (2 stiffness)`; excludes
+    /// `viscosity` and `length`. Absent: `energy` and `viscosity` govern debonding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "Pa", "exclusiveMinimum" = 0), example = 2e6)]
     pub strength: Option<f64>,

@@ -44,8 +44,8 @@ normal_laws! {
     /// Pressure as a piecewise linear function of the normal velocity, given by its corners, which may decrease and have upward
     /// jumps.
     Graph = "graph",
-    /// Pressure as a piecewise linear function of the normal displacement, given by its corners, which may pull, decrease and have
-    /// upward jumps: delamination, nonmonotone compliance.
+    /// Pressure as a piecewise linear function of the normal displacement, given by its corners, which may be tensile, decrease and
+    /// have upward jumps: delamination, nonmonotone compliance.
     DisplacementGraph = "displacement_graph",
     /// An elastic foundation: the pressure is stiffness times the penetration beyond the gap to the power of the exponent.
     Compliance = "compliance",
@@ -60,7 +60,7 @@ friction_laws! {
     Coulomb = "coulomb",
     /// A friction coefficient that decreases with the sliding velocity v: dynamic + (static - dynamic) exp(-v / decay_velocity).
     SlipWeakening = "slip_weakening",
-    /// A friction coefficient that decreases with the slip, the length of the way that a point has slid: the law of dynamic rupture.
+    /// A friction coefficient that decreases with the accumulated slip distance of a point: the law of dynamic rupture.
     DistanceWeakening = "distance_weakening",
     /// A friction coefficient that depends on the sliding velocity and on a state that evolves with slip and time: the law of faults.
     RateAndState = "rate_and_state",

@@ -21,9 +21,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// Initial rate of the memory pressure per normal displacement. Against a displacement held for a long time, the foundation
-    /// acts as a spring of stiffness `stiffness_rate decay_time`. Because the pressure lags behind the displacement, it adds energy
-    /// to oscillations, for any step length; the normal law or the body must dissipate this energy.
+    /// Initial rate of the memory pressure per normal displacement. Against a displacement that is kept for a long time, the
+    /// foundation acts as a spring of stiffness `stiffness_rate decay_time`. Because the pressure lags behind the displacement, it
+    /// adds energy to oscillations, for any step length; the normal law or the body must dissipate this energy.
     #[schemars(range(min = 0), extend("unit" = "Pa/(m s)"), example = 1e4)]
     pub stiffness_rate: f64,
     /// Time in which the memory pressure decays to 1/e without further penetration.

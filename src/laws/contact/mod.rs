@@ -55,24 +55,25 @@ pub struct Contact {
     pub quadrature: Quadrature,
     /// The normal law: the contact pressure -sigma_nu as a function of the normal velocity or the normal displacement.
     pub normal: NormalLaw,
-    /// Whether the mass of these boundaries is moved to the other nodes of their cells (mass redistribution), so that impacts do not lose
-    /// its kinetic energy and the contact pressure does not oscillate. Total mass stays the same. Requires an implicit scheme.
+    /// Whether the mass of these boundaries is moved to the other nodes of their cells (mass redistribution), so that the boundary
+    /// loses no kinetic energy in impacts and the contact pressure does not oscillate. Total mass stays the same. Requires an
+    /// implicit scheme.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub redistribute_mass: bool,
     /// A rigid obstacle, which may move. It replaces the key `gap` of the normal laws `compliance`, `displacement_graph` and `unilateral`;
     /// other normal laws have no distance to an obstacle. Absent: `gap` applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Gap>,
-    /// A force that moves the obstacle, such as indentation or punching by force, or a moment that turns it, such as rolling. Its
-    /// displacement and velocity, angle and angular velocity are in `resultants.csv`. Absent: the obstacle moves as its keys prescribe.
+    /// A force that moves the obstacle (indentation), or a moment that turns it (rolling). Its displacement and velocity, angle and
+    /// angular velocity are in `resultants.csv`. Absent: the obstacle moves as its keys prescribe.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle_load: Option<ObstacleLoad>,
     /// The friction law: the bound on the tangential traction sigma_tau. Absent: no friction, sigma_tau = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionLaw>,
-    /// Wear: the body's surface recedes where it slides under pressure, which widens the gap. The depth grows by `coefficient` times the
-    /// contact pressure times the length of sliding relative to the obstacle (Archard's law); fields have it as `wear`. Requires a friction
-    /// law and a normal law with a gap. Absent: no wear.
+    /// Wear: the body's surface recedes where it slides under pressure, so that the gap widens. The depth grows by `coefficient`
+    /// times the contact pressure times the length of sliding relative to the obstacle (Archard's law); fields have it as `wear`.
+    /// Requires a friction law and a normal law with a gap. Absent: no wear.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wear: Option<Wear>,
     /// Adhesion to an obstacle at rest: bonds that form at displacement zero, resist opening and sliding, and break. The bonding b

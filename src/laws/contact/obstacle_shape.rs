@@ -13,13 +13,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{path::PathBuf, sync::Arc};
 
-/// An obstacle of any shape, given by the distance from its surface: by either `distance` or `surface`.
+/// An obstacle of any shape, given by its signed distance: by either `distance` or `surface`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
     /// The distance from the surface, positive outside of the obstacle and negative inside, as an expression in x, y, z relative to
-    /// `centre`. It may be less than the distance, not more: between two places it changes by at most the way between them, as do
-    /// distances and their `min` (union) and `max` (intersection).
+    /// `centre`. A lower bound of the distance suffices: the expression must have the Lipschitz constant 1, as distances, their
+    /// `min` (union) and their `max` (intersection) have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m"), example = "sqrt(x^2 + z^2) - 0.1")]
     pub distance: Option<Scalar>,
@@ -33,13 +33,14 @@ pub struct Shape {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1e-3)]
     pub scale: Option<f64>,
-    /// The place of the origin of `distance` or `surface`, one component per axis: numbers, or expressions in t. Absent: the origin.
+    /// The position of the origin of `distance` or `surface`, one component per axis: numbers, or expressions in t. Absent: the
+    /// origin.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "m"), example = serde_json::json!([0.5, 0.0, "-1.01 + 0.1*t"]))]
     pub centre: Vec<Scalar>,
     /// Angular velocity of the rotation about the centre, counterclockwise; in 3D about `axis`, as seen against its direction: a
-    /// number, or an expression in t. It affects friction only: the shape itself does not turn, and should be round about the axis.
-    /// Absent: 0.
+    /// number, or an expression in t. It affects friction only: the geometry does not rotate; it should be axisymmetric about the
+    /// axis. Absent: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "rad/s"), example = "-2*t")]
     pub rotation: Option<Scalar>,

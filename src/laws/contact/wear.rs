@@ -19,8 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wear {
-    /// Depth of wear per pressure and length of sliding: the volume worn off per normal force and length, or Archard's factor over the
-    /// hardness.
+    /// Specific wear rate: worn volume per normal force and slip distance, or Archard's coefficient divided by the hardness.
     #[schemars(range(min = 0), extend("unit" = "1/Pa"), example = 1e-13)]
     pub coefficient: f64,
 }

@@ -34,7 +34,7 @@ pub struct Damage {
     #[serde(default)]
     #[schemars(range(min = 0, max = 10), example = 1.0)]
     pub exponent: f64,
-    /// Upper bound of the damage. The remaining stiffness keeps broken cells from moving freely.
+    /// Upper bound of the damage. The residual stiffness prevents rigid motions of broken cells.
     #[serde(default = "nearly_all")]
     #[schemars(range(min = 0), extend("exclusiveMaximum" = 1), example = 0.99)]
     pub largest: f64,

@@ -31,7 +31,7 @@ pub struct Study {
     #[serde(default)]
     #[schemars(extend("key_help" = "quote the whole key: \"time.step\" = [0.1, 0.2]"))]
     pub sweep: BTreeMap<String, Values>,
-    /// Quantities that responses.csv and a table show for each run, and charts over each key of a sweep that has numbers.
+    /// Quantities reported for each run in responses.csv and a table, and in charts over each numeric key of the sweep.
     #[serde(default)]
     pub response: Vec<Response>,
     /// The solution with which runs are compared. Absent: runs are timed only, and contain the fields of their last state only.
@@ -128,7 +128,7 @@ pub struct Product {
     /// Time schemes.
     #[schemars(example = ["lagged_euler", "bdf2"])]
     pub schemes: Vec<Scheme>,
-    /// Tolerances of the solver, from loose to tight. They show from which tolerance on the solver's error affects the results.
+    /// Tolerances of the solver, from loose to tight. They show at which tolerance the error of the solver becomes significant.
     #[schemars(transform = positive_items, example = [1e-4, 1e-7, 1e-10])]
     pub tolerances: Vec<f64>,
 }

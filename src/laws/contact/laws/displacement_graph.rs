@@ -23,9 +23,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DisplacementGraph {
-    /// Corners [penetration, pressure] of the polyline, with ascending penetrations, negative where the boundary is away from the
-    /// obstacle. A negative pressure pulls. The first pressure is 0, as are all pressures before it. Two corners with the same
-    /// penetration define an upward jump.
+    /// Corners [penetration, pressure] of the polyline, with ascending penetrations, negative where the gap is open. A negative
+    /// pressure is tensile. The first pressure is 0, as are all pressures before it. Two corners with the same penetration define
+    /// an upward jump.
     #[schemars(length(min = 1), extend("unit" = "[m, Pa]"), example = [[-2e-3, 0.0], [-1e-3, -50.0], [0.0, 0.0]])]
     pub points: Vec<[f64; 2]>,
     /// Slope of the pressure at penetrations beyond the last corner; infinite for a rigid obstacle.

@@ -29,8 +29,8 @@ pub enum Decay {
     Exponential,
 }
 
-/// Friction whose coefficient decreases from static to dynamic with the slip, the length of the way that a point has slid. Field files
-/// and checkpoints contain the slip as `slip`.
+/// Friction whose coefficient decreases from static to dynamic with the accumulated slip distance of a point. Field files and
+/// checkpoints contain the slip as `slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceWeakening {
@@ -38,7 +38,7 @@ pub struct DistanceWeakening {
     #[serde(rename = "static")]
     #[schemars(range(min = 0), example = 0.6)]
     pub at_rest: f64,
-    /// Friction coefficient after long slip.
+    /// Limit of the friction coefficient at large slip.
     #[schemars(range(min = 0), example = 0.3)]
     pub dynamic: f64,
     /// Slip over which the coefficient decreases.

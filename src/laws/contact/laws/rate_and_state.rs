@@ -48,20 +48,20 @@ pub struct RateAndState {
     /// Friction coefficient of steady sliding at the velocity `velocity`.
     #[schemars(extend("exclusiveMinimum" = 0), example = 0.6)]
     pub reference: f64,
-    /// The velocity to which `reference` belongs.
+    /// Reference velocity, at which the steady coefficient is `reference`.
     #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0), example = 1e-6)]
     pub velocity: f64,
-    /// The direct effect, often called a: increase of the coefficient where the velocity is multiplied by e at once.
+    /// The direct effect, often called a: instantaneous increase of the coefficient when the velocity increases by a factor of e.
     #[schemars(extend("exclusiveMinimum" = 0), example = 0.01)]
     pub direct: f64,
-    /// The evolution effect, often called b: decrease of the coefficient as the state follows. Steady sliding is unstable where it is
-    /// larger than `direct`.
+    /// The evolution effect, often called b: decrease of the coefficient through the evolution of the state after the velocity has
+    /// increased by a factor of e. Above `direct`, friction is velocity-weakening.
     #[schemars(range(min = 0), example = 0.015)]
     pub evolution: f64,
-    /// Slip over which the state changes.
+    /// Critical slip distance, over which the state evolves.
     #[schemars(extend("unit" = "m", "exclusiveMinimum" = 0), example = 1e-5)]
     pub distance: f64,
-    /// The law by which the state changes.
+    /// The evolution law of the state.
     #[serde(default)]
     pub law: Evolution,
     /// The state at the start of the run. Absent: that of steady sliding at `velocity`.

@@ -20,7 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Maxwell's linear relaxation: at constant strain the stress decays as `ds/dt = -dev s / relaxation_time - mean s /
-/// volumetric_relaxation_time`; in plane stress the strain rate is the in-plane part of that of this law.
+/// volumetric_relaxation_time`; in plane stress the in-plane components of this strain rate apply.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Maxwell {
