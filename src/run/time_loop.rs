@@ -140,12 +140,12 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
             self.simulation.advance(self.session).or_else(|error| self.explain(error))?
         {
             let Simulation { state, landings, adaptive, .. } = &self.simulation;
+            self.refuse_overflow()?;
             self.outputs.after_step(self.session, &self.simulation, &outcome)?;
             let has_steps_left = state.time < self.job.time.end;
             let steps_left = landings.steps_after(state.time, state.step_length);
             let last = if adaptive.is_some() { state.step + steps_left } else { last };
             self.report(&outcome, last);
-            self.refuse_overflow()?;
             self.refuse_growth()?;
             let request = self.pending_request(saved_at);
             if let Some(reason) = request.stop

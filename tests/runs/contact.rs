@@ -288,13 +288,71 @@ fn a_disc_and_a_ball_roll_as_fast_as_their_inertia_lets_them() {
     }
 }
 
+/// A block of 0.4 m that slides on two planes with different friction, which meet below its middle.
+fn on_two_planes() -> Case {
+    let plane = |part: &str, coefficient: f64| {
+        format!(
+            "{{on = ['bottom'], where = '{part}', normal = {{unilateral = {{}}}}, \
+             friction = {{coulomb = {{coefficient = {coefficient}}}}}}}"
+        )
+    };
+    Case::of("sliding_block")
+        .set("contact", &format!("[{}, {}]", plane("x < 0.2", 0.5), plane("x > 0.2", 0.25)))
+        .set("time.end", "0.02")
+        .without("output.fields")
+}
+
 #[test]
-fn contacts_with_constraints_that_share_a_node_of_a_smooth_boundary_are_refused() {
-    let case = under_two_discs().set("contact.0.where", "'x < 0.05'").set("contact.1.where", "'x >= 0.05'");
-    for ranks in [1, 2] {
-        let outcome = case.run_with(ranks, &[]).expect(2);
-        outcome
-            .says("two [[contact]] tables meet on a smooth boundary")
-            .says("leave a facet between them out of both");
+fn a_node_between_two_contacts_of_a_smooth_boundary_belongs_to_one_of_them() {
+    let mut alone: Option<Case> = None;
+    for ranks in 1..=3 {
+        let case = on_two_planes().run_and_keep(ranks);
+        let table = case.results().table("resultants.csv");
+        let at_end =
+            |name: &str, column: &str| *table.only("source", name).numbers(column).last().expect("rows");
+        let [left, right] = ["contact bottom", "contact bottom (2)"].map(|name| at_end(name, "force_y"));
+        assert!((left + right - 392.4).abs() < 1e-6, "the weight: {left} N and {right} N");
+        let [area, other] =
+            ["contact bottom", "contact bottom (2)"].map(|name| at_end(name, "touching_area"));
+        assert!((area - 0.2125).abs() < 1e-12 && (other - 0.1875).abs() < 1e-12, "{area} m and {other} m");
+        // The profile has the pressure at each of the 17 nodes, with the friction of the contact that it belongs to.
+        let profile = case.results().table("profiles.csv");
+        let [x, p, q] =
+            ["x", "contact_pressure", "friction_traction_x"].map(|column| profile.numbers(column));
+        let last = x.len() - 17;
+        let mut force = 0.0;
+        for at in last..x.len() {
+            let weight = if at == last || at == x.len() - 1 { 0.0125 } else { 0.025 };
+            force += weight * p[at];
+            let coefficient = if x[at] < 0.201 { 0.5 } else { 0.25 };
+            assert!(
+                (q[at] - coefficient * p[at]).abs() < 1e-6 * p[at],
+                "{} Pa and {} Pa at {}",
+                q[at],
+                p[at],
+                x[at]
+            );
+        }
+        assert!((force - 392.4).abs() < 1e-6, "{force} N");
+        match &alone {
+            None => alone = Some(case),
+            Some(one) => assert_same_answer(&one.results(), &case.results(), 1e-7, &format!("{ranks} ranks")),
+        }
+    }
+}
+
+/// The gap of a node that belongs to no contact is not that of a closed one.
+#[test]
+fn a_profile_has_no_gap_where_there_is_no_contact() {
+    let results = on_two_planes()
+        .set("contact.1.where", "'x > 0.3'")
+        .set("contact.0.where", "'x < 0.1'")
+        .set("contact.0.friction.coulomb.coefficient", "0.25")
+        .set("support", "[{on = ['top'], fix = ['y']}]")
+        .run(2);
+    let profile = results.table("profiles.csv");
+    let gaps = profile.words("gap");
+    for (x, gap) in profile.numbers("x").iter().zip(gaps) {
+        assert_eq!(gap.is_empty(), *x > 0.101 && *x < 0.299, "{gap} at {x}");
     }
 }

@@ -142,8 +142,30 @@ fn friction_that_can_not_be_right_is_refused_in_words() {
     let held = |on: &str, fix: &str| block().set("support", &format!("[{{ on = ['{on}'], fix = {fix} }}]"));
     held("left", "['y']").run_with(1, &[]).expect(2).says("a support fixes the normal component there");
     held("left", "'all'").set("time.end", "0.002").run(1);
-    let brick = Case::of("oblique_sliding").set("contact.0.on", "['bottom', 'left']");
-    brick.run_with(2, &[]).expect(2).says("two boundaries with friction meet at an edge there");
+}
+
+/// A brick is pushed into the edge between a floor and a wall, and along it: both rub, with a given bound. Along the edge itself only
+/// the floor or the wall does, so that 0.04 m^2 of each are missing at most.
+#[test]
+fn two_boundaries_with_friction_meet_at_an_edge() {
+    let make = || {
+        Case::of("oblique_sliding")
+            .set("contact.0.on", "['bottom', 'left']")
+            .set("body_force.0.value", "[-1000.0, 0.0, -1000.0]")
+            .set("initial.velocity", "[0.0, 0.5, 0.0]")
+            .set("time.end", "0.2")
+    };
+    let alone = make().run_and_keep(1);
+    for ranks in [2, 3] {
+        let case = make().run_and_keep(ranks);
+        assert_same_answer(&alone.results(), &case.results(), 1e-7, &format!("{ranks} ranks"));
+    }
+    let forces =
+        alone.results().table("resultants.csv").only("source", "contact bottom, left").numbers("force_y");
+    let force = forces[forces.len() - 1];
+    // 20 Pa on 0.12 m^2 and 0.03 m^2; the nodes of the edge have 0.05 m of the floor and 0.025 m of the wall along 0.3 m.
+    assert!((force + 20.0 * (0.12 + 0.03 - 0.025 * 0.3)).abs() < 1e-6, "{force} N");
+    assert!(alone.results().number("max_energy_imbalance") < 1e-9);
 }
 
 #[test]

@@ -104,6 +104,7 @@ fn scenario() {
         "random_laws" => random_laws::solve(&session),
         "supports" => supports::all(&session),
         "subspace" => subspace::solve(&session),
+        "carried" => resultants::carried(&session),
         "orders_plane" => orders::plane(&session),
         "rejected_steps" => rejected_steps::in_the_plane(&session),
         "failed_set_up" => rejected_steps::after_failures(&session),

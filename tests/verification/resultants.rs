@@ -9,6 +9,7 @@ use clarke::{
         effect::ContactAreas,
         resultants::{Resultants, Source},
     },
+    linear_algebra::tensor::larger,
     mesh::GlobalMesh,
     parallel::session::Session,
 };
@@ -95,6 +96,62 @@ pub fn all(session: &Session) {
     close(along(Source::Traction(0)), 2.4, "pull");
     close(along(Source::Support(0)) + along(Source::Contact(0)), -2.4, "what holds");
     assert!(along(Source::Support(0)) < 0.0 && along(Source::Contact(0)) < 0.0, "{areas:?}");
+}
+
+/// What all forces lack to the rate of momentum in the worst step, relative to the largest of them, with the default tolerance.
+fn worst_balance(session: &Session, mesh: &GlobalMesh<2>, text: &str) -> f64 {
+    let mut run = simulation::<2, 4>(session, text, mesh);
+    let mut resultants =
+        Resultants::new(session, &run.body, &run.state, &supports(text)).expect("resultants");
+    let mut worst: f64 = 0.0;
+    while run.advance(session).expect("a step").is_some() {
+        let motion = run.scheme.balanced_motion(&run.state);
+        resultants.update(session, &run.body, &run.state, motion, run.scheme.load()).expect("resultants");
+        let (mut sum, mut largest) = ([0.0; 2], 0.0);
+        for (source, (found, _)) in resultants.sources().iter().zip(resultants.rows()) {
+            let sign = if *source == Source::Momentum { -1.0 } else { 1.0 };
+            for (sum, force) in sum.iter_mut().zip(found.force) {
+                *sum += sign * force;
+                largest = larger(largest, force.abs());
+            }
+        }
+        worst = larger(worst, larger(sum[0].abs(), sum[1].abs()) / largest);
+    }
+    worst
+}
+
+/// The forces on a body that is carried along fast are solved for, not those that would stop it.
+pub fn carried(session: &Session) {
+    let steel = |scheme: &str| {
+        format!(
+            "{}[time]\nscheme = \"{scheme}\"\nend = 0.2\nstep = 0.01\n[material]\nhypothesis = \"plane_strain\"\n\
+             density = 7800\nelasticity = {{ youngs_modulus = 2e11, poisson_ratio = 0.3 }}\n\
+             [[support]]\non = [\"top\"]\nfix = [\"x\"]\nvelocity = [10.0]\n\
+             [[traction]]\non = [\"top\"]\nvalue = [0, -1e5]\n\
+             [[contact]]\non = [\"bottom\"]\nnormal.unilateral = {{}}\nfriction.coulomb.coefficient = 0.3\n",
+            any_mesh::<2>()
+        )
+    };
+    for scheme in ["implicit_euler", "bdf2"] {
+        let found = worst_balance(session, &crossed([6, 4]), &steel(scheme));
+        println!("steel, {scheme}: {found:.1e}");
+        assert!(found < 1e-6, "{scheme}: {found:e}");
+    }
+    let flight = format!(
+        "{}[time]\nscheme = \"implicit_euler\"\nend = 1e-4\nstep = 1e-6\n[material]\nhypothesis = \"plane_strain\"\n\
+         density = 1000\nelasticity = {{ youngs_modulus = 1e6, poisson_ratio = 0.3 }}\n\
+         [initial]\nvelocity = [1000.0, 0.0]\n[gravity]\nacceleration = [0, -9.81]\n\
+         [[contact]]\non = [\"bottom\"]\nnormal.unilateral.gap = 1.0\n",
+        any_mesh::<2>()
+    );
+    let found = worst_balance(session, &crossed([6, 4]), &flight);
+    println!("flight: {found:.1e}");
+    assert!(found < 1e-4, "flight: {found:e}");
+}
+
+#[test]
+fn forces_on_a_body_that_is_carried_along_are_balanced() {
+    run_on(&[1, 2], "carried");
 }
 
 #[test]

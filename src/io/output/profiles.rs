@@ -109,8 +109,17 @@ impl<const D: usize> Profiles<D> {
             let written = self.file.as_mut().map_or(Ok(()), |file| {
                 let mut rows: Vec<&[f64]> = rows.chunks_exact(width).collect();
                 rows.sort_by(|a, b| compare(a, b));
+                let gap_at = if self.with.gap { D + 3 } else { width };
                 let mut row = |row: &[f64]| {
-                    file.row(format_args!("{},{},{}", Number(state.time), profile.name, Numbers(row)))
+                    let (before, gap) = row.split_at(gap_at);
+                    let (time, name, before) = (Number(state.time), &profile.name, Numbers(before));
+                    match gap.split_first() {
+                        None => file.row(format_args!("{time},{name},{before}")),
+                        Some((gap, after)) if gap.is_nan() => {
+                            file.row(format_args!("{time},{name},{before},,{}", Numbers(after)))
+                        }
+                        Some(_) => file.row(format_args!("{time},{name},{before},{}", Numbers(gap))),
+                    }
                 };
                 rows.into_iter().try_for_each(&mut row)
             });
@@ -168,7 +177,8 @@ impl<const D: usize> Profile<D> {
                 .get(&node)
                 .and_then(|states| states.iter().max_by(|a, b| along_normal(a).total_cmp(&along_normal(b))));
             if with.gap {
-                out.push(here.map_or(0.0, |(_, state)| state.gap));
+                // Written as an empty entry.
+                out.push(here.map_or(f64::NAN, |(_, state)| state.gap));
             }
             if with.friction {
                 let rubbing =

@@ -96,8 +96,8 @@ impl Polyline {
             let range = match (before, after) {
                 (Some(v), _) if vertical => format!("at {v} {along}"),
                 (Some(v), Some(w)) => format!("{v} to {w} {along}"),
-                (Some(v), None) => format!("from {v} m/s on"),
-                (None, after) => format!("below {} m/s", after.unwrap_or_default()),
+                (Some(v), None) => format!("from {v} {along} on"),
+                (None, after) => format!("below {} {along}", after.unwrap_or_default()),
             };
             let slope =
                 if vertical { "vertical".into() } else { format!("{} {steep}", number(self.slopes[branch])) };

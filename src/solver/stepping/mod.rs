@@ -13,6 +13,7 @@ mod factor_cache;
 mod fallbacks;
 mod flow;
 mod flow_corrections;
+mod force_scale;
 mod frames;
 mod implicit;
 mod integrator;

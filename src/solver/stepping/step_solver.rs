@@ -4,6 +4,7 @@ use super::{
     StepOutcome,
     contacts::restore_pressures,
     factor_cache::{Cached, FactorCache, Krylov},
+    force_scale::size_of,
     linear_solver::{LINEAR_ITERATIONS, Preconditioner, ProblemSize, SolverSettings},
     problem::{REMEDY, StepProblem, System},
     resistance::{resistances_of_body, set_reference_values},
@@ -372,7 +373,7 @@ impl StepSolver {
             let remedy = "check loads and initial values; use smaller steps";
             return Err(problem.failed("the forces are not finite", remedy));
         }
-        let StepProblem { session, body, rounding, .. } = problem;
+        let StepProblem { session, body, scale, rounding, .. } = problem;
         // The tolerance is never below the rounding error of `K v`, even if the remaining forces are small; friction on a moving
         // obstacle rounds `v` as a difference from the obstacle's velocity.
         let mut motion = start.norm()?;
@@ -388,7 +389,10 @@ impl StepSolver {
         let size = if size > 0.0 { size.max(LEAST_FORCE / accuracy) } else { 0.0 };
         let total = size * ((body.mesh.total_nodes * D) as f64).sqrt();
         body.contacts.iter_mut().for_each(|contact| contact.reference.forces = total);
-        Ok((self.settings.tolerance * norm).max(LEAST_FORCE).max(ROUNDING_SHARE * *rounding).max(product))
+        Ok((self.settings.tolerance * size_of(norm, *scale))
+            .max(LEAST_FORCE)
+            .max(ROUNDING_SHARE * *rounding)
+            .max(product))
     }
 
     /// The precision of the factor in use, if steps are condensed to the contact.

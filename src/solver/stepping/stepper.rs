@@ -5,6 +5,7 @@ use super::{
     balance::Balance,
     contacts::{commit_tractions, prepare_contacts, prepare_gaps},
     factor_cache::nearest_cached_length,
+    force_scale::ForceScale,
     integrator::Integrator,
     lagged_euler::refuse_fast_flow,
     linear_solver::{Preconditioner, SolverSettings},
@@ -59,6 +60,7 @@ pub struct Stepper {
     /// The motions of obstacles that forces drive: the contact and the number of each; and the search for their velocities.
     loaded: Vec<[usize; 2]>,
     balance: Balance,
+    force_scale: ForceScale,
     trial: DistributedVector,
     /// Whether the scheme has completed the last attempted step, so that trial histories belong to its solution.
     is_finished: bool,
@@ -119,6 +121,7 @@ impl Stepper {
             moving_supports: MovingSupports::new(body, state)?,
             loaded: Vec::new(),
             balance: Balance::default(),
+            force_scale: ForceScale::new(body, &state.velocity)?,
             trial: state.velocity.like()?,
             is_finished: false,
             workspace: ErrorWorkspace::default(),
@@ -275,12 +278,14 @@ impl Stepper {
         state: &State,
         step: Step,
     ) -> Result<StepOutcome> {
+        let scale = self.size_of_forces(session, body, state, step)?;
         let mut problem = StepProblem {
             session,
             body,
             state,
             step,
             forces: &self.right_hand_side,
+            scale,
             rounding: self.integrator.rounding(session),
             flow_start: self.integrator.flow_start(),
         };
@@ -289,6 +294,31 @@ impl Stepper {
         } else {
             solve_and_search(&mut self.solver, &mut problem, &mut self.trial, self.other_starts)
         }
+    }
+
+    /// The size in N of the forces of the started step, without what only carries the body along. Collective.
+    fn size_of_forces<const D: usize, const S: usize>(
+        &mut self,
+        session: &Session,
+        body: &Body<D, S>,
+        state: &State,
+        step: Step,
+    ) -> Result<f64> {
+        let length = self.integrator.matrix_length(step);
+        let Some(supports) = &mut self.moving_supports else {
+            return self.force_scale.without_translation(
+                session,
+                body,
+                state,
+                (&self.right_hand_side, length),
+            );
+        };
+        let residual = &mut supports.held;
+        self.solver.multiply(&self.trial, residual)?;
+        residual.add_scaled(-1.0, &self.right_hand_side)?;
+        let residual = residual.norm()?;
+        let known = (&supports.known, length);
+        Ok(residual.max(self.force_scale.without_translation(session, body, state, known)?))
     }
 
     /// Solves the started step together with the loaded motions of obstacles: repeats the step with other velocities of the obstacles

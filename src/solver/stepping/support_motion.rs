@@ -20,8 +20,8 @@ pub(super) struct MovingSupports {
     /// `K g`.
     coupling: DistributedVector,
     /// `b`.
-    known: DistributedVector,
-    /// `D g`.
+    pub known: DistributedVector,
+    /// `D g`, and work space once the forces of the step are known.
     pub held: DistributedVector,
     /// Work space for nodal values with ghosts.
     values: Vec<f64>,

@@ -48,6 +48,7 @@ use crate::{
 };
 use friction::Friction;
 use point::{Point, Vectors::Body, gauss_points};
+use std::collections::BTreeSet;
 
 pub use crate::laws::contact::Quadrature;
 pub use count::{COUNTS, PointCount};
@@ -152,6 +153,30 @@ impl<const D: usize> Contact<D> {
             needs_ghosts,
             derivatives: Derivatives::Unknown,
         })
+    }
+
+    /// Adds to the weight of a point and of its friction.
+    fn add_weight(&mut self, at: usize, weight: f64) {
+        let factor = 1.0 + weight / self.points[at].weight;
+        self.points[at].scale_weight(factor);
+        let friction = self.friction.iter_mut().flat_map(|friction| &mut friction.points);
+        friction.filter(|point| point.at == at).for_each(|point| point.weight *= factor);
+    }
+
+    /// Removes points, by their positions.
+    fn remove_points(&mut self, given: &BTreeSet<usize>) {
+        if given.is_empty() {
+            return;
+        }
+        let after = |at: usize| at - given.range(..at).count();
+        if let Some(friction) = &mut self.friction {
+            friction.points.retain(|point| !given.contains(&point.at));
+            friction.points.iter_mut().for_each(|point| point.at = after(point.at));
+            friction.held.retain(|(at, _)| !given.contains(at));
+            friction.held.iter_mut().for_each(|(at, _)| *at = after(*at));
+        }
+        let mut number = 0..;
+        self.points.retain(|_| number.next().is_none_or(|at| !given.contains(&at)));
     }
 
     /// Commits the motion of the obstacle in a step.

@@ -116,6 +116,12 @@ impl<const D: usize> Point<D> {
         point
     }
 
+    /// Multiplies its weight.
+    pub(super) fn scale_weight(&mut self, factor: f64) {
+        self.weight *= factor;
+        self.force.as_flattened_mut().iter_mut().for_each(|force| *force *= factor);
+    }
+
     /// A point at a node, whose unknown is the parameter of the law.
     pub(super) fn nodal(node: u32, normal: Vector<D>, weight: f64, held: &Held<D>) -> Self {
         let mut point = Self::new(&[node], &[1.0], normal, weight, held);

@@ -13,9 +13,10 @@ const ORTHOGONAL: f64 = 1e-9;
 /// Cosine of 40 degrees, the angle by which facets of a smooth boundary turn at most.
 const SMOOTH: f64 = 0.766;
 
-/// Selects the velocity as the unknown at points where directions at a node are not orthogonal; refuses laws
-/// with vertical parts there and at Gauss points.
+/// Gives each node of a smooth boundary to one contact, and each edge to the friction of one boundary. Selects the velocity as the unknown
+/// at points where directions at a node are not orthogonal; refuses laws with vertical parts there and at Gauss points.
 pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<D>) -> Result<()> {
+    give_nodes_to_one_contact(contacts);
     let mut around: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
     for (number, contact) in contacts.iter().enumerate() {
         if contact.needs_ghosts {
@@ -32,7 +33,7 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
         }
     }
     keep_tangents_free_of_normals(contacts, &around);
-    let with_friction = refuse_shared_tangents(contacts, mesh)?;
+    let with_friction = give_edges_to_one_friction(contacts);
     for (node, places) in around.into_iter().filter(|(_, places)| places.len() > 1) {
         let direction = |&(number, at): &(usize, usize)| contacts[number].points[at].direction;
         let skew = (1..places.len()).any(|i| {
@@ -48,23 +49,10 @@ pub fn choose_unknowns<const D: usize>(contacts: &mut [Contact<D>], mesh: &Mesh<
             _ => "",
         };
         if !acting.is_empty() {
-            let is_smooth = (1..places.len()).any(|i| {
-                places[..i].iter().any(|other| dot(&direction(other), &direction(&places[i])) > SMOOTH)
-            });
-            let (meeting, remedy) = if is_smooth {
-                (
-                    "two [[contact]] tables meet on a smooth boundary",
-                    "leave a facet between them out of both, or use one table",
-                )
-            } else {
-                (
-                    "boundaries meet at an angle other than 90 degrees",
-                    "round the edge with facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact",
-                )
-            };
             let place = mesh.nodes[node];
             return Err(Error::Refused(format!(
-                "contact at {place:?} m: {meeting}, and {acting} there; {remedy}"
+                "contact at {place:?} m: boundaries meet at an angle other than 90 degrees, and {acting} there; round the edge with \
+                 facets that turn by less than 40 degrees each, or leave one of the boundaries out of contact"
             )));
         }
         places.into_iter().for_each(|(number, at)| contacts[number].points[at].unknown = Unknown::Velocity);
@@ -91,21 +79,60 @@ fn keep_tangents_free_of_normals<const D: usize>(
     }
 }
 
-/// The nodes with friction; along one direction friction of one boundary only can act.
-fn refuse_shared_tangents<const D: usize>(
-    contacts: &[Contact<D>],
-    mesh: &Mesh<D>,
-) -> Result<BTreeSet<usize>> {
-    let mut nodes = BTreeSet::new();
-    let frictions = contacts.iter().filter_map(|contact| contact.friction.as_ref());
-    for point in frictions.flat_map(|friction| &friction.points) {
-        if !nodes.insert(point.node()) {
-            return Err(Error::Refused(format!(
-                "friction at {:?} m: two boundaries with friction meet at an edge there, and both would act along it; give \
-                 friction to one of them only, or round the edge",
-                mesh.nodes[point.node()]
-            )));
+/// Leaves each edge to the friction of the boundary that has the larger part of a node there, because along one direction only one friction
+/// can act. Returns the nodes with friction.
+fn give_edges_to_one_friction<const D: usize>(contacts: &mut [Contact<D>]) -> BTreeSet<usize> {
+    let mut strongest: BTreeMap<usize, ((usize, usize), f64)> = BTreeMap::new();
+    for (number, contact) in contacts.iter().enumerate() {
+        for point in contact.friction.iter().flat_map(|friction| &friction.points) {
+            let this = ((number, point.at), point.weight);
+            let best = strongest.entry(point.node()).or_insert(this);
+            if is_larger(point.weight, best.1) {
+                *best = this;
+            }
         }
     }
-    Ok(nodes)
+    for (number, contact) in contacts.iter_mut().enumerate() {
+        if let Some(friction) = &mut contact.friction {
+            friction.points.retain(|point| strongest[&point.node()].0 == (number, point.at));
+        }
+    }
+    strongest.into_keys().collect()
+}
+
+/// Gives each node at which two contacts meet on a smooth boundary, with its whole weight, to the contact that has the larger part of it.
+fn give_nodes_to_one_contact<const D: usize>(contacts: &mut [Contact<D>]) {
+    let mut kept: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
+    let mut given = vec![BTreeSet::new(); contacts.len()];
+    for number in 0..contacts.len() {
+        let nodal = if contacts[number].needs_ghosts { 0 } else { contacts[number].points.len() };
+        for at in 0..nodal {
+            let point = &contacts[number].points[at];
+            let (normal, weight) = (point.normal, point.weight);
+            let here = kept.entry(point.node()).or_default();
+            let meets = |&(other, at): &(usize, usize)| {
+                other != number && dot(&contacts[other].points[at].normal, &normal) > SMOOTH
+            };
+            let Some(place) = here.iter().position(meets) else {
+                here.push((number, at));
+                continue;
+            };
+            let (other, other_at) = here[place];
+            let other_weight = contacts[other].points[other_at].weight;
+            if is_larger(weight, other_weight) {
+                here[place] = (number, at);
+                contacts[number].add_weight(at, other_weight);
+                given[other].insert(other_at);
+            } else {
+                contacts[other].add_weight(other_at, weight);
+                given[number].insert(at);
+            }
+        }
+    }
+    contacts.iter_mut().zip(&given).for_each(|(contact, given)| contact.remove_points(given));
+}
+
+/// Whether a weight is larger by more than rounding, which differs between partitions of the mesh.
+fn is_larger(weight: f64, other: f64) -> bool {
+    weight > other * (1.0 + 1e-9)
 }
