@@ -190,7 +190,10 @@ fn the_gap_of_a_profile_is_that_to_the_obstacle_where_it_is() {
             .set("contact.1.normal", "{compliance = {stiffness = 1e10, exponent = 1}}")
             .set("output.profile", "[{on = 'top'}]");
         let top = case.run(ranks).table("profiles.csv");
-        let (gap, pressure) = (top.numbers("gap"), top.numbers("contact_pressure"));
+        // Between the discs there is no contact, and no gap.
+        let number = |gap: &str| if gap.is_empty() { 0.0 } else { gap.parse().expect("a number") };
+        let gap: Vec<f64> = top.words("gap").into_iter().map(number).collect();
+        let pressure = top.numbers("contact_pressure");
         let deepest = gap.iter().copied().fold(0.0, f64::min);
         assert!(deepest < -1e-5, "{deepest} m");
         for (gap, pressure) in gap.iter().zip(&pressure) {
@@ -312,8 +315,8 @@ fn a_node_between_two_contacts_of_a_smooth_boundary_belongs_to_one_of_them() {
             |name: &str, column: &str| *table.only("source", name).numbers(column).last().expect("rows");
         let [left, right] = ["contact bottom", "contact bottom (2)"].map(|name| at_end(name, "force_y"));
         assert!((left + right - 392.4).abs() < 1e-6, "the weight: {left} N and {right} N");
-        let [area, other] =
-            ["contact bottom", "contact bottom (2)"].map(|name| at_end(name, "touching_area"));
+        let [area, other] = ["contact bottom", "contact bottom (2)"]
+            .map(|name| at_end(name, "touching_area") + at_end(name, "open_area"));
         assert!((area - 0.2125).abs() < 1e-12 && (other - 0.1875).abs() < 1e-12, "{area} m and {other} m");
         // The profile has the pressure at each of the 17 nodes, with the friction of the contact that it belongs to.
         let profile = case.results().table("profiles.csv");
@@ -326,7 +329,7 @@ fn a_node_between_two_contacts_of_a_smooth_boundary_belongs_to_one_of_them() {
             force += weight * p[at];
             let coefficient = if x[at] < 0.201 { 0.5 } else { 0.25 };
             assert!(
-                (q[at] - coefficient * p[at]).abs() < 1e-6 * p[at],
+                (q[at] - coefficient * p[at]).abs() <= 1e-6 * p[at],
                 "{} Pa and {} Pa at {}",
                 q[at],
                 p[at],
@@ -344,13 +347,12 @@ fn a_node_between_two_contacts_of_a_smooth_boundary_belongs_to_one_of_them() {
 /// The gap of a node that belongs to no contact is not that of a closed one.
 #[test]
 fn a_profile_has_no_gap_where_there_is_no_contact() {
-    let results = on_two_planes()
+    let case = on_two_planes()
         .set("contact.1.where", "'x > 0.3'")
         .set("contact.0.where", "'x < 0.1'")
         .set("contact.0.friction.coulomb.coefficient", "0.25")
-        .set("support", "[{on = ['top'], fix = ['y']}]")
-        .run(2);
-    let profile = results.table("profiles.csv");
+        .set("support", "[{on = ['top'], fix = ['y']}]");
+    let profile = case.run(2).table("profiles.csv");
     let gaps = profile.words("gap");
     for (x, gap) in profile.numbers("x").iter().zip(gaps) {
         assert_eq!(gap.is_empty(), *x > 0.101 && *x < 0.299, "{gap} at {x}");
