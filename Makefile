@@ -45,7 +45,7 @@ help:
 	@echo 'make bench     kernels of a step against the memory bandwidth; what files cost; ARGS=--write puts the tables into docs'
 	@echo 'make bench-runs  whole runs against the memory bandwidth, by phase (docs/speed.md); ARGS=--quick takes a minute'
 	@echo 'make bench-accuracy  the studies of docs/what-accuracy-costs.md; ARGS=--write puts their tables into it'
-	@echo 'make book      docs/ as a book in target/book (mdBook)'
+	@echo 'make book      docs/ as a book in target/book, with its links and formulas checked'
 	@echo 'make bench-effects  what effects cost (docs/speed.md); ARGS=--write puts the table into it'
 	@echo 'make bench-space  errors in space against seconds and memory (docs/space.md); ARGS=--write puts the tables into it'
 	@echo 'make verification  the cases of the verification manual, a minute; ARGS=--write puts their tables and pictures into docs/verification'
@@ -145,10 +145,10 @@ deny:
 	@cargo deny --version >/dev/null 2>&1 || cargo install --locked cargo-deny
 	cargo deny check
 
-# docs/ as a book in HTML.
-book:
-	@mdbook --version >/dev/null 2>&1 || cargo install --locked mdbook
-	mdbook build docs
+# docs/ as a book in HTML; the tests that make test runs, too, write it and check its links and formulas.
+book: deps
+	cargo test --release --locked --test book
+	@echo '$(or $(CARGO_TARGET_DIR),target)/book/index.html'
 
 msrv: deps
 	rustup toolchain install $(msrv) --profile minimal

@@ -1,4 +1,4 @@
-//! Checks of the pages: names of the source exist, links lead somewhere, jobs in them are valid.
+//! Checks of the pages: names of the source exist, jobs in them are valid. `book.rs` checks links.
 
 use std::path::{Path, PathBuf};
 
@@ -131,43 +131,6 @@ fn pages() -> Vec<String> {
 /// The targets of the links and pictures of a page.
 fn links(text: &str) -> Vec<&str> {
     text.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(target, _)| target)).collect()
-}
-
-/// The anchor that a heading has in a rendered page.
-fn anchor(heading: &str) -> String {
-    let kept = heading.trim_start_matches('#').trim().to_lowercase();
-    kept.chars()
-        .filter(|&c| is_word(c) || c == ' ' || c == '-')
-        .map(|c| if c == ' ' { '-' } else { c })
-        .collect()
-}
-
-/// The links of a page that lead nowhere.
-fn broken_links(page: &str, text: &str) -> Vec<String> {
-    let folder = Path::new(page).parent().expect("folder").to_owned();
-    let is_broken = |target: &&str| {
-        if target.contains("://") || target.contains(' ') {
-            return false;
-        }
-        let (file, heading) = target.split_once('#').unwrap_or((target, ""));
-        let file = if file.is_empty() { PathBuf::from(page) } else { folder.join(file) };
-        let has_heading =
-            |text: String| text.lines().any(|line| line.starts_with('#') && anchor(line) == heading);
-        !root().join(&file).exists()
-            || !(heading.is_empty() || std::fs::read_to_string(root().join(&file)).is_ok_and(has_heading))
-    };
-    links(text).into_iter().filter(is_broken).map(|target| format!("{page}: {target}")).collect()
-}
-
-#[test]
-fn every_link_leads_somewhere() {
-    let faults: Vec<String> = pages().iter().flat_map(|page| broken_links(page, &read(page))).collect();
-    assert!(faults.is_empty(), "links to nothing:\n{}", faults.join("\n"));
-    let text = "[a](scope.md) [b](nothing.md) [c](../README.md#first-run) [d](../README.md#no-such-heading)";
-    assert_eq!(
-        broken_links("docs/x.md", text),
-        ["docs/x.md: nothing.md", "docs/x.md: ../README.md#no-such-heading"]
-    );
 }
 
 #[test]
