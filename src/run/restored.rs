@@ -93,7 +93,8 @@ pub(super) fn transfer<const D: usize, const S: usize>(
         session.agree(if is_there { Ok(()) } else { Err(none()) })?;
         from.to_owned()
     };
-    let found = checkpoint::transfer(session, &file, body, state)?;
+    let physics = session.agree(loaded.job.physics())?;
+    let found = checkpoint::transfer(session, &file, &physics, body, state)?;
     for field in [&mut state.velocity, &mut state.previous_velocity] {
         body.held.clear(&mut field.owned_mut()?);
         field.update_ghosts()?;

@@ -76,6 +76,61 @@ fn what_a_stage_lacks_is_dropped_and_what_it_adds_starts_at_rest() {
     assert!(difference < 1e-9, "{difference:e}");
 }
 
+/// Two indenters on a viscous block under constant forces, with their masses; the second one turns as well.
+fn indenters() -> Case {
+    let contact = |part: &str, x: f64, load: &str| {
+        format!(
+            "{{ on = ['top'], where = '{part}', normal.unilateral = {{}}, friction.coulomb.coefficient = 0.3, \
+             obstacle.sphere = {{ centre = [{x}, 0.6], radius = 0.1 }}, obstacle_load = {{ direction = [0, -1], {load} }} }}"
+        )
+    };
+    let light = contact("x < 0.45", 0.25, "force = 1e3, mass = 100");
+    let heavy = contact("x > 0.55", 0.75, "force = 3e3, mass = 200, moment = 20, moment_of_inertia = 5");
+    Case::of("indented_block")
+        .set("mesh", "{ rectangle = { size = [1.0, 0.5], cells = [8, 4] } }")
+        .set(
+            "material",
+            "{ hypothesis = 'plane_strain', density = 1e3, elasticity = { youngs_modulus = 1e6, poisson_ratio = 0.3 }, \
+             viscosity = { volumetric = 1e3, shear = 1e3 } }",
+        )
+        .set("support", "[{ on = ['bottom'], fix = 'all' }]")
+        .set("contact", &format!("[{light}, {heavy}]"))
+        .set("time", "{ end = 0.1, step = 0.01, scheme = 'implicit_euler' }")
+        .set("output", "{ folder = 'out' }")
+        .set("checkpoint.every", "1000")
+}
+
+#[test]
+fn obstacles_moved_by_forces_continue_their_motion() {
+    let columns =
+        ["obstacle_displacement", "obstacle_velocity", "obstacle_rotation", "obstacle_angular_velocity"];
+    let motion = |case: &Case| {
+        let table = case.results().table("resultants.csv");
+        let last = table.words("time").last().expect("a row").to_string();
+        let rows = table.only("time", &last);
+        let places = columns.map(|column| rows.columns.iter().position(|c| c == column).expect("a column"));
+        let rows = rows.rows.iter().filter(|row| row.iter().any(|word| word.starts_with("contact")));
+        rows.flat_map(|row| places.map(|at| row[at].parse().unwrap_or(0.0))).collect::<Vec<f64>>()
+    };
+    let straight = indenters().run_and_keep(1);
+    let first = indenters().set("time.end", "0.05").run_and_keep(1);
+    let second = indenters().set("time.end", "0.05").set("initial.from", &format!("{:?}", out(&first)));
+    let said = second.run_with(2, &[]).expect(0);
+    let expected = motion(&straight);
+    assert!(expected.len() == 8 && expected[0] > 1e-3 && expected[6].abs() > 1e-3, "{expected:?}");
+    let difference = relative_difference(&expected, &motion(&second));
+    assert!(difference < 1e-7, "{difference:e}: {:?} instead of {expected:?}", motion(&second));
+    assert!(!said.stdout.contains("at rest") && !said.stderr.contains("at rest"), "nothing starts at rest");
+    // The first indenter is held in place, and the second one moves along another direction.
+    let other =
+        second.without("contact.0.obstacle_load").set("contact.1.obstacle_load.direction", "[0.1, -1]");
+    other
+        .run_with(1, &["--force", "--set", "time.end=0.01"])
+        .expect(0)
+        .says("dropped: displacement of the obstacle of contact.0, displacement of the obstacle of contact.1")
+        .says("at rest: displacement of the obstacle of contact.1");
+}
+
 #[test]
 fn stages_run_one_after_another() {
     let first = first("lagged_euler");

@@ -186,9 +186,7 @@ pub fn restore<const D: usize, const S: usize>(
         (&header.obstacle_rotations, &header.obstacle_rotation_stiffness),
     ];
     for (number, (motions, stiffness)) in saved.into_iter().enumerate() {
-        let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
-        let restored = obstacles.filter_map(|obstacle| obstacle.motions_mut().into_iter().nth(number)?);
-        for (at, motion) in restored.enumerate() {
+        for (at, motion) in loaded_motions(body, number).enumerate() {
             motions.get(at).into_iter().for_each(|saved| motion.restore(*saved));
             motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
         }
@@ -204,17 +202,18 @@ pub struct Transferred {
     pub step: u64,
     /// Its time in s.
     pub time: f64,
-    /// Tables of the checkpoint that this job does not have.
+    /// Tables of the checkpoint and motions of its obstacles that this job does not have.
     pub dropped: Vec<String>,
-    /// Histories of this job that the checkpoint does not have.
+    /// Histories and motions of obstacles of this job that the checkpoint does not have.
     pub at_rest: Vec<String>,
 }
 
-/// Reads the last state of another run on the same mesh into `body` and `state` as a state at time 0. Refused if the checkpoint is
-/// damaged or belongs to another mesh. Collective, with the same outcome on all ranks.
+/// Reads the last state of another run on the same mesh into `body` and `state` as a state at time 0, given the keys of this job that
+/// affect the results. Refused if the checkpoint is damaged or belongs to another mesh. Collective, with the same outcome on all ranks.
 pub fn transfer<const D: usize, const S: usize>(
     session: &Session,
     path: &Path,
+    physics: &BTreeMap<String, String>,
     body: &mut Body<D, S>,
     state: &mut State,
 ) -> Result<Transferred> {
@@ -262,7 +261,65 @@ pub fn transfer<const D: usize, const S: usize>(
     }
     let is_dropped = |name: &&String| !known.contains(&name.as_str()) && !name.starts_with("previous_");
     let dropped = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
-    Ok(Transferred { step: header.step, time: header.time, dropped, at_rest })
+    let mut found = Transferred { step: header.step, time: header.time, dropped, at_rest };
+    transfer_motions(&header, physics, body, &mut found);
+    Ok(found)
+}
+
+/// Lets the obstacles moved by forces continue their motion, where both jobs have it: a contact on the same boundaries, or the same part
+/// of them, along the same direction or about the same axis.
+fn transfer_motions<const D: usize, const S: usize>(
+    header: &Header,
+    physics: &BTreeMap<String, String>,
+    body: &mut Body<D, S>,
+    found: &mut Transferred,
+) {
+    let translation = ("direction", &["obstacle_load.direction"][..], "displacement");
+    let rotation = ("moment", &["obstacle.sphere.axis", "obstacle.shape.axis"][..], "rotation");
+    let saved = [
+        (translation, &header.obstacles, &header.obstacle_stiffness),
+        (rotation, &header.obstacle_rotations, &header.obstacle_rotation_stiffness),
+    ];
+    for (number, ((key, alike, what), motions, stiffness)) in saved.into_iter().enumerate() {
+        let there = motions_of(&header.physics, key, alike);
+        let here = motions_of(physics, key, alike);
+        let name = |contact: usize| format!("{what} of the obstacle of contact.{contact}");
+        for ((contact, own), motion) in here.iter().zip(loaded_motions(body, number)) {
+            let at = there.iter().position(|(_, other)| own == other);
+            let Some((at, [displacement, velocity, ..])) = at.and_then(|at| Some((at, *motions.get(at)?)))
+            else {
+                found.at_rest.push(name(*contact));
+                continue;
+            };
+            motion.restore([displacement, velocity, displacement, velocity]);
+            motion.restore_stiffness(stiffness.get(at).copied().unwrap_or(0.0));
+        }
+        let is_dropped = |(_, other): &&(usize, Vec<_>)| here.iter().all(|(_, own)| own != other);
+        found.dropped.extend(there.iter().filter(is_dropped).map(|(contact, _)| name(*contact)));
+    }
+}
+
+/// The contacts with this key of `obstacle_load`, and what two jobs must have in common for its motion to be the same: boundaries,
+/// their part, and the values of these keys.
+fn motions_of<'a>(
+    physics: &'a BTreeMap<String, String>,
+    key: &str,
+    alike: &[&str],
+) -> Vec<(usize, Vec<Option<&'a String>>)> {
+    let value = |contact: usize, key: &str| physics.get(&format!("contact.{contact}.{key}"));
+    let contacts = (0..).take_while(|contact| value(*contact, "on").is_some());
+    let loaded = contacts.filter(|contact| value(*contact, &format!("obstacle_load.{key}")).is_some());
+    let keys = || ["on", "where"].iter().chain(alike);
+    loaded.map(|contact| (contact, keys().map(|key| value(contact, key)).collect())).collect()
+}
+
+/// The motions of obstacles along a direction (number 0) or about an axis (1), in the order of the contacts.
+fn loaded_motions<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    number: usize,
+) -> impl Iterator<Item = &mut LoadedMotion> {
+    let obstacles = body.contacts.iter_mut().filter_map(|contact| contact.obstacle.as_mut());
+    obstacles.filter_map(move |obstacle| obstacle.motions_mut().into_iter().nth(number)?)
 }
 
 /// The table of contact tractions at nodes.
