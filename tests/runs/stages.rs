@@ -132,6 +132,20 @@ fn obstacles_moved_by_forces_continue_their_motion() {
 }
 
 #[test]
+fn an_initial_stress_is_repeated_or_named_as_dropped() {
+    let elastic = |case: Case| case.without("material.viscoplasticity").set("checkpoint.every", "1000");
+    let stress = "{ xx = -0.5, yy = 0.2 }";
+    let straight = elastic(Case::square(6)).set("time.scheme", "'implicit_euler'");
+    let expected = last(&straight.set("initial.stress", stress).run(1));
+    let first = elastic(first("implicit_euler")).set("initial.stress", stress).run_and_keep(1);
+    let second = || elastic(second("implicit_euler", &out(&first)));
+    second().run_with(1, &[]).expect(0).says("dropped: initial stress");
+    let repeated = second().set("initial.stress", stress);
+    let difference = relative_difference(&expected, &last(&repeated.run(2)));
+    assert!(difference < 1e-9, "{difference:e}");
+}
+
+#[test]
 fn stages_run_one_after_another() {
     let first = first("lagged_euler");
     let from = out(&first);

@@ -260,7 +260,12 @@ pub fn transfer<const D: usize, const S: usize>(
         }
     }
     let is_dropped = |name: &&String| !known.contains(&name.as_str()) && !name.starts_with("previous_");
-    let dropped = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
+    let mut dropped: Vec<String> = of_nodes.iter().chain(&of_cells).filter(is_dropped).cloned().collect();
+    let has_stress =
+        |keys: &BTreeMap<String, String>| keys.keys().any(|key| key.starts_with("initial.stress."));
+    if has_stress(&header.physics) && !has_stress(physics) {
+        dropped.push("initial stress of materials without viscoplasticity".into());
+    }
     let mut found = Transferred { step: header.step, time: header.time, dropped, at_rest };
     transfer_motions(&header, physics, body, &mut found);
     Ok(found)

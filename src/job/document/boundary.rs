@@ -155,8 +155,8 @@ pub struct Initial {
     /// checkpoint. The mesh must be the same; loads, supports, contacts, laws and scheme may differ. Histories that this job does
     /// not have are dropped, those that only this job has start from their initial values; the log names both. Components held by
     /// supports keep the saved displacement. Obstacles moved by forces continue their motion if the boundaries of the
-    /// contact, its `where` and the direction of the motion are the same. Not together with the other keys of this
-    /// table.
+    /// contact, its `where` and the direction of the motion are the same. A prescribed initial stress is not part of the state:
+    /// repeat `stress`. Not together with `displacement` and `velocity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("format" = "path"), example = "out/first_stage", example = "out/first_stage/checkpoint-64.h5")]
     pub from: Option<PathBuf>,
@@ -170,7 +170,7 @@ pub struct Initial {
     #[schemars(extend("unit" = "m/s"), example = [0.0, 0.0])]
     pub velocity: Option<Vec<Scalar>>,
     /// The elastic stress at displacement zero of all materials with elasticity, constant in each cell: the values at its centre.
-    /// Viscoplastic flow relaxes it. Absent: none.
+    /// Viscoplastic flow relaxes it; with `from` the saved history of these materials takes its place. Absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<InitialStress>,
 }
