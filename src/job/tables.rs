@@ -10,7 +10,8 @@ use std::path::Path;
 
 /// Largest size of a table in bytes.
 const LARGEST: u64 = 1 << 18;
-const FORMAT: &str = "a table has the times in its first column and values in the others, separated by commas, semicolons or blanks";
+const FORMAT: &str = "a table has the times in its first column and values in the others, separated by commas, semicolons or blanks; \
+                      its first line may be a header without numbers";
 
 /// Replaces the tables below a node by expressions. Relative paths start from `folder`.
 pub(super) fn insert(node: &mut Node, folder: &Path, faults: &mut Vec<Fault>) {
@@ -77,13 +78,16 @@ fn expression(text: &str, column: usize) -> Result<String, (usize, String)> {
             let parsed = field.parse().ok().filter(|value: &f64| value.is_finite());
             parsed.ok_or_else(|| (number, format!("`{field}` is not a number")))
         };
-        if last.is_none() && !has_header && value(0).is_err() {
+        let is_header = fields.iter().all(|field| field.parse::<f64>().is_err());
+        if last.is_none() && !has_header && is_header {
             has_header = true;
             continue;
         }
         let (time, value) = (value(0)?, value(column - 1)?);
         if last.is_some_and(|last| time <= last) {
-            return Err((number, format!("the time {time} does not follow {}", last.unwrap_or_default())));
+            let last = last.unwrap_or_default();
+            let words = "times must ascend; for a jump, give its second row a time slightly later";
+            return Err((number, format!("the time {time} does not follow {last}: {words}")));
         }
         last = Some(time);
         // Writing to a string does not fail.
@@ -110,9 +114,12 @@ mod tests {
     #[test]
     fn faults_have_their_line() {
         for (text, column, line, words) in [
-            ("0,1\n0,2", 2, 2, "does not follow"),
+            ("0,1\n0,2", 2, 2, "does not follow 0: times must ascend; for a jump"),
             ("0,1\n1,b", 2, 2, "`b` is not a number"),
             ("t,v\ns,m", 2, 2, "`s` is not a number"),
+            ("0.O,1000\n0.5,2", 2, 1, "`0.O` is not a number"),
+            ("nan,1\n0.5,2", 2, 1, "`nan` is not a number"),
+            ("t,inf\n0.5,2", 2, 1, "`t` is not a number"),
             ("0,1", 3, 1, "no column 3"),
             ("# nothing", 2, 1, "no numbers"),
             ("0,1", 1, 1, "column 1 is the time"),
