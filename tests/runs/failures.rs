@@ -189,3 +189,23 @@ fn the_log_counts_linear_systems_that_were_not_positive_definite() {
         assert_eq!([steps.len(), counted], [3, indefinite], "{log}");
     }
 }
+
+#[test]
+fn a_force_on_an_obstacle_that_is_not_finite_fails_on_all_ranks() {
+    for (key, value, words) in [
+        (
+            "force",
+            "if(t < 0.003, 300, 1/(t - t))",
+            "the force on the obstacle of contact.0 is inf at t = 0.004 s",
+        ),
+        (
+            "moment",
+            "if(t < 0.003, 0, sqrt(-t))",
+            "the moment on the obstacle of contact.0 is NaN at t = 0.004 s",
+        ),
+    ] {
+        let case =
+            Case::of("rolling_disc").set(&format!("contact.0.obstacle_load.{key}"), &format!("'{value}'"));
+        case.run_with(2, &[]).expect(1).says(words).says("correct the expression");
+    }
+}

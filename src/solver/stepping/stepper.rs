@@ -334,6 +334,7 @@ impl Stepper {
         let tolerance = OBSTACLE_SHARE * self.solver.relative_tolerance();
         let mut all = StepOutcome::default();
         balance.start(self.loaded.len());
+        session.agree(self.loaded.iter().try_for_each(|&motion| finite_force(body, motion, step.time)))?;
         for evaluation in 0..EVALUATIONS {
             for (&motion, velocity) in self.loaded.iter().zip(&mut balance.velocities) {
                 let Some(motion) = loaded_motion(body, motion) else { continue };
@@ -544,6 +545,24 @@ fn loaded_motion<const D: usize, const S: usize>(
     [contact, number]: [usize; 2],
 ) -> Option<&mut LoadedMotion> {
     body.contacts[contact].obstacle.as_mut()?.motions_mut().into_iter().nth(number)?
+}
+
+/// Refuses a force or a moment that is not finite at this time.
+fn finite_force<const D: usize, const S: usize>(
+    body: &mut Body<D, S>,
+    motion: [usize; 2],
+    time: f64,
+) -> Result<()> {
+    let [contact, number] = motion;
+    let Some(motion) = loaded_motion(body, motion) else { return Ok(()) };
+    let value = motion.force().evaluate(time, &[]);
+    if value.is_finite() {
+        return Ok(());
+    }
+    let what = if number == 0 { "force" } else { "moment" };
+    Err(Error::Failed(format!(
+        "the {what} on the obstacle of contact.{contact} is {value} at t = {time} s; correct the expression in the job"
+    )))
 }
 
 /// Whether two velocities are available for extrapolation.
