@@ -249,6 +249,13 @@ impl Parser<'_> {
             }),
             Some(Meaning::Three(function)) => {
                 self.arguments(&span, 3, 3, |_| {})?;
+                if name == "pulse"
+                    && let [.., Instruction::Number(start), Instruction::Number(end)] = self.program[..]
+                    && end < start
+                {
+                    let message = format!("the pulse ends at {end}, before its start at {start}");
+                    return Err(Fault::new(span, message, "write pulse(t, start, end)"));
+                }
                 self.program.push(Instruction::Ternary(function));
                 Ok(())
             }

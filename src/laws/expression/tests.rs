@@ -58,6 +58,7 @@ fn faults_point_into_the_text() {
         ("x == 1", 2..3, "comparison", "<="),
         ("(x < 1 < 2)*2", 7..8, "comparison", "<="),
         ("if(x, 1)", 0..8, "has 2 arguments", "3"),
+        ("pulse(t, 0.5, 0.1)", 0..5, "ends at 0.1, before its start at 0.5", "pulse(t, start, end)"),
         ("interpolate(t, 0, 1, 0.5)", 0..25, "3 numbers", "pairs"),
         ("interpolate(t, 0, 1, 0, 2)", 0..26, "0 is not above 0", "jump"),
         ("interpolate(t, 0, x)", 17..19, "numbers", "v1"),
