@@ -20,6 +20,7 @@ pub struct ObstacleLoad {
     #[schemars(extend("unit" = "N"), example = "min(t, 2 - t)")]
     pub force: Scalar,
     /// Mass of the obstacle, in 2D per metre of thickness. 0: the force and the contact tractions are in equilibrium in each step.
+    /// The kinetic energy of the obstacle is not part of `kinetic_energy`; implicit_euler damps its motion.
     #[serde(default)]
     #[schemars(extend("unit" = "kg"), range(min = 0), example = 0.5)]
     pub mass: f64,
@@ -33,7 +34,8 @@ pub struct ObstacleLoad {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("unit" = "N m"), example = 0.0)]
     pub moment: Option<Scalar>,
-    /// Moment of inertia about the centre or the axis, in 2D per metre of thickness.
+    /// Moment of inertia about the centre or the axis, in 2D per metre of thickness. 0: the moment and the contact tractions are in
+    /// equilibrium in each step; steps of an obstacle that also moves along `direction` may then fail.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(extend("unit" = "kg m^2"), range(min = 0), example = 1e-3)]
     pub moment_of_inertia: f64,

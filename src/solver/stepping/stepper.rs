@@ -383,7 +383,7 @@ impl Stepper {
         Err(Error::Failed(format!(
             "step to t = {time:.6e} s (length {length:.3e} s) failed: no motion of the obstacles balances their forces and moments; the \
              last velocities tried were {} m/s or rad/s; let the forces press the obstacles against the body, give them a mass, or take a \
-             smaller step",
+             smaller step; an obstacle that a moment turns may need a moment_of_inertia",
             tried.join(", ")
         )))
     }
