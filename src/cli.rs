@@ -7,7 +7,7 @@ use crate::{
         partitioned,
     },
     job::{self, Job, Loaded},
-    laws::nearest::nearest,
+    laws::{lines::wrapped, nearest::nearest},
     mesh::gmsh,
     parallel::{
         agreement::Agreed,
@@ -20,6 +20,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use mpi::traits::CommunicatorCollectives;
 use std::{
+    borrow::Cow,
     ffi::OsString,
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
@@ -341,7 +342,15 @@ fn printed(session: &Session, error: &Agreed) -> Exit {
 fn print_error(error: &impl std::error::Error) {
     let words = error.to_string();
     let prefix = if says_error(&words) { "" } else { "error: " };
-    let _ = writeln!(std::io::stderr(), "{prefix}{}", words.trim_end());
+    let words = format!("{prefix}{}", words.trim_end());
+    let lines: Vec<_> = words.lines().map(wrapped_words).collect();
+    let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
+}
+
+/// A line of an error message in lines of the terminal; an excerpt of a file, which has the mark `|`, stays whole.
+fn wrapped_words(line: &str) -> Cow<'_, str> {
+    let words = line.trim_start_matches(|c: char| c == ' ' || c.is_ascii_digit());
+    if words.starts_with('|') { Cow::Borrowed(line) } else { wrapped(line, 4 + line.len() - words.len()) }
 }
 
 /// Whether the text begins with `error`, with or without colour.

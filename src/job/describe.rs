@@ -4,9 +4,7 @@ use serde_json::Value;
 
 use super::schema::{Kind, Schema};
 use crate::error::{Error, Result};
-use crate::laws::nearest::nearest;
-
-const WIDTH: usize = 100;
+use crate::laws::{lines::wrapped, nearest::nearest};
 
 /// A table of the document and its keys.
 struct Table {
@@ -56,8 +54,9 @@ pub(crate) fn describe_kind(kind: Kind, table: Option<&str>) -> Result<String> {
     if shown.is_empty() {
         return Err(unknown_table(kind, wanted, &all));
     }
-    let opening = if wanted.is_empty() { kind.opening } else { "" };
-    Ok(opening.to_owned() + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
+    let paragraphs = kind.opening.split("\n\n").filter(|_| wanted.is_empty());
+    let opening: String = paragraphs.map(|text| lines(text, 0) + "\n").collect();
+    Ok(opening + &shown.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n"))
 }
 
 /// The JSON Schema (draft 2020-12) of a job.
@@ -185,7 +184,7 @@ impl Table {
     }
 
     fn text(&self) -> String {
-        let mut text = format!("{}\n{}", self.title(), wrapped(&self.meaning, 2));
+        let mut text = format!("{}\n{}", self.title(), lines(&self.meaning, 2));
         for key in &self.keys {
             text.push_str(&key.text());
         }
@@ -246,13 +245,14 @@ impl Key {
             "required" => default,
             default => format!("default {default}"),
         }));
-        let mut text = format!("\n  {}: {}\n", self.name, facts.join("; "));
-        text.push_str(&wrapped(&self.meaning(), 6));
+        let facts = format!("  {}: {}", self.name, facts.join("; "));
+        let mut text = format!("\n{}\n", wrapped(&facts, 6));
+        text.push_str(&lines(&self.meaning(), 6));
         for (word, meaning) in self.choices() {
-            text.push_str(&wrapped(&format!("\"{word}\": {meaning}"), 8));
+            text.push_str(&lines(&format!("\"{word}\": {meaning}"), 8));
         }
         for example in self.examples() {
-            text.push_str(&format!("      example: {example}\n"));
+            text.push_str(&lines(&format!("example: {example}"), 6));
         }
         text
     }
@@ -356,22 +356,10 @@ fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The text in lines of at most WIDTH characters, each after `indent` blanks.
-fn wrapped(text: &str, indent: usize) -> String {
-    let mut out = String::new();
-    let mut line = String::new();
-    for word in text.split_whitespace() {
-        if !line.is_empty() && indent + line.chars().count() + 1 + word.chars().count() > WIDTH {
-            out.push_str(&format!("{:indent$}{line}\n", ""));
-            line.clear();
-        }
-        if !line.is_empty() {
-            line.push(' ');
-        }
-        line.push_str(word);
+/// The text in lines, each after `indent` blanks.
+fn lines(text: &str, indent: usize) -> String {
+    if text.is_empty() {
+        return String::new();
     }
-    if !line.is_empty() {
-        out.push_str(&format!("{:indent$}{line}\n", ""));
-    }
-    out
+    format!("{}\n", wrapped(&format!("{:indent$}{}", "", flat(text)), indent))
 }

@@ -12,7 +12,9 @@ use super::{
 use crate::{
     error::{Error, Result},
     fem::{body::Body, effect::Form, state::State},
+    io::output::log::WORDS,
     job::{Job, Loaded, Probe},
+    laws::lines::wrapped,
     mesh::{Mesh, check::Quality},
     parallel::{agreement::Agreed, session::Session},
     solver::{certificate::Certificates, stepping::ProblemSize},
@@ -161,7 +163,9 @@ impl Report {
     /// Lines for the terminal.
     pub fn text(&self) -> String {
         let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
-        self.header.iter().cloned().chain(warnings).chain(self.lines()).collect::<Vec<_>>().join("\n")
+        let lines =
+            self.header.iter().cloned().chain(warnings).chain(self.lines()).collect::<Vec<_>>().join("\n");
+        wrapped(&lines, WORDS).into_owned()
     }
 
     /// Lines that the log of a run does not have.

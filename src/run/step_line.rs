@@ -1,10 +1,7 @@
 //! The line of the log after a step.
 
-use crate::solver::stepping::StepOutcome;
+use crate::{laws::lines::WIDTH, solver::stepping::StepOutcome};
 use std::fmt::{self, Display, Formatter, Write};
-
-/// Longest line, in characters.
-const WIDTH: usize = 100;
 
 /// It is written without allocation, because runs log many steps.
 pub(super) struct StepLine<'a> {
@@ -99,7 +96,7 @@ fn digits(number: u64) -> usize {
 }
 
 /// A time with at most seven digits.
-struct Short(f64);
+pub(super) struct Short(pub f64);
 
 impl Display for Short {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {

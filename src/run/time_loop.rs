@@ -9,7 +9,7 @@ use super::{
     phases,
     restored::{candidates, restore},
     setup::{Setup, setup},
-    step_line::{Columns, StepLine},
+    step_line::{Columns, Short, StepLine},
     summary::{Guesses, PartitionQuality, Summary, peak_memory},
 };
 use crate::{
@@ -202,7 +202,7 @@ impl<const D: usize, const S: usize> Run<'_, D, S> {
         let Simulation { state, totals, .. } = &self.simulation;
         let (step, time, imbalance) = (state.step, state.time, totals.energy_imbalance);
         if self.log.has_bar() {
-            self.log.progress(step, &format!("t = {time:.4e} s"));
+            self.log.progress(step, &format!("t = {} s", Short(time)));
         }
         if let Some(what) = outcome.landed_on.filter(|_| self.landed < LOGGED_STEPS) {
             self.landed += 1;

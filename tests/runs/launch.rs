@@ -45,10 +45,24 @@ impl Outcome {
     /// Requires this text in the output.
     #[track_caller]
     pub fn says(self, words: &str) -> Self {
-        let said = self.stdout.contains(words) || self.stderr.contains(words);
+        let said =
+            [&self.stdout, &self.stderr].iter().any(|text| unwrapped(text).contains(&unwrapped(words)));
         assert!(said, "{words:?} is not in\n{}\n{}", self.stdout, self.stderr);
         self
     }
+}
+
+/// The text with each line that was continued after blanks in one line.
+pub fn unwrapped(text: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for line in text.split('\n') {
+        let words = line.trim_start();
+        match lines.last_mut() {
+            Some(before) if words.len() < line.len() => before.push_str(&format!(" {words}")),
+            _ => lines.push(line.to_owned()),
+        }
+    }
+    lines.join("\n")
 }
 
 /// Runs the solver on this many ranks to its end.

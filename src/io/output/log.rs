@@ -1,12 +1,18 @@
 //! The log: what the terminal shows, and the same without control characters in `run.log`.
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    laws::lines::wrapped,
+};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::{
     fs::{File, OpenOptions, TryLockError},
     io::{IsTerminal, Write},
     path::Path,
 };
+
+/// Where the words of a line begin, behind its title.
+pub(crate) const WORDS: usize = 11;
 
 /// Writes lines on rank 0 and nothing elsewhere.
 #[derive(Debug)]
@@ -56,12 +62,13 @@ impl Log {
         if !self.is_active {
             return;
         }
+        let words = wrapped(words.as_ref(), WORDS);
         match &self.bar {
-            Some(bar) => bar.suspend(|| print_line(words.as_ref())),
-            None if self.on_terminal => print_line(words.as_ref()),
+            Some(bar) => bar.suspend(|| print_line(&words)),
+            None if self.on_terminal => print_line(&words),
             None => {}
         }
-        self.file_line(words.as_ref());
+        self.file_line(&words);
     }
 
     /// Writes a warning and keeps it for the summary.
@@ -105,7 +112,7 @@ impl Log {
                 bar.set_draw_target(ProgressDrawTarget::term_like_with_hz(Box::new(LauncherTerminal), 5));
             }
             let style = ProgressStyle::with_template(
-                "{bar:30} {pos}/{len} steps  {elapsed} spent, {eta} left  {msg}",
+                "{wide_bar} {pos}/{len} steps  {msg}  {elapsed} spent, {eta} left",
             );
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_position(taken);
@@ -159,7 +166,7 @@ impl LauncherTerminal {
 
 impl TermLike for LauncherTerminal {
     fn width(&self) -> u16 {
-        100
+        80
     }
 
     fn move_cursor_up(&self, lines: usize) -> std::io::Result<()> {

@@ -6,6 +6,8 @@ use super::{
 };
 use crate::{
     error::{Exit, Result},
+    io::output::log::WORDS,
+    laws::lines::wrapped,
     linear_algebra::petsc::clear_option,
     parallel::{agreement::Agreed, session::Session},
     run::{self, Clock, Start},
@@ -32,7 +34,7 @@ pub(super) enum Outcome {
 pub(super) fn speaker(session: &Session) -> impl Fn(&str) {
     move |words| {
         if session.is_first() {
-            let _ = writeln!(std::io::stdout(), "{words}");
+            let _ = writeln!(std::io::stdout(), "{}", wrapped(words, WORDS));
         }
     }
 }

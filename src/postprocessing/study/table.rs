@@ -4,7 +4,10 @@ use super::{
     document::{Norm, Over, ProbeError, Quantity, Space, Study},
     results::{ErrorResult, NormResult, Results, RunResult},
 };
-use crate::postprocessing::drawing::scale::number;
+use crate::{
+    laws::lines::{WIDTH, wrapped},
+    postprocessing::drawing::scale::number,
+};
 
 /// A table with a title and lines below it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,25 +28,37 @@ impl Table {
         Self { title: title.into(), header, ..Self::default() }
     }
 
-    /// The table as aligned text for the terminal.
+    /// The table as aligned text for the terminal. What is too wide follows below, with the first column again.
     pub(super) fn text(&self) -> String {
         let width = |column: usize| {
             let cells = self.rows.iter().chain([&self.header]).filter_map(|row| row.get(column));
             cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
         };
-        let mut out = format!("{}\n", self.title);
-        for row in [&self.header].into_iter().chain(&self.rows).filter(|row| !row.is_empty()) {
-            let mut line = String::new();
-            for (column, cell) in row.iter().enumerate() {
-                let width = width(column);
-                let padded =
-                    if column == 0 { format!("  {cell:<width$}") } else { format!("  {cell:>width$}") };
-                line.push_str(&padded);
+        let rows = || [&self.header].into_iter().chain(&self.rows).filter(|row| !row.is_empty());
+        let first = width(0) + 2;
+        let mut parts = vec![Vec::new()];
+        let mut taken = first;
+        for column in 1..rows().map(Vec::len).max().unwrap_or(0) {
+            if taken + width(column) + 2 > WIDTH && taken > first {
+                parts.push(Vec::new());
+                taken = first;
             }
-            out.push_str(line.trim_end());
-            out.push('\n');
+            taken += width(column) + 2;
+            parts.last_mut().into_iter().for_each(|part| part.push(column));
         }
-        self.notes.iter().for_each(|note| out.push_str(&format!("  {note}\n")));
+        let mut out = format!("{}\n", self.title);
+        for (at, part) in parts.iter().enumerate() {
+            out.push_str(if at > 0 { "\n" } else { "" });
+            for row in rows() {
+                let mut line = row.first().map_or(String::new(), |cell| format!("  {cell:<0$}", width(0)));
+                for (column, cell) in part.iter().filter_map(|column| Some((*column, row.get(*column)?))) {
+                    line.push_str(&format!("  {cell:>0$}", width(column)));
+                }
+                out.push_str(line.trim_end());
+                out.push('\n');
+            }
+        }
+        self.notes.iter().for_each(|note| out.push_str(&format!("{}\n", wrapped(&format!("  {note}"), 4))));
         out
     }
 
