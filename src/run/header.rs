@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, setup::Setup};
+use super::{Summary, setup::Setup, step_line::Short};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
@@ -75,12 +75,15 @@ pub(super) fn closing(log: &mut Log, summary: &Summary, folder: &Path) {
         "{}     {} steps to t = {} s, {} Newton and {} linear iterations",
         summary.status, summary.steps, summary.time, summary.newton_iterations, summary.linear_iterations
     ));
+    let inclusion = match summary.inventory.contact_points {
+        0 => String::new(),
+        _ => format!("inclusion residual at most {:.1e}, ", summary.max_inclusion_residual),
+    };
+    log.line(format!("checks     {inclusion}energy imbalance at most {:.1e}", summary.max_energy_imbalance));
     log.line(format!(
-        "checks     inclusion residual at most {:.1e}, energy imbalance at most {:.1e}; von Mises at most {:.6}, at the end {:.6}",
-        summary.max_inclusion_residual,
-        summary.max_energy_imbalance,
-        summary.peaks.von_mises,
-        summary.final_von_mises
+        "stress     von Mises at most {} Pa, at the end {} Pa",
+        Short(summary.peaks.von_mises),
+        Short(summary.final_von_mises)
     ));
     for Figures { names, line, .. } in FIELDS.iter().filter_map(|field| field.figures) {
         let found: Option<Vec<f64>> = names.iter().map(|name| summary.of_fields.get(name).copied()).collect();
