@@ -68,6 +68,9 @@ impl Document {
         refuse_long(kind, text.len(), name)?;
         let texts = Texts::new(kind.name, name, text, overrides, colour);
         let mut root = parse(text).map_err(|fault| texts.refuse(vec![fault]))?;
+        if let Some(what) = other_document(kind, &root) {
+            return Err(Error::Refused(format!("{name} is {what}")));
+        }
         let mut faults = Vec::new();
         for (index, text) in overrides.iter().enumerate() {
             faults.extend(set::apply(&mut root, text, index + 1).err());
@@ -171,8 +174,38 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
     Err(Error::Refused(format!("{name}: a {} file has at most {LARGEST} bytes", kind.name)))
 }
 
+/// What a document is that is not of this kind, if it is a study or a job.
+fn other_document(kind: Kind, root: &Node) -> Option<&'static str> {
+    let is_study = root.find("base.job").is_some();
+    match kind.name {
+        "job" if is_study && root.find("time").is_none() => Some("a study, not a job: run it with solver study FILE"),
+        "study" if !is_study && root.find("time").is_some() && root.find("mesh").is_some() => {
+            Some("a job, not a study: run it with solver run FILE, or name it in [base] job of a study")
+        }
+        _ => None,
+    }
+}
+
+/// What a file with this extension is, if it is one that is often given in place of another.
+pub(crate) fn by_extension(path: &Path) -> Option<&'static str> {
+    match path.extension()?.to_str()? {
+        "geo" => Some("a geometry for Gmsh: make the mesh with gmsh -2 (in 3D -3) -format msh41 FILE.geo"),
+        "stl" => Some("a triangulated surface: name it in a job, [contact.obstacle.shape] surface = { file = \"FILE.stl\" }"),
+        "csv" => Some("a table of numbers"),
+        "toml" => Some("a text, a job or a study: solver check FILE or solver study FILE reads it"),
+        _ => None,
+    }
+}
+
 /// What a file is that begins with these bytes, if it is one that is often given in place of a job.
 fn other_file(bytes: &[u8]) -> Option<&'static str> {
+    // ASCII characters in UTF-16, without the mark at the beginning.
+    if let [a, 0, b, 0, ..] | [0, a, 0, b, ..] = bytes
+        && *a > 0
+        && *b > 0
+    {
+        return Some("a text in UTF-16: save it in UTF-8");
+    }
     let kinds: [(&[u8], &str); 4] = [
         (b"$MeshFormat", "a Gmsh mesh, not a job: name it in a job, [mesh] file = \"FILE.msh\""),
         (
@@ -202,7 +235,9 @@ pub(crate) fn read(kind: Kind, path: &Path) -> Result<(String, PathBuf)> {
     };
     let read = |file: File| file.take(LARGEST as u64 + 1).read_to_end(&mut bytes);
     File::open(path).and_then(read).map_err(unreadable)?;
-    if let Some(what) = other_file(&bytes) {
+    let extension = path.extension().is_some_and(|extension| extension != "toml");
+    let by_name = if extension { by_extension(path) } else { None };
+    if let Some(what) = other_file(&bytes).or(by_name) {
         return Err(Error::Refused(format!("{} is {what}", path.display())));
     }
     refuse_long(kind, bytes.len(), &path.display().to_string())?;
@@ -229,7 +264,12 @@ mod tests {
         assert!(said("a.msh", b"$MeshFormat\n4.1 0 8\n").contains("a Gmsh mesh, not a job"));
         assert!(said("a.h5", b"\x89HDF\r\n\x1a\n").contains("an HDF5 file, not a job"));
         assert!(said("a.toml", b"\xff\xfe[\0").contains("UTF-16: save it in UTF-8"));
-        let missing = Job::load(&folder.path().join("b.toml"), &[]).expect_err("missing").to_string();
+        assert!(said("b.toml", b"[\0m\0e\0").contains("UTF-16: save it in UTF-8"));
+        assert!(said("c.toml", b"\0[\0m\0e").contains("UTF-16: save it in UTF-8"));
+        assert!(said("a.geo", b"Point(1) = {0, 0, 0};\n").contains("a geometry for Gmsh"));
+        assert!(said("a.stl", b"solid a\n").contains("a triangulated surface"));
+        assert!(said("d.toml", b"base.job = 'a.toml'\n").contains("a study, not a job: run it with solver study"));
+        let missing = Job::load(&folder.path().join("none.toml"), &[]).expect_err("missing").to_string();
         assert!(missing.contains("cannot read") && missing.contains("there is no job file"), "{missing}");
         let directory = Job::load(folder.path(), &[]).expect_err("a folder").to_string();
         assert!(directory.contains("it is a folder, not a job file"), "{directory}");

@@ -23,6 +23,6 @@ pub(crate) use describe::{describe_kind, markdown_of};
 pub use document::*;
 pub use effective::differing_keys;
 pub use load::Loaded;
-pub(crate) use load::{Document, normal, read};
+pub(crate) use load::{Document, by_extension, normal, read};
 pub(crate) use schema::{Kind, Schema, schema_of};
 pub use semantic::MeshNames;

@@ -45,6 +45,10 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["man", "Cargo.lock/man1"], &["cannot write Cargo.lock/man1"]),
     (&["inspect", "nowhere.h5"], &["cannot read nowhere.h5"]),
     (&["inspect", "Cargo.lock"], &["Cargo.lock: it is not an HDF5 file"]),
+    (&["inspect", "Cargo.toml"], &["a job or a study"]),
+    (&["run", "jobs/studies/wang_cheng_table_1.toml"], &["is a study, not a job"]),
+    (&["study", "jobs/sliding_block.toml"], &["is a job, not a study"]),
+    (&["describe", "study", "swep"], &["did you mean `sweep`?"]),
     (&["inspect", "src"], &["src: it is not a file"]),
 ];
 

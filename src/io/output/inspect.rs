@@ -1,7 +1,10 @@
 //! Describes a checkpoint or a field file in text; in one process, without MPI.
 
 use super::seal::{CHECKPOINT, is_sealed, verify_alone};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    job::by_extension,
+};
 use hdf5::types::FixedAscii;
 use std::fmt::Write;
 use std::path::Path;
@@ -16,11 +19,14 @@ pub fn inspect(path: &Path) -> Result<String> {
     let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
     let refused = |words: &str| Error::Refused(format!("{}: {words}", path.display()));
     if !facts.is_file() {
-        return Err(refused("it is not a file; give a checkpoint-<step>.h5 or fields.vtkhdf"));
+        return Err(refused("it is not a file; give a mesh (.msh), a partitioned mesh, a checkpoint-<step>.h5 or fields.vtkhdf"));
     }
     let bytes = facts.len();
     std::fs::File::open(path).map_err(|error| Error::unreadable(path, error))?;
-    let file = hdf5::File::open(path).map_err(|_| refused("it is not an HDF5 file, or a damaged one"))?;
+    let file = hdf5::File::open(path).map_err(|_| match by_extension(path) {
+        Some(what) => refused(&format!("it is {what}")),
+        None => refused("it is not an HDF5 file, or a damaged one"),
+    })?;
     let words = if sealed {
         describe_checkpoint(&file)
     } else if file.link_exists("VTKHDF") && file.link_exists("Fields") {

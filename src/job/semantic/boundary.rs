@@ -254,12 +254,16 @@ pub(super) fn check_names(findings: &mut Findings<'_>, mesh: MeshNames<'_>) {
 
 /// Boundaries are in all tables; points and curves only in supports that hold nodes.
 fn check_place(findings: &mut Findings<'_>, (path, name): (&str, &str), mesh: MeshNames<'_>) {
-    if mesh.boundaries.contains(&name) || !mesh.points.contains(&name) {
-        return check_name(findings, path, name, mesh.boundaries, "boundary");
-    }
     let table = path.split(".on.").next().unwrap_or_default();
+    let holds_nodes = table.starts_with("support") && findings.root.find(&format!("{table}.fix")).is_some();
+    if mesh.boundaries.contains(&name) || !mesh.points.contains(&name) {
+        let points = if holds_nodes { mesh.points } else { &[] };
+        let known = [mesh.boundaries, points].concat();
+        let what = if points.is_empty() { "boundary" } else { "boundary, point or curve" };
+        return check_name(findings, path, name, &known, what);
+    }
     let what = "is the name of points or curves";
-    if !table.starts_with("support") || findings.root.find(&format!("{table}.fix")).is_none() {
+    if !holds_nodes {
         let message = format!("\"{name}\" {what}: only a support with `fix` acts on them");
         findings.fault(path, message, "name a boundary");
     } else if findings.root.read(&format!("{table}.fix")) == Some(Fix::Keyword(FixedDirections::Normal)) {
