@@ -79,7 +79,8 @@ enum Command {
     /// Print the meaning, unit, range and default of the keys of a job file (describe study: of a study file).
     Describe {
         /// Table or key to print, such as material.elasticity or time.step; absent: all tables.
-        table: Option<String>,
+        #[arg(num_args = 0..=2)]
+        table: Vec<String>,
         /// Print the JSON Schema of the whole job, or of the whole study; editors complete and check keys with it.
         #[arg(long)]
         json: bool,
@@ -206,6 +207,7 @@ fn dispatch(cli: Cli) -> Result<Exit> {
         Some(Command::Check { job, overrides, json }) => check(&job, &overrides, json),
         Some(Command::Describe { table, json, markdown }) => {
             let form = [(json, Form::Json), (markdown, Form::Markdown)];
+            let table = Some(table.join(".")).filter(|table| !table.is_empty());
             describe(table.as_deref(), form.into_iter().find(|(chosen, _)| *chosen).map(|(_, form)| form))
         }
         Some(Command::Inspect { file }) if partitioned::is_one(&file) => say(&partitioned::inspect(&file)?),

@@ -250,7 +250,7 @@ fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
     assert!(error.contains("the mesh has no boundary \"e\"") && error.contains("case.toml:26:7"), "{error}");
     let edges = MeshNames { points: &["edge"], ..mesh(&names[..4]) };
     let error = load(RICH, &[]).check_mesh(edges).expect_err("no boundary e").to_string();
-    assert!(error.contains("a, b, c, d") , "{error}");
+    assert!(error.contains("a, b, c, d"), "{error}");
     let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[], points: &[] };
     let error = loaded.check_mesh(plane).expect_err("2D").to_string();
     for part in [

@@ -178,7 +178,9 @@ fn refuse_long(kind: Kind, bytes: usize, name: &str) -> Result<()> {
 fn other_document(kind: Kind, root: &Node) -> Option<&'static str> {
     let is_study = root.find("base.job").is_some();
     match kind.name {
-        "job" if is_study && root.find("time").is_none() => Some("a study, not a job: run it with solver study FILE"),
+        "job" if is_study && root.find("time").is_none() => {
+            Some("a study, not a job: run it with solver study FILE")
+        }
         "study" if !is_study && root.find("time").is_some() && root.find("mesh").is_some() => {
             Some("a job, not a study: run it with solver run FILE, or name it in [base] job of a study")
         }
@@ -190,7 +192,9 @@ fn other_document(kind: Kind, root: &Node) -> Option<&'static str> {
 pub(crate) fn by_extension(path: &Path) -> Option<&'static str> {
     match path.extension()?.to_str()? {
         "geo" => Some("a geometry for Gmsh: make the mesh with gmsh -2 (in 3D -3) -format msh41 FILE.geo"),
-        "stl" => Some("a triangulated surface: name it in a job, [contact.obstacle.shape] surface = { file = \"FILE.stl\" }"),
+        "stl" => Some(
+            "a triangulated surface: name it in a job, [contact.obstacle.shape] surface = { file = \"FILE.stl\" }",
+        ),
         "csv" => Some("a table of numbers"),
         "toml" => Some("a text, a job or a study: solver check FILE or solver study FILE reads it"),
         _ => None,
@@ -268,7 +272,9 @@ mod tests {
         assert!(said("c.toml", b"\0[\0m\0e").contains("UTF-16: save it in UTF-8"));
         assert!(said("a.geo", b"Point(1) = {0, 0, 0};\n").contains("a geometry for Gmsh"));
         assert!(said("a.stl", b"solid a\n").contains("a triangulated surface"));
-        assert!(said("d.toml", b"base.job = 'a.toml'\n").contains("a study, not a job: run it with solver study"));
+        assert!(
+            said("d.toml", b"base.job = 'a.toml'\n").contains("a study, not a job: run it with solver study")
+        );
         let missing = Job::load(&folder.path().join("none.toml"), &[]).expect_err("missing").to_string();
         assert!(missing.contains("cannot read") && missing.contains("there is no job file"), "{missing}");
         let directory = Job::load(folder.path(), &[]).expect_err("a folder").to_string();

@@ -85,6 +85,10 @@ fn keys_that_contradict_each_other_are_refused_where_they_stand() {
             "the base job has no profile along `left`",
         ),
         (format!("{run}[[response]]\nof = \"history.max.work\"\n"), "`history.max.work` is not a quantity"),
+        (format!("{run}[[response]]\nof = \"max_vonmises\"\n"), "did you mean `max_von_mises`?"),
+        (format!("{run}[[response]]\nof = \"history.kinetic_enery\"\n"), "did you mean `kinetic_energy`?"),
+        (format!("{run}[[response]]\nof = \"history.nothing\"\n"), "there is no quantity `history.nothing`"),
+        (format!("{run}[[response]]\nof = \"probe.middle.velocity_z\"\n"), "it may be displacement_x"),
     ];
     for (study, words) in cases {
         let text = refused(&study);

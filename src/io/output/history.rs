@@ -13,6 +13,11 @@ use std::{cmp::Ordering, path::Path};
 const STEP_COLUMNS: &str =
     "step,time,dt,newton_iterations,linear_iterations,active_changes,inclusion_residual";
 
+/// All columns.
+pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
+    STEP_COLUMNS.split(',').chain(in_columns(|kind| kind.column, || "energy_imbalance"))
+}
+
 /// Number of energy columns before the column of the imbalance.
 const BEFORE_IMBALANCE: usize = 6;
 
@@ -196,8 +201,7 @@ impl History {
     /// Creates the file, or continues it after this step.
     pub fn open(folder: &Path, goes_on_after: Option<u64>) -> Result<Self> {
         let path = folder.join("history.csv");
-        let energies = in_columns(|kind| kind.column, || "energy_imbalance").join(",");
-        let header = format!("{STEP_COLUMNS},{energies}");
+        let header = columns().collect::<Vec<_>>().join(",");
         Ok(Self(CsvFile::open(&path, &header, goes_on_after.map(|step| step as f64))?))
     }
 

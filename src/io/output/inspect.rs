@@ -19,7 +19,9 @@ pub fn inspect(path: &Path) -> Result<String> {
     let facts = std::fs::metadata(path).map_err(|error| Error::unreadable(path, error))?;
     let refused = |words: &str| Error::Refused(format!("{}: {words}", path.display()));
     if !facts.is_file() {
-        return Err(refused("it is not a file; give a mesh (.msh), a partitioned mesh, a checkpoint-<step>.h5 or fields.vtkhdf"));
+        return Err(refused(
+            "it is not a file; give a mesh (.msh), a partitioned mesh, a checkpoint-<step>.h5 or fields.vtkhdf",
+        ));
     }
     let bytes = facts.len();
     std::fs::File::open(path).map_err(|error| Error::unreadable(path, error))?;

@@ -1,7 +1,11 @@
 //! Checks of a study alone and against its base job, before the jobs of its runs are loaded.
 
 use super::document::{Exact, ProbeError, Quantity, Reference, Run, Space, Study, Values};
-use crate::job::{Document, Job};
+use crate::{
+    io::output::{field_list::FIELDS, history::columns},
+    job::{Document, Job},
+    laws::nearest::nearest,
+};
 
 /// The most runs of a study.
 const MOST_RUNS: usize = 1000;
@@ -141,7 +145,72 @@ fn check_exact(exact: &Exact, of: Quantity, base: &Job, path: &str, document: &m
     }
 }
 
-/// Checks that the quantity is one of a known form, and that the base job has its probe or profile.
+/// Columns of `resultants.csv`, beside those of forces and moments.
+const OF_RESULTANTS: [&str; 10] = [
+    "touching_area",
+    "open_area",
+    "mean_pressure",
+    "largest_pressure",
+    "sticking_area",
+    "slipping_area",
+    "obstacle_displacement",
+    "obstacle_velocity",
+    "obstacle_rotation",
+    "obstacle_angular_velocity",
+];
+
+/// Columns of `profiles.csv`, beside those of coordinates and vectors.
+const OF_PROFILES: [&str; 4] = ["normal_displacement", "normal_velocity", "contact_pressure", "gap"];
+
+/// The numbers of `summary.json`, beside those in objects.
+const OF_SUMMARY: [&str; 18] = [
+    "ranks",
+    "dimension",
+    "cells",
+    "nodes",
+    "unknowns",
+    "steps",
+    "time",
+    "rejected_steps",
+    "set_ups",
+    "newton_iterations",
+    "linear_iterations",
+    "final_von_mises",
+    "max_von_mises",
+    "max_strain",
+    "max_inclusion_residual",
+    "max_energy_imbalance",
+    "max_slip_pressure",
+    "peak_memory_bytes",
+];
+
+/// The names that the last part of a response may have, if they are known before the runs.
+fn known_columns(parts: &[&str], base: &Job) -> Vec<String> {
+    let axes = &["x", "y", "z"][..base.dimension().unwrap_or(3)];
+    let vectors = |names: &[&str]| -> Vec<String> {
+        names.iter().flat_map(|name| axes.iter().map(move |axis| format!("{name}_{axis}"))).collect()
+    };
+    let plain = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let mut known = match parts {
+        ["probe", ..] => vectors(&["displacement", "velocity"]),
+        ["profile", ..] => vectors(&["friction_traction", "sliding_velocity", "tangential_displacement"]),
+        ["resultant", ..] => vectors(&["force"]),
+        _ => Vec::new(),
+    };
+    known.extend(match parts {
+        ["profile", ..] => [plain(axes), plain(&OF_PROFILES)].concat(),
+        ["resultant", ..] => [plain(&["moment_x", "moment_y", "moment_z"]), plain(&OF_RESULTANTS)].concat(),
+        ["history", _] => columns().map(str::to_owned).collect(),
+        [_] => {
+            let figures = FIELDS.iter().filter_map(|field| field.figures).flat_map(|figures| figures.names);
+            OF_SUMMARY.iter().chain(figures).map(|name| (*name).to_owned()).collect()
+        }
+        _ => Vec::new(),
+    });
+    known
+}
+
+/// Checks that the quantity is one of a known form, that the base job has its probe or profile, and that it is a column of its table.
 fn check_response(study: &Study, base: &Job, index: usize, document: &mut Document) {
     let name = &study.response[index].of;
     let path = format!("response.{index}.of");
@@ -162,6 +231,15 @@ fn check_response(study: &Study, base: &Job, index: usize, document: &mut Docume
         ["probe" | "profile" | "history" | "resultant", ..] => false,
         ref parts => parts.iter().all(|part| !part.is_empty()),
     };
+    let parts: Vec<&str> = name.split('.').collect();
+    let known = known_columns(&parts, base);
+    let column = parts.last().copied().unwrap_or_default();
+    if has_form && !known.is_empty() && !known.iter().any(|known| known == column) {
+        let names = || known.iter().map(String::as_str);
+        let near = nearest(column, names()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
+        let help = format!("{near}it may be {}", names().collect::<Vec<_>>().join(", "));
+        document.fault(&path, format!("there is no quantity `{name}`"), help);
+    }
     if !has_form {
         let help = "a number of summary.json, history.COLUMN, probe.NAME.COLUMN, probe.NAME.max.COLUMN, \
                     resultant.SOURCE.COLUMN or profile.BOUNDARY.max.COLUMN (also .min., of profiles .first.)";

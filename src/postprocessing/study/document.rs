@@ -27,7 +27,8 @@ pub struct Study {
     /// Runs for all combinations of the values in lists. They follow the runs of [[run]].
     pub product: Option<Product>,
     /// Runs of the base job with other values of its keys: every combination of the listed values, and random draws. They follow the
-    /// runs of [product].
+    /// runs of [product]. The name is a key of the job, with the positions of its lists counted from 0, such as
+    /// "contact.0.friction.coulomb.coefficient" = [0.1, 0.2, 0.4] or "time.step" = { from = 0.01, to = 0.02, draws = 8 }.
     #[serde(default)]
     #[schemars(extend("key_help" = "quote the whole key: \"time.step\" = [0.1, 0.2]"))]
     pub sweep: BTreeMap<String, Values>,
