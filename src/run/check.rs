@@ -51,7 +51,7 @@ pub struct Report {
     warnings: Vec<String>,
     output_folder: String,
     #[serde(skip)]
-    has_impacts: bool,
+    motion: Motion,
     #[serde(skip)]
     header: Vec<String>,
 }
@@ -119,8 +119,11 @@ fn report<const D: usize, const S: usize>(
         estimate: Estimate::new(session, body, &inventory, preconditioner, problem),
         warnings: header::warnings(loaded, ready),
         output_folder: job.output_folder().display().to_string(),
-        has_impacts: body.has_form(Form::Mass)
-            && body.contacts.iter().any(|c| c.law.depends_on_displacement()),
+        motion: match body.contacts.iter().any(|contact| contact.law.depends_on_displacement()) {
+            _ if !body.has_form(Form::Mass) => Motion::Slow,
+            true => Motion::Impacts,
+            false => Motion::Inertia,
+        },
         header: header::lines(session, loaded, ready)?,
     })
 }
@@ -136,21 +139,37 @@ fn extent<const D: usize>(session: &Session, mesh: &Mesh<D>) -> Vec<[f64; 2]> {
     (0..D).map(along).collect()
 }
 
-/// Which time scheme suits a job, and why.
-fn advice(scheme: &str, bound: Option<f64>, has_impacts: bool) -> String {
+/// Up to which step the scheme of a job is stable, and which scheme suits the job.
+fn advice(scheme: &str, bound: Option<f64>, motion: Motion) -> [String; 2] {
     let own = match bound {
         Some(bound) => format!("{scheme} is stable with steps below {bound:.4e} s"),
         None => format!("{scheme} is stable with steps of any length"),
     };
-    let better = match (scheme, has_impacts) {
-        ("bdf2", true) => {
-            "; in impacts, which this job may have, [[contact]] redistribute_mass = true keeps energy and pressure from jumping, and \
-             implicit_euler damps them"
+    let suits = match motion {
+        Motion::Impacts => {
+            "contact may close in an impact: midpoint with [[contact]] redistribute_mass = true keeps the energy, implicit_euler damps \
+             it; bdf2 suits bodies that touch from the start and move smoothly"
         }
-        (_, true) | ("bdf2", false) => "",
-        (_, false) => "; bdf2 is of second order where motions are smooth",
+        Motion::Inertia => {
+            "no impacts: bdf2, of second order where loads are smooth; lagged_euler, the scheme of Wang and Cheng (2022), has the \
+             cheapest steps, but they must be short enough to be stable"
+        }
+        Motion::Slow => {
+            "no inertia: bdf2, of second order where loads and contact change smoothly; implicit_euler where they jump"
+        }
     };
-    format!("stability  {own}{better}")
+    [format!("stability  {own}"), format!("suits      {suits}")]
+}
+
+/// The kind of motion, as far as the job tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Motion {
+    /// Bodies with mass and contact that opens and closes.
+    Impacts,
+    /// Bodies with mass without such a contact.
+    Inertia,
+    /// Bodies without mass.
+    Slow,
 }
 
 impl Report {
@@ -176,8 +195,8 @@ impl Report {
             format!("unknowns   {} velocity components; supports hold the others", self.unknowns),
             format!("cells      shape quality at least {:.3} of 1", self.cell_quality.smallest),
             format!("extent     {}", extent.join(", ")),
-            advice(self.scheme, self.certificates.explicit_step_bound, self.has_impacts),
         ];
+        lines.extend(advice(self.scheme, self.certificates.explicit_step_bound, self.motion));
         if self.newton {
             lines.push(format!("contact    {} points", self.contact_points));
         }
@@ -249,6 +268,14 @@ fn rounded(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_scheme_that_suits_a_job_depends_on_its_motion() {
+        let suits = |motion| advice("lagged_euler", Some(0.12), motion);
+        assert_eq!(suits(Motion::Slow)[0], "stability  lagged_euler is stable with steps below 1.2000e-1 s");
+        assert!(suits(Motion::Impacts)[1].contains("midpoint with [[contact]] redistribute_mass = true"));
+        assert!(suits(Motion::Inertia)[1].contains("no impacts: bdf2"));
+    }
 
     #[test]
     fn sizes_and_times_have_readable_units() {
