@@ -229,7 +229,8 @@ impl Key {
     /// The allowed words with their meanings.
     fn choices(&self) -> Vec<(&'static str, String)> {
         let choice = |choice: &Schema| Some((choice.text("const")?, flat(choice.text("description")?)));
-        self.schema.alternatives().iter().filter_map(choice).collect()
+        let of_items = self.schema.items().filter(|_| self.schema.accepts("array"));
+        of_items.unwrap_or(self.schema).alternatives().iter().filter_map(choice).collect()
     }
 
     /// Lines as in a document.

@@ -16,10 +16,10 @@ pub struct Support {
     #[schemars(length(min = 1), example = ["left"])]
     pub on: Vec<String>,
     /// The part of these boundaries to which the support applies: with `fix` the nodes at which this expression in x, y, z is not
-    /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. Absent: the whole
-    /// boundaries.
+    /// 0, for example the nodes of an edge, or a single node; otherwise the facets at whose centre it is not 0. A product of
+    /// conditions holds where all hold, their `max` where one holds. Absent: the whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
-    #[schemars(example = "x < 1", example = "hypot(x - 1, y) < 1e-6")]
+    #[schemars(example = "x < 1", example = "hypot(x - 1, y) < 1e-6", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,
     /// The components of the displacement that the support determines: "all", "normal" or a list of axes. They keep their initial
     /// values, unless `displacement` or `velocity` moves them.

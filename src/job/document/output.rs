@@ -64,7 +64,8 @@ pub enum FurtherField {
     /// nodes and where the law has no gap.
     Gap,
     /// The state of the nodes of nodal contacts. 0: no contact boundary; 1: open; 2: with contact pressure; 3: with contact pressure
-    /// and friction, sticking; 4: the same, slipping.
+    /// and friction, sticking; 4: the same, slipping. At t = 0, where the first step has
+    /// yet to find the pressure: 1.
     ContactStatus,
     /// The number of the branch of the normal contact law, from 0 in the order of the normal velocity; 0 at other nodes.
     Branch,
