@@ -248,9 +248,9 @@ fn a_mesh_file_is_compared_with_the_job_once_it_is_read() {
 
     let error = loaded.check_mesh(mesh(&names[..4])).expect_err("no boundary e").to_string();
     assert!(error.contains("the mesh has no boundary \"e\"") && error.contains("case.toml:26:7"), "{error}");
-    let edges = MeshNames { points: &["edge"], ..mesh(&names[..4]) };
-    let error = load(RICH, &[]).check_mesh(edges).expect_err("no boundary e").to_string();
-    assert!(error.contains("a, b, c, d"), "{error}");
+    let points = MeshNames { points: &["pin"], ..mesh(&["a", "c", "d", "e"]) };
+    let error = load(RICH, &[]).check_mesh(points).expect_err("no boundary b").to_string();
+    assert!(error.contains("no boundary, point or curve \"b\"") && error.contains("e, pin"), "{error}");
     let plane = MeshNames { dimension: 2, boundaries: &names, regions: &[], points: &[] };
     let error = loaded.check_mesh(plane).expect_err("2D").to_string();
     for part in [
