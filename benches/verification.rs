@@ -171,6 +171,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        page: "hertz-sphere",
+        name: "meshes",
+        job: "verification/hertz_sphere",
+        columns: Columns::Meshes,
+        pictured: true,
+        runs: &[
+            with("4 mm", &["mesh.file=../../meshes/sphere_coarse.msh"]),
+            with("2 mm", &[]),
+            with("1 mm", &["mesh.file=../../meshes/sphere_fine.msh"]),
+        ],
+    },
+    Table {
         page: "cattaneo",
         name: "meshes",
         job: "verification/cattaneo",
