@@ -51,6 +51,11 @@ pub trait FrictionBound {
         0.0
     }
 
+    /// Whether a point at rest carries any traction up to a bound; if not, the traction grows from zero with the sliding velocity.
+    fn jumps_at_rest(&self) -> bool {
+        true
+    }
+
     /// Whether the bound depends on the contact pressure.
     fn follows_pressure(&self) -> bool {
         true
@@ -154,6 +159,7 @@ macro_rules! friction_laws {
                 coefficient(speed: f64) -> f64;
                 bound(speed: f64, pressure: f64) -> f64;
                 slope(speed: f64, pressure: f64) -> f64;
+                jumps_at_rest() -> bool;
                 follows_pressure() -> bool;
                 steepest_decrease() -> f64;
                 corner_velocity() -> f64;

@@ -375,6 +375,9 @@ impl<const D: usize> Friction<D> {
     /// Largest distance of (sliding velocity, traction from equilibrium) to the graph at the contact pressure, scaled by
     /// `range`; overestimated by at most a factor of the square root of 2. `residual` contains the unbalanced forces in N; both are
     /// vectors of Newton's method.
+    ///
+    /// A graph without a jump at rest may be steeper there than the rounding of velocities resolves: the bound at the rounded sliding
+    /// velocity says nothing about the traction. There the distance to the point with the same parameter counts, too.
     pub(super) fn inclusion_residual(
         &self,
         points: &[Point<D>],
@@ -392,6 +395,16 @@ impl<const D: usize> Friction<D> {
             let (speed, size) = (norm(&sliding), norm(&traction));
             let beyond = (size - point.law.bound(0.0, pressure)).max(0.0);
             let to_rest = (speed / speeds).hypot(beyond / tractions);
+            let to_rest = if point.law.jumps_at_rest() {
+                to_rest
+            } else {
+                to_rest.min(distance_along_parameter(
+                    &point.law,
+                    pressure,
+                    [sliding, traction],
+                    [speeds, tractions],
+                ))
+            };
             if speed == 0.0 {
                 return to_rest;
             }
@@ -422,6 +435,25 @@ impl<const D: usize> Friction<D> {
         };
         self.points.iter().map(square).sum()
     }
+}
+
+/// The scaled distance of a sliding velocity and a traction to the point of the graph with the same parameter `c v + q`, where `c` is
+/// the ratio of the scales or, where the graph decreases faster, twice its steepest decrease.
+fn distance_along_parameter<const D: usize>(
+    law: &FrictionLaw,
+    pressure: f64,
+    [sliding, traction]: [Vector<D>; 2],
+    [speeds, tractions]: [f64; 2],
+) -> f64 {
+    let c = (tractions / speeds).max(2.0 * law.steepest_decrease() * pressure.max(0.0));
+    let parameter = add_scaled(&traction, c, &sliding);
+    let size = norm(&parameter);
+    let found = law.resolve(size, c, pressure);
+    let off = |value: &Vector<D>, found: f64| {
+        let share = if size > 0.0 { found / size } else { 0.0 };
+        norm(&add_scaled(value, -share, &parameter))
+    };
+    (off(&sliding, found.speed) / speeds).hypot(off(&traction, found.traction) / tractions)
 }
 
 /// The directions along the boundary that supports fix at a point.

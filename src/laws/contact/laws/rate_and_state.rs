@@ -140,6 +140,10 @@ impl FrictionBound for RateAndState {
         self.at(speed)[1] * pressure.max(0.0)
     }
 
+    fn jumps_at_rest(&self) -> bool {
+        false
+    }
+
     fn steepest_decrease(&self) -> f64 {
         let [before, length] = self.step;
         let follows = match self.law {
