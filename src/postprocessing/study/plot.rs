@@ -4,7 +4,7 @@
 //! Each mark is a run. A line joins those runs of a scheme that are more accurate than all cheaper runs of the scheme.
 
 use super::{
-    document::{Quantity, Space, Values},
+    document::{Over, Quantity, Space, Values},
     measure::Place,
     plan::Plan,
     results::{NormResult, Results, RunResult},
@@ -13,6 +13,7 @@ use super::{
 use crate::{
     error::Result,
     io::output::field_snapshot::Snapshot,
+    job::Job,
     postprocessing::drawing::{
         body::{Body, Coloured},
         chart::{Axis, Chart, Look, Series},
@@ -38,15 +39,27 @@ struct Curve {
 /// All pictures of the results.
 pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
     let mut pictures = Vec::new();
+    let dimension = dimension(plan);
     for (at, norm) in results.norms.iter().enumerate() {
-        let of = plan.study.norm.get(at).map(|norm| (norm.of, norm.space));
-        pictures.extend(costs(results, at, norm, unit(of))?);
+        let chosen = plan.study.norm.get(at);
+        let of = chosen.map(|norm| (norm.of, norm.space));
+        let is_summed = chosen.is_some_and(|norm| norm.over == Over::Sum);
+        pictures.extend(costs(results, at, norm, &unit_of_norm(of, dimension, is_summed))?);
         pictures.extend(tolerances(results, at, norm)?);
-        pictures.extend(over_time(plan, results, at, norm, of)?);
+        pictures.extend(over_time(plan, results, at, norm, &unit_of_norm(of, dimension, false))?);
         pictures.extend(on_the_body(plan, results, at, norm, of)?);
     }
     pictures.extend(responses(plan, results)?);
     Ok(pictures)
+}
+
+/// The dimension of the bodies; that of a mesh file is found in the fields of a run.
+fn dimension(plan: &Plan) -> usize {
+    let of_run = |job: &Job| {
+        let fields = || Snapshot::read(&job.output_folder().join("fields.vtkhdf")).ok();
+        job.dimension().or_else(|| Some(fields()?.dimension()))
+    };
+    plan.runs.iter().find_map(|run| of_run(&run.loaded.job)).unwrap_or(3)
 }
 
 /// Errors against cost, for a norm that is known for at least two runs.
@@ -197,11 +210,35 @@ fn response(
     )))
 }
 
+/// The unit of a quantity whose norm is taken: that of the strain or the strain rate in V.
 fn unit(of: Option<(Quantity, Space)>) -> &'static str {
     match of {
         None | Some((Quantity::Displacement, Space::V)) => "",
         Some((Quantity::Velocity, Space::V)) => "1/s",
         Some((of, _)) => of.field().units[0],
+    }
+}
+
+/// The unit of a norm: the root of the integral of a square over a body of this dimension and, if it is summed over the steps, over
+/// time.
+fn unit_of_norm(of: Option<(Quantity, Space)>, dimension: usize, is_summed: bool) -> String {
+    let Some((quantity, space)) = of else { return String::new() };
+    let in_space = match (quantity, space, dimension) {
+        (Quantity::Stress, _, 2) => "Pa m",
+        (Quantity::Stress, ..) => "Pa m^1.5",
+        (Quantity::Displacement, Space::V, 2) => "m",
+        (Quantity::Displacement, Space::V, _) => "m^1.5",
+        (Quantity::Displacement, _, 2) => "m²",
+        (Quantity::Displacement, ..) => "m^2.5",
+        (Quantity::Velocity, Space::V, 2) => "m/s",
+        (Quantity::Velocity, Space::V, _) => "m^1.5/s",
+        (Quantity::Velocity, _, 2) => "m²/s",
+        (Quantity::Velocity, ..) => "m^2.5/s",
+    };
+    match (is_summed, in_space.strip_suffix("/s")) {
+        (false, _) => in_space.into(),
+        (true, None) => format!("{in_space} √s"),
+        (true, Some(length)) => format!("{length}/√s"),
     }
 }
 
@@ -252,7 +289,7 @@ fn over_time(
     results: &Results,
     norm: usize,
     shown: &NormResult,
-    of: Option<(Quantity, Space)>,
+    unit: &str,
 ) -> Result<Option<Picture>> {
     let named = &plan.study.pictures.over_time;
     let mut chosen: Vec<&RunResult> = Vec::new();
@@ -273,7 +310,7 @@ fn over_time(
         Series::new(place, run.name.clone(), Look::Line, run.places[norm].over_time.clone())
     });
     let time = Axis { quantity: "t", unit: "s" };
-    let shown_error = Axis { quantity: "error", unit: unit(of) };
+    let shown_error = Axis { quantity: "error", unit };
     let chart =
         Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
     let worst = chosen.iter().map(|run| {
@@ -326,6 +363,20 @@ fn on_the_body(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The dimensions by hand: the root of the integral over an area is a length, over a volume a length to the power of 1.5.
+    #[test]
+    fn norms_have_the_unit_of_the_root_of_an_integral() {
+        let unit = |quantity, space, dimension, is_summed| {
+            unit_of_norm(Some((quantity, space)), dimension, is_summed)
+        };
+        assert_eq!(unit(Quantity::Stress, Space::Q, 2, false), "Pa m");
+        assert_eq!(unit(Quantity::Stress, Space::Q, 3, true), "Pa m^1.5 √s");
+        assert_eq!(unit(Quantity::Displacement, Space::V, 2, false), "m");
+        assert_eq!(unit(Quantity::Displacement, Space::H, 2, false), "m²");
+        assert_eq!(unit(Quantity::Velocity, Space::H, 3, false), "m^2.5/s");
+        assert_eq!(unit(Quantity::Velocity, Space::V, 2, true), "m/√s");
+    }
 
     #[test]
     fn the_line_joins_runs_that_no_cheaper_one_beats() {
