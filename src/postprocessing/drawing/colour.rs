@@ -17,9 +17,6 @@ pub const LINES: [Colour; 7] = [
 /// Text and axes.
 pub(super) const INK: Colour = [0x1a, 0x1a, 0x1a];
 
-/// Light backgrounds of parts of a chart.
-pub const BANDS: [Colour; 3] = [[0xdb, 0xe9, 0xf6], [0xfd, 0xeb, 0xd0], [0xe6, 0xe6, 0xe6]];
-
 /// The colour scale of a field, from the smallest value to the largest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shades(&'static [u32; 17]);
@@ -59,6 +56,11 @@ pub fn hex([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
+/// A light version of a colour, for backgrounds.
+pub fn lightened(colour: Colour) -> Colour {
+    colour.map(|channel| 0xff - (f64::from(0xff - channel) * 0.17).round() as u8)
+}
+
 /// A darker colour.
 pub(super) fn dimmed(colour: Colour, light: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * light).round() as u8)
@@ -78,6 +80,14 @@ mod tests {
         for shades in [VIRIDIS, CIVIDIS] {
             let light: Vec<f64> = (0..=20).map(|n| lightness(shades.at(f64::from(n) / 20.0))).collect();
             assert!(light.windows(2).all(|pair| pair[0] < pair[1]), "{light:?}");
+        }
+    }
+
+    #[test]
+    fn each_line_has_a_light_background_of_its_own() {
+        let light = LINES.map(lightened);
+        for (at, colour) in light.iter().enumerate() {
+            assert!(lightness(*colour) > 200.0 && !light[..at].contains(colour), "{colour:?}");
         }
     }
 

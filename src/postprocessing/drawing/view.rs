@@ -88,14 +88,19 @@ pub fn outline(snapshot: &Snapshot) -> Vec<Vec<u32>> {
 /// Outward unit normals at boundary nodes: the mean over the facets between these nodes, weighted by their size.
 pub fn normals(snapshot: &Snapshot, nodes: &[usize]) -> Vec<[f64; 3]> {
     let mut sums: BTreeMap<u32, [f64; 3]> = nodes.iter().map(|node| (*node as u32, [0.0; 3])).collect();
-    let mut add = |facet: &[u32], normal: [f64; 3]| {
+    for (facet, normal) in facets(snapshot) {
         if facet.iter().all(|node| sums.contains_key(node)) {
             for node in facet {
-                let sum = sums.entry(*node).or_default();
+                let sum = sums.entry(node).or_default();
                 *sum = std::array::from_fn(|i| sum[i] + normal[i]);
             }
         }
-    };
+    }
+    nodes.iter().map(|node| unit(sums[&(*node as u32)])).collect()
+}
+
+/// The nodes of each facet of the surface, with its outward normal; the length of the normal is in proportion to the facet's size.
+pub fn facets(snapshot: &Snapshot) -> Vec<(Vec<u32>, [f64; 3])> {
     let at = |node: u32| snapshot.nodes[node as usize];
     if snapshot.dimension() == 2 {
         let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(snapshot.cells.len());
@@ -104,19 +109,20 @@ pub fn normals(snapshot: &Snapshot, nodes: &[usize]) -> Vec<[f64; 3]> {
             edges.extend(sides.map(|[a, b, opposite]| ([a.min(b), a.max(b)], opposite)));
         }
         edges.sort_unstable();
-        for same in edges.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1) {
+        let alone = edges.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
+        let of_edge = |same: &[([u32; 2], u32)]| {
             let ([a, b], opposite) = same[0];
             let [along, inward] = [minus(at(b), at(a)), minus(at(opposite), at(a))];
             let normal = [along[1], -along[0], 0.0];
-            add(&[a, b], if dot(normal, inward) > 0.0 { normal.map(|c| -c) } else { normal });
-        }
-    } else {
-        for face in faces(snapshot) {
-            let [a, b, c] = face.nodes.map(at);
-            add(&face.nodes, cross(minus(b, a), minus(c, a)));
-        }
+            (vec![a, b], if dot(normal, inward) > 0.0 { normal.map(|c| -c) } else { normal })
+        };
+        return alone.map(of_edge).collect();
     }
-    nodes.iter().map(|node| unit(sums[&(*node as u32)])).collect()
+    let of_face = |face: Face| {
+        let [a, b, c] = face.nodes.map(at);
+        (face.nodes.to_vec(), cross(minus(b, a), minus(c, a)))
+    };
+    faces(snapshot).into_iter().map(of_face).collect()
 }
 
 fn outward(snapshot: &Snapshot, (key, cell, opposite): ([u32; 3], u32, u8)) -> Face {

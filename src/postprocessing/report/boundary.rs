@@ -4,7 +4,7 @@ use super::{
     arc::along_curve,
     body::{Body, Coloured},
     chart::{Axis, Band, Chart, Look, Series},
-    colour::{BANDS, CIVIDIS, Colour, LINES},
+    colour::{CIVIDIS, LINES, lightened},
     friction::{self, Rubbing},
     law::Law,
     markup::table,
@@ -20,7 +20,7 @@ use crate::{
         fields::{Place, Shape},
         output_field::OutputField,
     },
-    laws::contact::FrictionLaw,
+    laws::{contact::FrictionLaw, expression::Scalar},
 };
 use std::collections::HashMap;
 
@@ -44,6 +44,10 @@ pub(super) struct Boundary<'a> {
     arc: Vec<f64>,
     dimension: usize,
     behind: Option<Behind<'a>>,
+    /// Whether the laws act at each node.
+    is_in_contact: Vec<bool>,
+    /// The boundary, or the part of it on which its laws act, in words.
+    place: String,
 }
 
 /// The body at the same time, with the numbers of the boundary's nodes and the outward normals there.
@@ -53,8 +57,12 @@ struct Behind<'a> {
     normals: Vec<[f64; 3]>,
 }
 
-/// The laws on a boundary.
+/// The laws of a contact.
 pub(super) struct Laws {
+    /// Its boundaries.
+    pub on: Vec<String>,
+    /// The part of them on which it acts, if it is not all of them.
+    pub part: Option<Scalar>,
     /// The normal law.
     pub normal: Law,
     /// The friction law.
@@ -62,20 +70,26 @@ pub(super) struct Laws {
 }
 
 impl<'a> Boundary<'a> {
-    /// The rows of a profile at one time, and the laws on its boundary.
-    pub(super) fn new(
-        table: Table,
-        name: &'a str,
-        laws: Option<&'a Laws>,
-        snapshot: Option<&'a Snapshot>,
-    ) -> Self {
-        let (law, friction) = (laws.map(|laws| &laws.normal), laws.and_then(|laws| laws.friction));
+    /// The rows of a profile at one time, and the body.
+    pub(super) fn new(table: Table, name: &'a str, snapshot: Option<&'a Snapshot>) -> Self {
         let dimension = if table.header().iter().any(|column| column == "z") { 3 } else { 2 };
         let axes = ["x", "y", "z"].map(|axis| table.column(axis).unwrap_or_else(|| vec![0.0; table.len()]));
         let points: Vec<[f64; 3]> = (0..table.len()).map(|n| [0, 1, 2].map(|axis| axes[axis][n])).collect();
         let time = table.column("time").and_then(|times| times.last().copied()).unwrap_or(0.0);
-        let mut boundary =
-            Self { name, time, law, friction, table, points, arc: vec![], dimension, behind: None };
+        let is_in_contact = vec![true; points.len()];
+        let mut boundary = Self {
+            name,
+            time,
+            law: None,
+            friction: None,
+            table,
+            points,
+            arc: vec![],
+            dimension,
+            behind: None,
+            is_in_contact,
+            place: name.to_owned(),
+        };
         if dimension == 2 {
             let (order, arc) = along_curve(&boundary.points);
             boundary.points = order.iter().map(|at| boundary.points[*at]).collect();
@@ -87,7 +101,46 @@ impl<'a> Boundary<'a> {
                 Behind { snapshot, nodes, normals }
             });
         }
+        // The gap is empty at nodes without a contact.
+        if let Some(gap) = boundary.table.column("gap") {
+            boundary.is_in_contact = gap.iter().map(|gap| !gap.is_nan()).collect();
+        }
         boundary
+    }
+
+    /// The nodes on which these laws act, and no others: of two contacts on one boundary, their common node follows neither law.
+    pub(super) fn within(self, laws: &'a Laws, others: &[&Laws]) -> Self {
+        let mut is_in_contact = self.is_in_contact.clone();
+        let parts = std::iter::once((true, laws)).chain(others.iter().map(|other| (false, *other)));
+        for (wanted, part) in parts {
+            let inside = self.inside(part.part.as_ref());
+            is_in_contact.iter_mut().zip(inside).for_each(|(is, inside)| *is &= inside == wanted);
+        }
+        let place = match &laws.part {
+            Some(Scalar::Expression(part)) => format!("{} where {}", self.name, part.text()),
+            _ => self.name.to_owned(),
+        };
+        Self { law: Some(&laws.normal), friction: laws.friction, is_in_contact, place, ..self }
+    }
+
+    /// Whether each node belongs to a facet of this part; without the body, whether the node itself does.
+    fn inside(&self, part: Option<&Scalar>) -> Vec<bool> {
+        let Some(part) = part else { return vec![true; self.points.len()] };
+        let holds = |point: &[f64; 3]| part.evaluate(0.0, &point[..self.dimension]) != 0.0;
+        let Some(Behind { snapshot, nodes, .. }) = &self.behind else {
+            return self.points.iter().map(holds).collect();
+        };
+        let places: HashMap<u32, usize> = (0..).zip(nodes).map(|(at, node)| (*node as u32, at)).collect();
+        let mut inside = vec![false; self.points.len()];
+        for (facet, _) in super::view::facets(snapshot) {
+            let here: Vec<usize> = facet.iter().filter_map(|node| places.get(node).copied()).collect();
+            let corner = |axis: usize| here.iter().map(|at| self.points[*at][axis]).sum::<f64>();
+            let centre = std::array::from_fn(|axis| corner(axis) / facet.len() as f64);
+            if here.len() == facet.len() && holds(&centre) {
+                here.into_iter().for_each(|at| inside[at] = true);
+            }
+        }
+        inside
     }
 
     /// The numbers of the boundary's nodes in the body, if all are found.
@@ -119,9 +172,12 @@ impl<'a> Boundary<'a> {
                 out.push(picture);
             }
         }
-        out.extend(self.on_law(&[])?);
-        out.extend(self.on_friction()?);
         Ok(out)
+    }
+
+    /// Its nodes on the graphs of its laws.
+    pub(super) fn graphs(&self) -> Result<Vec<Picture>> {
+        Ok(self.on_law(&[])?.into_iter().chain(self.on_friction()?).collect())
     }
 
     /// Fields and histories with a number at each node that only nodes of contacts have, where the profile does not have them.
@@ -142,8 +198,9 @@ impl<'a> Boundary<'a> {
     pub(super) fn branch_table(&self) -> String {
         let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return String::new() };
         let rows = law.branches().into_iter().enumerate().map(|(at, branch)| {
-            let count = on.iter().filter(|other| **other == at).count();
-            let where_ = extent(self.arc.iter().zip(&on).filter(|(_, other)| **other == at).map(|(s, _)| *s));
+            let count = on.iter().filter(|other| **other == Some(at)).count();
+            let where_ =
+                extent(self.arc.iter().zip(&on).filter(|(_, other)| **other == Some(at)).map(|(s, _)| *s));
             let place = where_.map_or("–".into(), |(a, b)| format!("{} to {}", number(a), number(b)));
             let mut row = vec![branch.name, branch.range, branch.slope, count.to_string()];
             if self.dimension == 2 {
@@ -154,7 +211,7 @@ impl<'a> Boundary<'a> {
         let quantity = law.quantity().0;
         let words = format!(
             "Nodes of {} on the branches of the contact law at t = {} s",
-            self.name,
+            self.place,
             number(self.time)
         );
         let mut header = vec!["branch", quantity, "slope", "nodes"];
@@ -168,18 +225,15 @@ impl<'a> Boundary<'a> {
         self.drawn(column, &self.table.column(column).unwrap_or_default(), snapshot)
     }
 
-    /// Values at the nodes along the boundary; no picture of what is zero everywhere. A gap is infinite where the normal meets no
-    /// obstacle: such nodes are left out of a curve, and there is no map of such values.
+    /// Values at the nodes along the boundary; no picture of what is zero everywhere. Nodes without a contact have no
+    /// gap, and it is infinite where the normal meets no obstacle: such nodes are left out.
     fn drawn(&self, column: &str, values: &[f64], snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
-        if values.iter().all(|value| *value == 0.0) {
+        if values.iter().all(|value| *value == 0.0 || !value.is_finite()) {
             return Ok(None);
         }
         let (quantity, unit) = (column.replace('_', " "), unit_by_name(column));
         let name = format!("{}_{column}", self.name);
         if self.dimension == 3 {
-            if values.iter().any(|value| !value.is_finite()) {
-                return Ok(None);
-            }
             return self.map(&name, &quantity, unit, values, snapshot);
         }
         let points = self.arc.iter().zip(values).filter(|(_, value)| value.is_finite());
@@ -228,7 +282,8 @@ impl<'a> Boundary<'a> {
         let Some(snapshot) = snapshot else { return Ok(None) };
         let bits = |p: &[f64; 3]| p.map(f64::to_bits);
         let places: HashMap<[u64; 3], u32> = (0..).zip(&self.points).map(|(n, p)| (bits(p), n)).collect();
-        let here: Vec<Option<u32>> = snapshot.nodes.iter().map(|p| places.get(&bits(p)).copied()).collect();
+        let place = |p| places.get(&bits(p)).copied().filter(|n| values[*n as usize].is_finite());
+        let here: Vec<Option<u32>> = snapshot.nodes.iter().map(place).collect();
         let mut cells = Vec::new();
         for face in super::view::faces(snapshot) {
             if let [Some(a), Some(b), Some(c)] = face.nodes.map(|node| here[node as usize]) {
@@ -259,15 +314,18 @@ impl<'a> Boundary<'a> {
         Ok(Some(picture))
     }
 
-    /// The nodes in the plane of the law's graph, and the branch of each node.
-    fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<usize>)> {
+    /// The nodes in the plane of the law's graph, and the branch of each node on which the law acts.
+    fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<Option<usize>>)> {
         let law = self.law?;
         let column = |name: &str| self.table.column(name);
         let (v, p) = (column("normal_velocity")?, column("contact_pressure")?);
         let gap = if law.needs_gap() { column("gap")? } else { vec![0.0; v.len()] };
-        let node = |n: usize| [law.abscissa(gap[n], v[n]), p[n]];
-        let nodes: Vec<[f64; 2]> = (0..self.points.len()).map(node).collect();
-        let on = law.branches_of(&nodes);
+        let acts: Vec<usize> = (0..self.points.len()).filter(|n| self.is_in_contact[*n]).collect();
+        let nodes: Vec<[f64; 2]> = acts.iter().map(|n| [law.abscissa(gap[*n], v[*n]), p[*n]]).collect();
+        let mut on = vec![None; self.points.len()];
+        for (n, branch) in acts.iter().zip(law.branches_of(&nodes)) {
+            on[*n] = Some(branch);
+        }
         (!nodes.is_empty()).then_some((nodes, on))
     }
 
@@ -283,15 +341,17 @@ impl<'a> Boundary<'a> {
         let line = Series { colour: [0x55; 3], ..Series::new(0, "", Look::Line, law.line(&reached)) };
         let mut series = vec![line];
         let mut counts = Vec::new();
+        let on: Vec<usize> = on.into_iter().flatten().collect();
+        let others_on = law.branches_of(others);
         for (at, branch) in law.branches().iter().enumerate() {
             let mine = nodes.iter().zip(&on).filter(|(_, other)| **other == at);
             let mine: Vec<[f64; 2]> = mine.map(|(node, _)| *node).collect();
-            if !mine.is_empty() {
+            // A branch that any of the drawings needs is named in all of them, always with the same colour and marker.
+            if !mine.is_empty() || others_on.contains(&at) {
                 let plural = if mine.len() == 1 { "node" } else { "nodes" };
                 let label = format!("{}: {} {plural}", branch.name, mine.len());
                 counts.push(label.clone());
-                let dots = Series::new(series.len(), label, Look::Dots, mine);
-                series.push(Series { colour: branch_colour(at), ..dots });
+                series.push(Series::new(at, label, Look::Dots, mine));
             }
         }
         let (quantity, unit) = law.quantity();
@@ -302,12 +362,12 @@ impl<'a> Boundary<'a> {
             &format!("{}_on_law", self.name),
             format!(
                 "Nodes of {} on the graph of the contact law at {} s: {counted}",
-                self.name,
+                self.place,
                 number(self.time)
             ),
             format!(
                 "The contact law (grey) and the nodes of {} at t = {} s: {counted}.",
-                self.name,
+                self.place,
                 number(self.time)
             ),
             chart.svg()?,
@@ -325,8 +385,10 @@ impl<'a> Boundary<'a> {
             let end = at + same.len();
             let from = if at == 0 { self.arc[0] } else { middle(at) };
             let to = if end == self.arc.len() { self.arc[end - 1] } else { middle(end) };
-            let name = names.get(same[0]).map(|branch| branch.name.clone()).unwrap_or_default();
-            bands.push(Band { span: [from, to], colour: BANDS[same[0] % BANDS.len()], label: name });
+            if let Some(branch) = same[0] {
+                let label = names.get(branch).map(|branch| branch.name.clone()).unwrap_or_default();
+                bands.push(Band { span: [from, to], colour: lightened(LINES[branch % LINES.len()]), label });
+            }
             at = end;
         }
         if bands.len() > MOST_BANDS || bands.len() < 2 { Vec::new() } else { bands }
@@ -346,10 +408,12 @@ impl<'a> Boundary<'a> {
         if traction.is_empty() || speed.is_empty() {
             return Ok(None);
         }
-        let rubbing = pressure.into_iter().zip(traction).zip(speed);
-        let rubbing: Vec<Rubbing> =
-            rubbing.map(|((pressure, traction), speed)| Rubbing { speed, traction, pressure }).collect();
-        friction::picture(self.name, self.time, law, &rubbing)
+        let rubbing = pressure.into_iter().zip(traction).zip(speed).zip(&self.is_in_contact);
+        let rubbing: Vec<Rubbing> = rubbing
+            .filter(|(_, is_in_contact)| **is_in_contact)
+            .map(|(((pressure, traction), speed), _)| Rubbing { speed, traction, pressure })
+            .collect();
+        friction::picture((self.name, &self.place), self.time, law, &rubbing)
     }
 
     /// The mean outward normal, if the normals have one.
@@ -405,11 +469,6 @@ impl<'a> Boundary<'a> {
     }
 }
 
-/// The colour of the nodes of a branch: a stronger version of its background colour.
-fn branch_colour(branch: usize) -> Colour {
-    [LINES[0], LINES[1], LINES[6]][branch % BANDS.len()]
-}
-
 fn is_quantity(column: &str) -> bool {
     !["time", "profile", "x", "y", "z"].contains(&column)
 }
@@ -418,4 +477,53 @@ fn is_quantity(column: &str) -> bool {
 pub(super) fn capital(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        job::{Contact, Quadrature},
+        laws::{
+            contact::{Compliance, NormalLaw},
+            expression::Expression,
+        },
+    };
+
+    fn laws(part: &str, stiffness: f64) -> Laws {
+        let contact = Contact {
+            on: vec!["bottom".into()],
+            part: Some(Scalar::Expression(Expression::parse(part).expect("expression"))),
+            quadrature: Quadrature::Nodal,
+            normal: NormalLaw::Compliance(Compliance { stiffness, exponent: 1.0, gap: None }),
+            redistribute_mass: false,
+            obstacle: None,
+            obstacle_load: None,
+            friction: None,
+            wear: None,
+            adhesion: None,
+            memory: None,
+        };
+        let normal = Law::of(&contact).expect("law");
+        Laws { on: contact.on, part: contact.part, normal, friction: None }
+    }
+
+    /// Five nodes: two on each of two springs, one on both.
+    #[test]
+    fn of_two_contacts_on_a_boundary_each_has_the_nodes_that_follow_its_law() {
+        let text = "time,profile,x,y,normal_velocity,contact_pressure,gap\n1,bottom,0,0,0,10,-0.1\n1,bottom,0.25,0,0,10,-0.1\n\
+                    1,bottom,0.5,0,0,55,-0.1\n1,bottom,0.75,0,0,100,-0.1\n1,bottom,1,0,0,0,\n";
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("profiles.csv");
+        std::fs::write(&path, text).expect("written");
+        let [soft, stiff] = [laws("x <= 0.5", 100.0), laws("x >= 0.5", 1000.0)];
+        let table = || Table::read(&path, "profile").expect("table");
+        let nodes = |one, other| Boundary::new(table(), "bottom", None).within(one, &[other]).law_nodes();
+        assert_eq!(nodes(&soft, &stiff), [[0.1, 10.0], [0.1, 10.0]]);
+        // The last node has no gap, because no contact acts there.
+        assert_eq!(nodes(&stiff, &soft), [[0.1, 100.0]]);
+        let part = Boundary::new(table(), "bottom", None).within(&soft, &[&stiff]);
+        let words = part.branch_table();
+        assert!(words.contains("Nodes of bottom where x &lt;= 0.5 on the branches"), "{words}");
+    }
 }

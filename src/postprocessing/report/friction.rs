@@ -28,7 +28,7 @@ pub(super) struct Rubbing {
 /// The law as a function of the sliding velocity, and the nodes: their traction, or traction over pressure if the law depends on
 /// pressure.
 pub(super) fn picture(
-    name: &str,
+    (name, place): (&str, &str),
     time: f64,
     law: &FrictionLaw,
     nodes: &[Rubbing],
@@ -48,7 +48,7 @@ pub(super) fn picture(
     let line = std::iter::once([0.0, 0.0]).chain(graph.map(|v| [v, law.bound(v, 1.0)])).collect();
     let mut series = vec![Series { colour: GREY, ..Series::new(0, "", Look::Line, line) }];
     let mut counts = Vec::new();
-    for (place, words, group) in [(1, "stick", &sticking), (2, "slip", &slipping)] {
+    for (at, words, group) in [(1, "stick", &sticking), (2, "slip", &slipping)] {
         if group.is_empty() {
             continue;
         }
@@ -56,7 +56,7 @@ pub(super) fn picture(
         let label = format!("{words}: {count}");
         counts.push(label.clone());
         let points = group.iter().map(|node| [node.speed, ordinate(node)]).collect();
-        series.push(Series { colour: LINES[place - 1], ..Series::new(place, label, Look::Dots, points) });
+        series.push(Series { colour: LINES[at - 1], ..Series::new(at, label, Look::Dots, points) });
     }
     let apart = nodes.len() - touching.len();
     if apart > 0 {
@@ -72,8 +72,8 @@ pub(super) fn picture(
     let when = number(time);
     Ok(Some(Picture::new(
         &format!("{name}_on_friction"),
-        format!("Nodes of {name} on the graph of the friction law at {when} s: {counted}"),
-        format!("The friction law (grey) and the nodes of {name} at t = {when} s: {counted}."),
+        format!("Nodes of {place} on the graph of the friction law at {when} s: {counted}"),
+        format!("The friction law (grey) and the nodes of {place} at t = {when} s: {counted}."),
         chart.svg()?,
     )))
 }
@@ -91,7 +91,7 @@ mod tests {
     fn nodes_stick_slip_or_bear_no_pressure() {
         let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
         let nodes = [node(0.0, 1.0, 10.0), node(0.1, 3.0, 10.0), node(0.2, 6.0, 20.0), node(0.5, 0.0, 0.0)];
-        let drawn = picture("bottom", 0.5, &law, &nodes).expect("drawn").expect("a picture");
+        let drawn = picture(("bottom", "bottom"), 0.5, &law, &nodes).expect("drawn").expect("a picture");
         assert!(
             drawn.caption.contains("stick: 1 node, slip: 2 nodes, without pressure: 1"),
             "{}",
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn nodes_that_all_rest_stick() {
         let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
-        let drawn = picture("bottom", 0.5, &law, &[node(0.0, 1.0, 10.0), node(0.0, 0.0, 3.0)]);
+        let drawn = picture(("bottom", "bottom"), 0.5, &law, &[node(0.0, 1.0, 10.0), node(0.0, 0.0, 3.0)]);
         let caption = drawn.expect("drawn").expect("a picture").caption;
         assert!(caption.contains("stick: 2 nodes") && !caption.contains("slip:"), "{caption}");
     }
@@ -111,9 +111,11 @@ mod tests {
     #[test]
     fn given_bounds_are_drawn_in_their_own_unit_and_a_boundary_in_the_air_not_at_all() {
         let given = FrictionLaw::Tresca(Tresca { bound: 2.0 });
-        let drawn = picture("left", 0.0, &given, &[node(0.1, 2.0, 0.0)]).expect("drawn").expect("a picture");
+        let drawn = picture(("left", "left"), 0.0, &given, &[node(0.1, 2.0, 0.0)])
+            .expect("drawn")
+            .expect("a picture");
         assert!(drawn.svg.contains("friction traction / Pa"));
         let law = FrictionLaw::Coulomb(Coulomb { coefficient: 0.3 });
-        assert!(picture("left", 0.0, &law, &[node(0.1, 0.0, 0.0)]).expect("drawn").is_none());
+        assert!(picture(("left", "left"), 0.0, &law, &[node(0.1, 0.0, 0.0)]).expect("drawn").is_none());
     }
 }

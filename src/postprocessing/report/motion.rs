@@ -23,13 +23,10 @@ const FEWEST: usize = 3;
 /// The most cells of all drawings together.
 const MOST_CELLS: usize = 2_000_000;
 /// Seconds for which a drawing is shown.
-const SECONDS: f64 = 0.3;
-
-/// The boundaries of each contact and its laws.
-type Contacts<'a> = [(&'a [String], Laws)];
+const SECONDS: f64 = 0.6;
 
 /// The animation of a run with these contacts, if its fields differ at three times or more.
-pub(super) fn picture(found: &Found, look: Look, contacts: &Contacts) -> Result<Option<Picture>> {
+pub(super) fn picture(found: &Found, look: Look, contacts: &[Laws]) -> Result<Option<Picture>> {
     let Some(last) = &found.snapshot else { return Ok(None) };
     let cells = last.cells.len() / last.corners;
     let count = MOST.min(MOST_CELLS / cells.max(1)).min(last.times.len());
@@ -60,16 +57,18 @@ pub(super) fn picture(found: &Found, look: Look, contacts: &Contacts) -> Result<
 
 /// The nodes of the first contact boundary with a profile on the graph of its law, at the times of the snapshots at which there is
 /// a profile.
-fn graphs(found: &Found, contacts: &Contacts, snapshots: &[Snapshot]) -> Result<Vec<Option<Picture>>> {
+fn graphs(found: &Found, contacts: &[Laws], snapshots: &[Snapshot]) -> Result<Vec<Option<Picture>>> {
     let Some(profiles) = &found.profiles else { return Ok(Vec::new()) };
     let names = profiles.names();
-    let touching = |name: &&String| contacts.iter().any(|(on, _)| on.contains(name));
-    let Some(name) = names.iter().find(touching) else { return Ok(Vec::new()) };
-    let laws = contacts.iter().find(|(on, _)| on.contains(name)).map(|(_, laws)| laws);
+    let on = |name: &String| contacts.iter().filter(|laws| laws.on.contains(name)).collect::<Vec<_>>();
+    let Some(name) = names.iter().find(|name| !on(name).is_empty()) else { return Ok(Vec::new()) };
+    let here = on(name);
+    let Some((laws, others)) = here.split_first() else { return Ok(Vec::new()) };
     let rows = profiles.of(name);
     let mut boundaries = Vec::new();
     for snapshot in snapshots {
-        boundaries.push(Boundary::new(rows.at("time", snapshot.time), name, laws, Some(snapshot)));
+        let boundary = Boundary::new(rows.at("time", snapshot.time), name, Some(snapshot));
+        boundaries.push(boundary.within(laws, others));
     }
     let nodes: Vec<[f64; 2]> = boundaries.iter().flat_map(Boundary::law_nodes).collect();
     boundaries.iter().map(|boundary| boundary.on_law(&nodes)).collect()

@@ -177,14 +177,14 @@ fn contact_directions(found: &Found, snapshot: &Snapshot) -> Vec<[f64; 3]> {
     let names = profiles.names();
     let touching = names.iter().filter(|name| job.contact.iter().any(|contact| contact.on.contains(name)));
     let rows = |name| profiles.of(name).last("time");
-    touching.filter_map(|name| Boundary::new(rows(name), name, None, Some(snapshot)).direction()).collect()
+    touching.filter_map(|name| Boundary::new(rows(name), name, Some(snapshot)).direction()).collect()
 }
 
-/// The boundaries of each contact and its laws.
-fn contact_laws(found: &Found) -> Result<Vec<(&[String], Laws)>> {
-    let of = |contact| {
-        let &Contact { ref on, friction, .. } = contact;
-        Ok((on.as_slice(), Laws { normal: Law::of(contact)?, friction }))
+/// The laws of each contact.
+fn contact_laws(found: &Found) -> Result<Vec<Laws>> {
+    let of = |contact: &Contact| {
+        let Contact { on, part, friction, .. } = contact;
+        Ok(Laws { on: on.clone(), part: part.clone(), normal: Law::of(contact)?, friction: *friction })
     };
     found.job.iter().flat_map(|job| &job.contact).map(of).collect()
 }
@@ -195,21 +195,40 @@ fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>
     if let Some(profiles) = found.profiles.as_ref().filter(|profiles| !profiles.is_empty()) {
         seen = profiles.names();
         for name in &seen {
-            let contact = contacts.iter().find(|(on, _)| on.contains(name));
+            let here: Vec<&Laws> = contacts.iter().filter(|contact| contact.on.contains(name)).collect();
             let snapshot = found.snapshot.as_ref();
-            let rows = profiles.of(name).last("time");
-            let boundary = Boundary::new(rows, name, contact.map(|(_, laws)| laws), snapshot);
+            let new = || Boundary::new(profiles.of(name).last("time"), name, snapshot);
+            let mut parts = Vec::new();
+            for (at, laws) in here.iter().enumerate() {
+                let others = [&here[..at], &here[at + 1..]].concat();
+                parts.push(new().within(laws, &others));
+            }
+            let whole = new();
+            // The backgrounds of curves show the branches of one law.
+            let boundary = if let [part] = &parts[..] { part } else { &whole };
             let mut pictures = boundary.pictures(snapshot)?;
-            if let Some(body) = body.filter(|_| contact.is_some()) {
+            for (at, part) in parts.iter().enumerate() {
+                let named = |picture: Picture| match at {
+                    0 => picture,
+                    _ => {
+                        let name = format!("{}_{}", picture.name, at + 1);
+                        picture.renamed(&name)
+                    }
+                };
+                pictures.extend(part.graphs()?.into_iter().map(named));
+            }
+            if let Some(body) = body.filter(|_| !here.is_empty()) {
                 pictures.extend(boundary.arrows(body)?);
             }
-            let heading =
-                format!("{} {name}", if contact.is_some() { "Contact boundary" } else { "Boundary" });
-            sections.push((heading, boundary.branch_table(), pictures));
+            let heading = format!("{} {name}", if here.is_empty() { "Boundary" } else { "Contact boundary" });
+            let tables = parts.iter().map(Boundary::branch_table).collect();
+            sections.push((heading, tables, pictures));
         }
     }
-    let unseen: Vec<&String> =
-        contacts.iter().flat_map(|(on, _)| on.iter()).filter(|name| !seen.contains(name)).collect();
+    let mut unseen: Vec<&String> =
+        contacts.iter().flat_map(|laws| &laws.on).filter(|name| !seen.contains(name)).collect();
+    unseen.sort_unstable();
+    unseen.dedup();
     if !unseen.is_empty() {
         let words: String = unseen
             .iter()
