@@ -33,8 +33,8 @@ pub(super) fn page(folder: &Path) -> Result<Page> {
         (None, out)
     };
     let mut page = Page::new(title.as_deref().unwrap_or("Study"), String::new());
-    page.section("Results", &body, vec![]);
     page.section("Pictures", &pictures(folder, &captions)?, vec![]);
+    page.section("Results", &body, vec![]);
     Ok(page)
 }
 
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn without_words_the_lists_of_the_results_become_tables_and_pictures_stand_below() {
+    fn without_words_the_lists_of_the_results_become_tables_below_the_pictures() {
         let folder = tempfile::tempdir().expect("folder");
         let json = r#"{"title": "t", "rows": [{"cells": 8, "error": 0.5}, {"cells": 16, "seconds": 2}]}"#;
         std::fs::write(folder.path().join("study.json"), json).expect("written");
@@ -190,6 +190,8 @@ mod tests {
             html.contains("<th scope=\"col\">seconds</th>") && html.contains("<td class=\"short\">16</td>"),
             "{html}"
         );
-        assert!(html.contains("alt=\"cost\" src=\"data:image/svg+xml;base64,PHN2Zy8+\"/>"), "{html}");
+        let picture =
+            html.find("alt=\"cost\" src=\"data:image/svg+xml;base64,PHN2Zy8+\"/>").expect("a picture");
+        assert!(html.find("<table").is_some_and(|table| picture < table), "{html}");
     }
 }
