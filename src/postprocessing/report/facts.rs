@@ -90,6 +90,15 @@ pub(super) fn ending(summary: &Value) -> String {
     format!("{ended}: {} steps to t = {} s on {ranks}{took}.", value("steps"), value("time"))
 }
 
+/// Why the run failed, if it did.
+pub(super) fn reason(summary: &Value) -> String {
+    let error = summary.get("error").and_then(Value::as_str).unwrap_or_default();
+    if error.is_empty() {
+        return String::new();
+    }
+    format!("<div class=\"missing\">\n<h2>Reason of the failure</h2>\n<pre>{}</pre>\n</div>\n", escape(error))
+}
+
 /// The warnings of the run, if there are any.
 pub(super) fn warnings(summary: &Value) -> String {
     let warnings = summary.get("warnings").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
@@ -265,6 +274,12 @@ mod tests {
         {
             assert_eq!(rate(&summary, phase, seconds), "", "{phase}");
         }
+    }
+
+    #[test]
+    fn the_reason_of_a_failure_is_given_and_no_other() {
+        assert_eq!(reason(&json!({ "error": null })) + &reason(&json!({})), "");
+        assert!(reason(&json!({ "error": "no <step>" })).contains("<pre>no &lt;step&gt;</pre>"));
     }
 
     #[test]
