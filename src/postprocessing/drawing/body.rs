@@ -97,7 +97,8 @@ impl Quantity<'_> {
             Shading::Errors => Some(if most > 0.0 { (least.max(1e-2 * most), most) } else { full }),
             Shading::Linear => {
                 let shown @ (low, high) = percentiles(&self.values)?;
-                Some(if most - least > 1.05 * (high - low) { shown } else { full })
+                let is_wide = most - least > 1.05 * (high - low);
+                Some(if is_wide && !is_uniform(low, high) { shown } else { full })
             }
         }
     }

@@ -1,5 +1,6 @@
 //! What several drawings of bodies have in common: colours, magnification of displacements, section.
 
+use super::scale::number;
 use std::collections::BTreeMap;
 
 /// The common properties of several drawings.
@@ -37,7 +38,7 @@ impl Common {
     }
 }
 
-/// Whether values in this range count as the same.
+/// Whether values in this range count as the same: they are in all digits of a caption.
 pub(super) fn is_uniform(low: f64, high: f64) -> bool {
-    high - low <= 1e-12 * low.abs().max(high.abs())
+    number(low) == number(high)
 }

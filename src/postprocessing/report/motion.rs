@@ -40,7 +40,13 @@ pub(super) fn picture(found: &Found, look: Look, contacts: &[Laws]) -> Result<Op
     let bodies: Vec<Body> = snapshots.iter().map(|snapshot| Body::new(snapshot).with_look(look)).collect();
     let all: Vec<&Body> = bodies.iter().collect();
     let common = Body::in_common("all drawings", &all, true);
-    let varies = |field: &&OutputField| field.picture.is_some_and(|picture| common.has(picture.name));
+    // A field whose value differs within a drawing, not only from one drawing to the next.
+    let varies = |field: &&OutputField| {
+        let name = field.picture.map(|picture| picture.name).filter(|name| common.has(name));
+        name.is_some_and(|_| {
+            bodies.iter().any(|body| matches!(body.of_field(field), Ok(Some(Drawn::Picture(_)))))
+        })
+    };
     let Some(field) = std::iter::once(&VON_MISES).chain(&FIELDS).find(varies) else { return Ok(None) };
     let graphs = graphs(found, contacts, &snapshots)?;
     let mut drawings = Vec::new();
