@@ -122,11 +122,11 @@ fn the_page_of_a_plane_run_has_its_pictures_and_the_known_numbers() {
         "probes_velocity_x",
         "force_0",
         "area_1",
+        "pressure_1",
         "energies",
         "dissipation",
         "energy_imbalance",
         "newton_iterations",
-        "dt",
         "inclusion_residual",
         "wall_seconds",
     ] {
@@ -348,6 +348,7 @@ fn a_failed_run_says_so_with_its_error() {
     let document = parsed(&html);
     assert_eq!(fact(&document, "status"), "failed");
     assert_eq!(fact(&document, "error"), "a <step> failed");
+    assert_eq!(words_of(elements(&document, "pre")[0]), "a <step> failed", "before all sections");
 }
 
 #[test]

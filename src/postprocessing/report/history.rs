@@ -15,6 +15,8 @@ use crate::{
 const TIME: Axis = Axis { quantity: "t", unit: "s" };
 /// Number of probes in one chart above which lines cannot be distinguished.
 const MOST_PROBES: usize = 7;
+/// A force below this share of the largest one of the run is a rounding error.
+const ROUNDING: f64 = 1e-9;
 
 /// Each quantity of the probes over time, with a line for each probe.
 pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
@@ -49,25 +51,51 @@ pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
     Ok(out)
 }
 
-/// The components of the force of each source, and the area of each contact by state.
-pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Vec<Picture>> {
+/// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
+/// Forces that are zero but for rounding errors are named instead.
+pub(super) fn resultants(table: &Table, dimension: usize) -> Result<(Vec<Picture>, Vec<String>)> {
     let of = |unit: [&'static str; 2]| unit[dimension - 2];
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
     let forces: Vec<&str> = forces.iter().map(String::as_str).collect();
     let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
-    let mut out = Vec::new();
+    let columns = forces.iter().filter_map(|force| table.column(force));
+    let largest = columns.flatten().fold(0.0, |most, force| f64::max(most, force.abs()));
+    let (mut out, mut none) = (Vec::new(), Vec::new());
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
         let what = if source == "momentum" { "rate of momentum" } else { source };
         let quantity = if source == "momentum" { "rate of momentum" } else { "force" };
-        out.extend(sums(&rows, &format!("force_{number}"), (what, quantity), of(["N/m", "N"]), &forces)?);
+        let name = format!("force_{number}");
+        let is_felt = |force: &&str| exceeds(&rows, force, ROUNDING * largest);
+        let (felt, unfelt): (Vec<&str>, Vec<&str>) = forces.iter().copied().partition(is_felt);
+        none.extend(unfelt.iter().map(|force| format!("{} of {what}", force.replace('_', " "))));
+        out.extend(sums(&rows, &name, (what, quantity), of(["N/m", "N"]), &felt)?);
         if source.starts_with("contact") {
             let name = format!("area_{number}");
             out.extend(sums(&rows, &name, (source, "area"), of(["m", "m²"]), &areas)?);
+            for (name, quantity, unit, columns) in [
+                ("pressure", "contact pressure", "Pa", &["mean_pressure", "largest_pressure"][..]),
+                (
+                    "obstacle_displacement",
+                    "displacement of the obstacle",
+                    "m",
+                    &["obstacle_displacement"][..],
+                ),
+                ("obstacle_rotation", "rotation of the obstacle", "rad", &["obstacle_rotation"][..]),
+            ] {
+                let words = format!("{source}, {quantity}");
+                out.extend(sums(
+                    &rows,
+                    &format!("{name}_{number}"),
+                    (words.as_str(), quantity),
+                    unit,
+                    columns,
+                )?);
+            }
         }
     }
-    Ok(out)
+    Ok((out, none))
 }
 
 /// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
@@ -97,6 +125,11 @@ pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
     Ok(out)
 }
 
+/// Whether a column has an entry whose size is larger than this.
+fn exceeds(table: &Table, column: &str, size: f64) -> bool {
+    table.column(column).is_some_and(|values| values.iter().any(|value| value.abs() > size))
+}
+
 /// A chart of several columns of one quantity over time; none if all of them are zero.
 fn sums(
     table: &Table,
@@ -110,7 +143,10 @@ fn sums(
     for column in columns {
         let Some(values) = table.column(column) else { continue };
         let words = column.replace('_', " ");
-        if values.iter().all(|value| *value == 0.0) {
+        if values.iter().all(|value| value.is_nan()) {
+            continue;
+        }
+        if values.iter().all(|value| *value == 0.0 || value.is_nan()) {
             zero.push(words);
             continue;
         }
@@ -165,12 +201,13 @@ struct Curve<'a> {
     tolerance: Option<f64>,
 }
 
-/// A column over time; none if all its values are 0.
+/// A column over time; none if it is constant.
 fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
     let Curve { column, quantity, unit, caption, is_logarithmic, tolerance } = curve;
     let points = table.curve("time", column);
     let Some((low, high)) = extent(points.iter().map(|p| p[1])) else { return Ok(None) };
-    if low == 0.0 && high == 0.0 {
+    // No picture of what is constant, such as the length of the steps of most runs.
+    if low == high || (!is_logarithmic && number(low) == number(high)) {
         return Ok(None);
     }
     let unseen = points.iter().filter(|p| is_logarithmic && p[1] <= 0.0).count();
@@ -190,4 +227,23 @@ fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
         if unseen > 0 { format!(" {unseen} steps with the value 0 are not shown.") } else { String::new() };
     let alt = format!("Chart over time. {caption}; {most}");
     Ok(Some(Picture::new(column, alt, format!("{caption}; {most}.{unseen}"), chart.svg()?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_of_rounding_errors_are_named_and_the_motion_of_the_obstacle_is_drawn() {
+        let text = "step,time,source,force_x,force_y,largest_pressure,obstacle_displacement\n1,0.1,contact top,1e-12,5,3,0.1\n\
+                    2,0.2,contact top,2e-12,6,4,0.2\n1,0.1,support left,3e-13,0,,\n2,0.2,support left,0,0,,\n";
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("resultants.csv");
+        std::fs::write(&path, text).expect("written");
+        let table = Table::read(&path, "source").expect("table");
+        let (pictures, none) = resultants(&table, 2).expect("drawn");
+        let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
+        assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);
+        assert_eq!(none, ["force x of contact top", "force x of support left", "force y of support left"]);
+    }
 }

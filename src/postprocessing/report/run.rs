@@ -250,9 +250,12 @@ fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
     }
     let dimension = found.dimension().unwrap_or(3);
     if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
-        let words = "Forces on the body. In every step they add up to the rate of momentum.";
-        let pictures = history::resultants(resultants, dimension)?;
-        sections.push(("Resultants".into(), paragraph(words), pictures));
+        let mut words = "Forces on the body. In every step they add up to the rate of momentum.".to_owned();
+        let (pictures, none) = history::resultants(resultants, dimension)?;
+        if !none.is_empty() {
+            words += &format!(" Zero in all steps: {}.", none.join(", "));
+        }
+        sections.push(("Resultants".into(), paragraph(&words), pictures));
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
