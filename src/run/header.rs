@@ -1,6 +1,6 @@
 //! The lines of the log before the first and after the last step.
 
-use super::{Summary, setup::Setup, step_line::Short};
+use super::{Summary, setup::Setup, step_line::Short, steps};
 use crate::{
     error::Result,
     io::output::{field_list::FIELDS, log::Log, output_field::Figures},
@@ -63,7 +63,8 @@ pub(super) fn lines<const D: usize, const S: usize>(
 
 /// Warnings about the job, its certificates and its initial state.
 pub(super) fn warnings<const D: usize, const S: usize>(loaded: &Loaded, ready: &Setup<D, S>) -> Vec<String> {
-    loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned().collect()
+    let given = loaded.warnings.iter().chain(&ready.verdict.warnings).chain(&ready.warnings).cloned();
+    given.chain(steps::warnings(&loaded.job)).collect()
 }
 
 /// Logs status, totals and times of a finished run.

@@ -14,7 +14,7 @@ use crate::{
     linear_algebra::{sparse::Precision, tensor::larger},
     mesh::{GlobalMesh, Mesh},
     parallel::{agreement::Agreed, session::Session},
-    solver::stepping::{Adaptive, Landings, StepOutcome, Stepper, next_step},
+    solver::stepping::{Adaptive, Landings, StepOutcome, Stepper},
 };
 
 /// A body with its state and scheme, for programs that look at fields after each step.
@@ -84,7 +84,7 @@ impl<const D: usize, const S: usize> Simulation<D, S> {
             totals.step_level = Some(adaptive.step_level);
             outcome
         } else {
-            let step = next_step(state, time.step, target.time);
+            let step = landings.fixed_step(state, target, time.scheme.is_two_step());
             let mut outcome = session.agree(scheme.advance(session, body, state, step))?;
             outcome.landed_on = target.name.filter(|_| step.time == target.time);
             outcome

@@ -1,9 +1,19 @@
 //! The steps of a job.
 
 use crate::{
-    job::{Every, Job},
-    solver::stepping::{Adaptive, Landings},
+    job::{Every, Job, Scalar},
+    solver::stepping::{Adaptive, Breakpoint, Landings, TIME_TOLERANCE},
 };
+
+/// Steps end at the kinks of a table if at most this number lies within steps, or one in every ten steps.
+const MOST_KINKS: usize = 100;
+const STEPS_A_KINK: f64 = 10.0;
+/// Share of a time within which the exact time of a jump is found.
+const SEARCHED: f64 = 1e-10;
+/// A value jumps if it changes by more than this share of its largest value.
+const CONTINUITY_TOLERANCE: f64 = 1e-9;
+/// Samples of a value for its largest value.
+const SAMPLES: u32 = 256;
 
 /// The step size control of a job with adaptive steps.
 pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
@@ -13,6 +23,132 @@ pub(super) fn adaptive<const D: usize>(job: &Job) -> Option<Adaptive<D>> {
 /// The longest step of a job.
 pub(super) fn longest_step(job: &Job) -> f64 {
     adaptive::<2>(job).map_or(job.time.step, |adaptive| adaptive.longest())
+}
+
+/// A value that may depend on time.
+struct TimeDependent<'a> {
+    /// Its meaning, for the log.
+    name: &'static str,
+    /// Its place in the job.
+    key: String,
+    value: &'a Scalar,
+}
+
+/// The loads, motions of supports and obstacles, and gaps that depend on time.
+fn time_dependent(job: &Job) -> Vec<TimeDependent<'_>> {
+    let mut all: Vec<(&'static str, String, &[Scalar])> = Vec::new();
+    for (at, support) in job.support.iter().enumerate() {
+        for (key, values) in [("displacement", &support.displacement), ("velocity", &support.velocity)] {
+            all.push(("a support", format!("support.{at}.{key}"), values.as_deref().unwrap_or_default()));
+        }
+    }
+    for (at, traction) in job.traction.iter().enumerate() {
+        all.push(("a traction", format!("traction.{at}.value"), &traction.value));
+        all.push(("a traction", format!("traction.{at}.pressure"), traction.pressure.as_slice()));
+    }
+    for (at, force) in job.body_force.iter().enumerate() {
+        all.push(("a body force", format!("body_force.{at}.value"), &force.value));
+    }
+    if let Some(gravity) = &job.gravity {
+        all.push(("gravity", "gravity.acceleration".into(), &gravity.acceleration));
+    }
+    for (at, contact) in job.contact.iter().enumerate() {
+        if let Some(gap) = contact.normal.gap() {
+            let key = format!("contact.{at}.{}.gap", contact.normal.table());
+            all.push(("an obstacle", key, std::slice::from_ref(gap)));
+        }
+        for values in contact.obstacle.iter().flat_map(|obstacle| obstacle.expressions()) {
+            all.push(("an obstacle", format!("contact.{at}.obstacle"), values));
+        }
+        if let Some(load) = &contact.obstacle_load {
+            let [force, moment] = ["force", "moment"].map(|key| format!("contact.{at}.obstacle_load.{key}"));
+            all.push(("the force on an obstacle", force, std::slice::from_ref(&load.force)));
+            all.push(("the moment on an obstacle", moment, load.moment.as_slice()));
+        }
+    }
+    let mut found = Vec::new();
+    for (name, key, values) in all {
+        let values = values.iter().filter(|value| value.depends_on_time());
+        found.extend(values.map(|value| TimeDependent { name, key: key.clone(), value }));
+    }
+    found
+}
+
+/// The kinks of the tables of a value within the run. `Err` is the number of those within steps if steps do not end there, because
+/// they are too many.
+fn kinks(job: &Job, value: &Scalar) -> Result<Vec<f64>, usize> {
+    let length = longest_step(job);
+    let mut kinks = value.breakpoints().kinks;
+    kinks.retain(|time| *time > 0.0 && *time < job.time.end);
+    let is_within_step = |time: &&f64| {
+        let steps = **time / length;
+        (steps - steps.round()).abs() > TIME_TOLERANCE
+    };
+    let within = kinks.iter().filter(is_within_step).count();
+    let is_few = within <= MOST_KINKS || within as f64 * STEPS_A_KINK <= job.time.end / length;
+    if is_few { Ok(kinks) } else { Err(within) }
+}
+
+/// Warnings about tables whose kinks the steps pass over. Adaptive steps follow a table up to their tolerance.
+pub(super) fn warnings(job: &Job) -> Vec<String> {
+    if job.time.adaptive.is_some() {
+        return Vec::new();
+    }
+    let length = job.time.step;
+    let dense = |found: TimeDependent<'_>| {
+        let within = kinks(job, found.value).err()?;
+        Some(format!(
+            "{}: {within} kinks of a table lie within steps of {length} s, more than {MOST_KINKS} and more than one in \
+             {STEPS_A_KINK} steps: steps take the values of the table at their own ends; choose a step that divides its \
+             intervals, or list the important times in [time] land_on",
+            found.key
+        ))
+    };
+    let mut warnings: Vec<String> = time_dependent(job).into_iter().filter_map(dense).collect();
+    warnings.dedup();
+    warnings
+}
+
+/// The times at which loads and motions of a job have kinks or jumps, if steps end there.
+fn breakpoints(job: &Job) -> Vec<Breakpoint> {
+    let mut found = Vec::new();
+    for TimeDependent { name, value, .. } in time_dependent(job) {
+        let kinks = kinks(job, value).unwrap_or_default();
+        found.extend(kinks.into_iter().map(|time| Breakpoint { time, is_jump: false, name }));
+        let switches = value.breakpoints().switches;
+        if switches.is_empty() {
+            continue;
+        }
+        let times = (0..=SAMPLES).map(|at| job.time.end * f64::from(at) / f64::from(SAMPLES));
+        let values = times.map(|time| value.evaluate(time, &[]).abs()).filter(|size| size.is_finite());
+        let largest = values.fold(0.0, f64::max);
+        found.extend(switches.into_iter().map(|time| switch(value, time, largest, name)));
+    }
+    let near = TIME_TOLERANCE * shortest_step(job);
+    found.retain(|breakpoint| breakpoint.time > near && job.time.end - breakpoint.time > near);
+    found.sort_by(|one, other| one.time.total_cmp(&other.time));
+    found
+}
+
+/// The breakpoint of a value that switches near `time`. Where the value depends on position it counts as a jump.
+fn switch(value: &Scalar, time: f64, largest: f64, name: &'static str) -> Breakpoint {
+    let [mut low, mut high] = [time * (1.0 - SEARCHED), time * (1.0 + SEARCHED)];
+    let before = value.pieces(low, &[]);
+    while value.pieces(high, &[]) != before {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if value.pieces(middle, &[]) == before { low = middle } else { high = middle }
+    }
+    let [left, right] = [low, high].map(|time| value.evaluate(time, &[]));
+    let is_jump = value.depends_on_position() || (left - right).abs() > CONTINUITY_TOLERANCE * largest;
+    Breakpoint { time: if is_jump { low } else { time }, is_jump, name }
+}
+
+/// The length of fixed steps or of the shortest adaptive steps of a job.
+fn shortest_step(job: &Job) -> f64 {
+    job.time.adaptive.as_ref().map_or(job.time.step, |adaptive| adaptive.smallest_step)
 }
 
 /// Times at which steps of a job must end; adaptive steps also end at output times.
@@ -31,7 +167,15 @@ pub(super) fn landings(job: &Job) -> Landings {
     output_times.retain(|time| *time > 0.0 && !job.time.land_on.contains(time));
     output_times.sort_by(f64::total_cmp);
     output_times.dedup();
-    Landings { times: job.time.land_on.clone(), output_times, interval, end: job.time.end }
+    Landings {
+        times: job.time.land_on.clone(),
+        output_times,
+        interval,
+        breakpoints: breakpoints(job),
+        length: shortest_step(job),
+        is_fixed: job.time.adaptive.is_none(),
+        end: job.time.end,
+    }
 }
 
 /// Estimated number of steps that share a matrix: adaptive steps are assumed to change their length every other step.

@@ -16,6 +16,7 @@ mod graded;
 mod hdf5_file;
 mod indicator;
 mod iterations;
+mod landings;
 mod launch;
 mod materials;
 mod outputs;

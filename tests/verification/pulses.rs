@@ -66,6 +66,30 @@ fn pushed(session: &Session) {
     }
 }
 
+/// The impulse of a short pulse within a step, or at the end of one, is exact.
+fn kicked(session: &Session) {
+    let [fine, coarse] = ["step = 0.0078125", "step = 0.25"];
+    let jumps = ["8*pulse(t, 0.6031, 0.6041)", "8*pulse(t, 0.5, 0.501)", "if(t < 0.3, 0, 8)*(t <= 0.301)"];
+    let triangle = "interpolate(t, 0.603, 0, 0.604, 8, 0.605, 0)";
+    for (scheme, time, pulses) in [
+        ("lagged_euler", fine, &jumps[..]),
+        ("implicit_euler", coarse, &jumps),
+        ("bdf2", coarse, &jumps),
+        ("midpoint", coarse, &jumps),
+        ("implicit_euler", LONG, &jumps),
+        ("implicit_euler", coarse, &[triangle]),
+        ("midpoint", coarse, &[triangle]),
+    ] {
+        for pulse in pulses {
+            let force = format!("[[body_force]]\nvalue = [\"{pulse}\", 0]");
+            let (run, times) = run(session, &job(scheme, time, &force));
+            let found = speed(session, &run);
+            assert!((found / 0.002 - 1.0).abs() < 1e-9, "{scheme}, {pulse}: {found}, {times:?}");
+            assert!(time == LONG || times.len() <= 131, "{scheme}, {pulse}: {times:?}");
+        }
+    }
+}
+
 /// A wall that approaches and recedes within a step of the largest length repels the block.
 fn hit(session: &Session) {
     let wall = "[[contact]]\non = [\"left\"]\n\
@@ -93,6 +117,7 @@ fn named(session: &Session) {
 
 pub fn all(session: &Session) {
     named(session);
+    kicked(session);
     pushed(session);
     hit(session);
 }

@@ -22,7 +22,8 @@ pub struct Time {
     pub scheme: Scheme,
     /// Times at which a step must end, in ascending order, above 0 and not after `end`. Suitable times are those of sudden changes
     /// of loads or gaps. A step that would pass such a time is shortened to end there; the next fixed step has its full length
-    /// again.
+    /// again. Steps end without this key where the slope of a table or of `interpolate(t, ...)` changes, if no more than 100 of these
+    /// times lie within steps or one in every ten steps, and where `pulse`, `step` or a comparison of linear functions of t switches.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("unit" = "s"), example = [0.25, 0.6])]
     pub land_on: Vec<f64>,

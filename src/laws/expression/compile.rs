@@ -21,20 +21,21 @@ macro_rules! comparison {
         fn compare(a: f64, b: f64) -> f64 {
             if a.is_nan() || b.is_nan() { f64::NAN } else { f64::from(u8::from(a $operator b)) }
         }
-        Binary::of_pieces(compare, compare)
+        Binary::switch(compare)
     }};
 }
 
-const ADD: Binary = Binary::smooth(|a, b| a + b);
-const SUBTRACT: Binary = Binary::smooth(|a, b| a - b);
-const MULTIPLY: Binary = Binary::smooth(|a, b| a * b);
-const DIVIDE: Binary = Binary::smooth(|a, b| a / b);
+const ADD: Binary = Binary::linear(|a, b| a + b, |[a, p], [b, q]| Some([a + b, p + q]));
+const SUBTRACT: Binary = Binary::linear(|a, b| a - b, |[a, p], [b, q]| Some([a - b, p - q]));
+const MULTIPLY: Binary =
+    Binary::linear(|a, b| a * b, |[a, p], [b, q]| (p == 0.0 || q == 0.0).then_some([a * b, a * q + b * p]));
+const DIVIDE: Binary = Binary::linear(|a, b| a / b, |[a, p], [b, q]| (q == 0.0).then_some([a / b, p / b]));
 const POWER: Binary = Binary::smooth(f64::powf);
 const BELOW: Binary = comparison!(<);
 const AT_MOST: Binary = comparison!(<=);
 const ABOVE: Binary = comparison!(>);
 const AT_LEAST: Binary = comparison!(>=);
-const NEGATE: Unary = Unary::smooth(|a| -a);
+const NEGATE: Unary = Unary::linear(|a| -a, |[a, p]| [-a, -p]);
 
 /// An error in an expression, and its position in the text.
 #[derive(Debug, Clone, PartialEq, Eq)]

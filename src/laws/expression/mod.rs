@@ -3,6 +3,7 @@
 //! An expression is compiled once to a short program for a stack machine, so that it can be evaluated at every
 //! node and step, by any thread.
 
+mod breakpoints;
 mod compile;
 mod functions;
 mod program;
@@ -15,6 +16,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+pub use breakpoints::Breakpoints;
 pub use compile::Fault;
 use program::Program;
 pub use program::Variable;
@@ -57,6 +59,14 @@ impl Scalar {
         match self {
             Self::Number(_) => 0,
             Self::Expression(expression) => expression.program.pieces(time, point),
+        }
+    }
+
+    /// Times at which it switches or a table has a kink, found from arguments that are linear functions of time.
+    pub fn breakpoints(&self) -> Breakpoints {
+        match self {
+            Self::Number(_) => Breakpoints::default(),
+            Self::Expression(expression) => expression.program.breakpoints(),
         }
     }
 

@@ -22,9 +22,9 @@ pub enum Variable {
 /// A compiled program; clones share the instructions.
 #[derive(Debug, Clone)]
 pub(super) struct Program {
-    instructions: Arc<[Instruction]>,
+    pub(super) instructions: Arc<[Instruction]>,
     /// Points of the tables that the instructions interpolate.
-    tables: Arc<[Table]>,
+    pub(super) tables: Arc<[Table]>,
     depth: usize,
 }
 
@@ -146,53 +146,89 @@ fn interpolate(table: &Table, at: f64) -> (f64, usize) {
     (value, behind)
 }
 
+/// A linear function of time: its value at time 0 and its slope.
+pub(super) type Line = [f64; 2];
+
 /// A piecewise function of the three topmost values.
 #[derive(Clone, Copy)]
 pub(super) struct Ternary {
     value: fn([f64; 3]) -> f64,
     /// Records which piece is active.
     piece: fn([f64; 3]) -> f64,
+    /// Whether it switches where its first argument equals another one.
+    pub(super) switches: bool,
 }
 
 impl Ternary {
     pub(super) const fn of_pieces(value: fn([f64; 3]) -> f64, piece: fn([f64; 3]) -> f64) -> Self {
-        Self { value, piece }
+        Self { value, piece, switches: false }
+    }
+
+    /// A function that has one value in each piece.
+    pub(super) const fn switch(value: fn([f64; 3]) -> f64) -> Self {
+        Self { value, piece: value, switches: true }
     }
 }
 
 /// A function of the topmost value.
 #[derive(Clone, Copy)]
 pub(super) struct Unary {
-    value: fn(f64) -> f64,
+    pub(super) value: fn(f64) -> f64,
     /// Records which piece is active, for piecewise functions.
     piece: Option<fn(f64) -> f64>,
+    /// Its value for a linear function of time, if that is linear, too.
+    pub(super) line: Option<fn(Line) -> Line>,
+    /// Whether it switches where its argument is 0.
+    pub(super) switches: bool,
 }
 
 impl Unary {
     pub(super) const fn smooth(value: fn(f64) -> f64) -> Self {
-        Self { value, piece: None }
+        Self { value, piece: None, line: None, switches: false }
+    }
+
+    pub(super) const fn linear(value: fn(f64) -> f64, line: fn(Line) -> Line) -> Self {
+        Self { line: Some(line), ..Self::smooth(value) }
     }
 
     pub(super) const fn of_pieces(value: fn(f64) -> f64, piece: fn(f64) -> f64) -> Self {
-        Self { value, piece: Some(piece) }
+        Self { piece: Some(piece), ..Self::smooth(value) }
+    }
+
+    /// A function that has one value in each piece.
+    pub(super) const fn switch(value: fn(f64) -> f64) -> Self {
+        Self { switches: true, ..Self::of_pieces(value, value) }
     }
 }
 
 /// A function of the two topmost values.
 #[derive(Clone, Copy)]
 pub(super) struct Binary {
-    value: fn(f64, f64) -> f64,
+    pub(super) value: fn(f64, f64) -> f64,
     /// Records which piece is active, for piecewise functions.
     piece: Option<fn(f64, f64) -> f64>,
+    /// Its value for linear functions of time, where that is linear, too.
+    pub(super) line: Option<fn(Line, Line) -> Option<Line>>,
+    /// Whether it switches where its arguments are equal.
+    pub(super) switches: bool,
 }
 
 impl Binary {
     pub(super) const fn smooth(value: fn(f64, f64) -> f64) -> Self {
-        Self { value, piece: None }
+        Self { value, piece: None, line: None, switches: false }
+    }
+
+    pub(super) const fn linear(value: fn(f64, f64) -> f64, line: fn(Line, Line) -> Option<Line>) -> Self {
+        Self { line: Some(line), ..Self::smooth(value) }
     }
 
     pub(super) const fn of_pieces(value: fn(f64, f64) -> f64, piece: fn(f64, f64) -> f64) -> Self {
-        Self { value, piece: Some(piece) }
+        Self { piece: Some(piece), ..Self::smooth(value) }
+    }
+
+    /// A function that has one value in each piece.
+    pub(super) const fn switch(value: fn(f64, f64) -> f64) -> Self {
+        Self { switches: true, ..Self::of_pieces(value, value) }
     }
 }
 

@@ -135,3 +135,29 @@ fn pieces_change_where_another_one_holds() {
     }
     assert!(!Scalar::Number(1.0).has_pieces() && Scalar::Number(1.0).pieces(0.5, &[]) == 0);
 }
+
+#[test]
+fn breakpoints_follow_from_arguments_that_are_linear_in_time() {
+    let scalar = |text: &str| Scalar::Expression(Expression::parse(text).expect(text));
+    for (text, switches, kinks) in [
+        ("pulse(t, 0.1, 0.5)", &[0.1, 0.5][..], &[][..]),
+        ("1e5*pulse(t, 0.1, 0.1 + 0.25)*sin(t)", &[0.1, 0.35], &[]),
+        ("pulse(x, t, 2*t - 1)", &[], &[]),
+        ("x*step(t - 0.5)", &[0.5], &[]),
+        ("step(-(0.5 - 2*t)/4)", &[0.25], &[]),
+        ("step(t^2 - 0.25) + step(t*t) + step(x - t) + step(3)", &[], &[]),
+        ("if(t < 1, t, 2)", &[1.0], &[]),
+        ("(t >= 0.25)*(2*t <= 1 + sqrt(4)) + (t > t)", &[0.25, 1.5], &[]),
+        ("interpolate(t, 0, 0, 0.25, 1, 1, 0)", &[], &[0.0, 0.25, 1.0]),
+        ("-3*interpolate(2*t - 1, 0, 0, 1, 1)", &[], &[0.5, 1.0]),
+        ("interpolate(t, 0, 1, 1, 1, 2, 2, 3, 3, 4, 3)", &[], &[1.0, 3.0]),
+        ("interpolate(x, 0, 0, 1, 1) + interpolate(sin(t), 0, 0, 1, 1)", &[], &[]),
+        ("min(t/0.1, 1) + abs(t - 0.2) + sign(t - 0.3)", &[], &[]),
+    ] {
+        let found = scalar(text).breakpoints();
+        let near = |found: &[f64], expected: &[f64]| {
+            found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15)
+        };
+        assert!(near(&found.switches, switches) && near(&found.kinks, kinks), "{text}: {found:?}");
+    }
+}

@@ -150,7 +150,8 @@ impl<const D: usize> Adaptive<D> {
         let shortest = (1.0 - TIME_TOLERANCE) * self.settings.smallest_step;
         let data = self.time_dependent_data.as_ref();
         let end = data.and_then(|data| data.next_breakpoint(session, [state.time, last], [shortest, length]));
-        end.unwrap_or(target)
+        // The target may be the same breakpoint, without the rounding of a search.
+        end.filter(|end| end.time < target.time - TIME_TOLERANCE * length).unwrap_or(target)
     }
 
     /// Solves a step without committing it. Returns its relative error and the norms at its end. A step whose error is NaN

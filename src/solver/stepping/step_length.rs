@@ -5,6 +5,10 @@ use crate::fem::{effect::Step, state::State};
 /// A step whose end differs from a prescribed time by at most this share of its length ends at that time.
 pub const TIME_TOLERANCE: f64 = 1e-6;
 
+/// A two-step scheme starts anew where a step is longer than the last one by more than this factor, below the limit `1 + √2` for
+/// its stability.
+const LARGEST_GROWTH: f64 = 2.4;
+
 /// A time that a step must not pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Landing {
@@ -12,6 +16,17 @@ pub struct Landing {
     pub time: f64,
     /// Its name, if the log reports it.
     pub name: Option<&'static str>,
+}
+
+/// A time at which a load or an obstacle motion has a kink or a jump.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breakpoint {
+    /// In s; for a jump the last time before it, so that the values at the end of a step are those within it.
+    pub time: f64,
+    /// Whether the value jumps.
+    pub is_jump: bool,
+    /// What has it, for the log.
+    pub name: &'static str,
 }
 
 /// The times at which steps of a run must end.
@@ -23,6 +38,12 @@ pub struct Landings {
     pub output_times: Vec<f64>,
     /// Every multiple of this time in s.
     pub interval: Option<f64>,
+    /// Breakpoints of loads and obstacle motions, sorted. Fixed steps that end near a kink remain as they are.
+    pub breakpoints: Vec<Breakpoint>,
+    /// Length of fixed steps or of the shortest adaptive steps in s.
+    pub length: f64,
+    /// Whether steps are fixed.
+    pub is_fixed: bool,
     /// The end of the run in s.
     pub end: f64,
 }
@@ -30,6 +51,42 @@ pub struct Landings {
 impl Landings {
     /// The first of these times after `time`.
     pub fn next(&self, time: f64) -> Landing {
+        let landing = self.next_prescribed(time);
+        let near = TIME_TOLERANCE * self.length;
+        let fixed_end = snapped_to_multiple(time + self.length, self.length);
+        // A jump is passed over only if it coincides with the last end, a kink also if the step to it would be too short.
+        let shortest = if self.is_fixed { near } else { self.length - near };
+        let must_land = |breakpoint: &&Breakpoint| {
+            let Breakpoint { time: at, is_jump, .. } = **breakpoint;
+            let is_end = self.is_fixed && (at - fixed_end).abs() <= near;
+            is_jump && at <= landing.time || at > time + shortest && at < landing.time - near && !is_end
+        };
+        let following = self.breakpoints.partition_point(|breakpoint| breakpoint.time <= time + near);
+        let mut within = self.breakpoints[following..].iter().take_while(|next| next.time <= landing.time);
+        let first = within.find(must_land);
+        first.map_or(landing, |first| Landing { time: first.time, name: Some(first.name) })
+    }
+
+    /// The fixed step from here that does not pass `target`. A two-step scheme starts anew after a jump and after a short step.
+    pub fn fixed_step(&self, state: &State, target: Landing, is_two_step: bool) -> Step {
+        let mut step = next_step(state, self.length, target.time);
+        let has_grown = step.length > LARGEST_GROWTH * step.previous_length;
+        if is_two_step && (has_grown || self.has_jump(state.time)) {
+            step.previous_length = 0.0;
+        }
+        step
+    }
+
+    /// Whether a load or an obstacle motion jumps at this time, the end of a step.
+    fn has_jump(&self, time: f64) -> bool {
+        let near = TIME_TOLERANCE * self.length;
+        let first = self.breakpoints.partition_point(|breakpoint| breakpoint.time < time - near);
+        let mut following = self.breakpoints[first..].iter().take_while(|next| next.time <= time + near);
+        following.any(|breakpoint| breakpoint.is_jump)
+    }
+
+    /// The first of the times of the job and the outputs after `time`.
+    fn next_prescribed(&self, time: f64) -> Landing {
         let after = time * (1.0 + 1e-12);
         let multiple = |interval: f64| interval * ((after / interval).floor() + 1.0);
         let last = self.interval.map_or(self.end, multiple).min(self.end);
@@ -43,10 +100,12 @@ impl Landings {
     /// Fixed steps of this length from `time` to the end.
     pub fn steps_after(&self, time: f64, length: f64) -> u64 {
         let (mut from, mut steps) = (time, 0);
-        let next = |times: &[f64], from: f64| times.iter().copied().find(|to| *to > from);
+        let next = |times: &[f64], from: f64| times.get(times.partition_point(|to| *to <= from)).copied();
         while from < self.end {
-            let nearest = [next(&self.times, from), next(&self.output_times, from)].into_iter().flatten();
-            let to = nearest.fold(self.end, f64::min);
+            let following = self.breakpoints.partition_point(|breakpoint| breakpoint.time <= from);
+            let breakpoint = self.breakpoints.get(following).map(|breakpoint| breakpoint.time);
+            let times = [next(&self.times, from), next(&self.output_times, from), breakpoint];
+            let to = times.into_iter().flatten().fold(self.end, f64::min);
             steps += ((to - from) / length - TIME_TOLERANCE).ceil().max(0.0) as u64;
             from = to;
         }
@@ -55,7 +114,7 @@ impl Landings {
 }
 
 /// A step of `length` from here, shortened or extended to end at `end` if that is near.
-pub fn next_step(state: &State, length: f64, end: f64) -> Step {
+pub(super) fn next_step(state: &State, length: f64, end: f64) -> Step {
     let previous_length = state.step_length;
     let time = snapped_to_multiple(state.time + length, length);
     if (end - time).abs() <= TIME_TOLERANCE * length {
@@ -91,6 +150,48 @@ fn without_rounding(time: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// A run of 1 s with steps of 0.1 s.
+    fn landings(breakpoints: Vec<Breakpoint>, is_fixed: bool, times: Vec<f64>) -> Landings {
+        let output_times = Vec::new();
+        Landings { times, output_times, interval: None, breakpoints, length: 0.1, is_fixed, end: 1.0 }
+    }
+
+    fn breakpoint(time: f64, is_jump: bool) -> Breakpoint {
+        Breakpoint { time, is_jump, name: "a traction" }
+    }
+
+    #[test]
+    fn kinks_within_fixed_steps_are_landed_on_and_those_at_their_ends_change_nothing() {
+        let kinks = [0.1, 0.2 + 1e-9, 0.25, 0.25 + 1e-9, 0.4].map(|time| breakpoint(time, false));
+        let landings = landings(kinks.to_vec(), true, vec![0.4 + 1e-9]);
+        let next = |time: f64| landings.next(time);
+        assert_eq!(next(0.0), Landing { time: 0.2 + 1e-9, name: Some("a traction") }, "a step to 0.1 first");
+        assert_eq!(next(0.1), Landing { time: 0.25, name: Some("a traction") }, "0.2 s is the end anyway");
+        assert_eq!(next(0.25), Landing { time: 0.4 + 1e-9, name: Some("[time] land_on") });
+        assert_eq!(next(0.4 + 1e-9), Landing { time: 1.0, name: None });
+        assert_eq!(landings.steps_after(0.0, 0.1), 3 + 2 + 6);
+    }
+
+    #[test]
+    fn jumps_are_landed_on_from_below_also_at_ends_of_fixed_steps() {
+        let before = 0.1f64.next_down();
+        for (is_fixed, times) in [(true, vec![]), (false, vec![]), (true, vec![0.1])] {
+            let landings = landings(vec![breakpoint(before, true), breakpoint(0.103, true)], is_fixed, times);
+            assert_eq!(landings.next(0.0).time, before);
+            assert_eq!(landings.next(before).time, 0.103, "not 0.1 in a step of rounding errors");
+            assert_eq!(landings.next(0.103).time, 1.0);
+            assert!(landings.has_jump(before) && landings.has_jump(0.1) && !landings.has_jump(0.2));
+        }
+    }
+
+    #[test]
+    fn adaptive_steps_to_kinks_are_not_shorter_than_the_shortest() {
+        let kinks = [0.3, 0.35, 0.41].map(|time| breakpoint(time, false));
+        let landings = landings(kinks.to_vec(), false, Vec::new());
+        assert_eq!(landings.next(0.0).time, 0.3);
+        assert_eq!(landings.next(0.3).time, 0.41);
+    }
+
     #[test]
     fn the_end_of_a_million_steps_is_exact() {
         let (length, mut time) = (1e-3, 0.0);
@@ -102,8 +203,7 @@ mod tests {
 
     #[test]
     fn prescribed_times_are_reached_in_order_and_shorten_fixed_steps() {
-        let landings =
-            Landings { times: vec![0.25, 0.7], output_times: Vec::new(), interval: None, end: 1.0 };
+        let landings = landings(Vec::new(), true, vec![0.25, 0.7]);
         let times = |landings: &Landings| {
             let mut times = vec![0.0];
             while times[times.len() - 1] < landings.end {
@@ -124,12 +224,11 @@ mod tests {
         assert_eq!((with_listed.next(0.5).name, with_listed.next(0.6).name), (None, Some("[time] land_on")));
         // One, then 0.2, 0.25; 0.35, 0.45, 0.55, 0.6; 0.7; 0.8 to 1.
         assert_eq!(with_listed.steps_after(0.0, 0.1), 1 + 2 + 4 + 1 + 3);
-        let named = |times: Vec<f64>, interval| {
-            Landings { times, output_times: Vec::new(), interval, end: 1.0 }.next(0.4).name
-        };
+        let named =
+            |times, interval| Landings { interval, ..self::landings(Vec::new(), true, times) }.next(0.4).name;
         assert_eq!(named(vec![0.5], Some(0.5)), Some("[time] land_on"), "also where an interval ends");
         assert_eq!(named(vec![1.0], None), Some("[time] land_on"), "also at the end of the run");
-        let none = Landings { times: Vec::new(), output_times: Vec::new(), interval: None, end: 1.0 };
+        let none = self::landings(Vec::new(), true, Vec::new());
         assert_eq!((none.next(0.3).time, none.steps_after(0.0, 0.3)), (1.0, 4));
     }
 

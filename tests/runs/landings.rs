@@ -1,0 +1,49 @@
+//! Steps end where loads have kinks and jumps.
+
+use crate::case::Case;
+
+/// Pushed within the fifth step of 0.0625 s.
+fn pushed(scheme: &str) -> Case {
+    Case::square(6)
+        .set("time.scheme", &format!("'{scheme}'"))
+        .set("body_force", "[{ value = ['200*pulse(t, 0.27, 0.28)', 0] }]")
+}
+
+#[test]
+fn a_pulse_within_a_fixed_step_acts_and_the_log_names_it() {
+    let case = pushed("implicit_euler");
+    let results = case.run(2);
+    assert!(results.text("run.log").contains("step 5 ends at t = 0.270000000 s: a body force"));
+    let times = results.table("history.csv").numbers("time");
+    assert_eq!(times.len(), 18, "{times:?}");
+    assert!((times[4] - 0.27).abs() < 1e-15 && (times[5] - 0.28).abs() < 1e-15, "{times:?}");
+}
+
+#[test]
+fn a_run_that_continues_from_a_jump_is_the_straight_run_to_the_last_bit() {
+    for scheme in ["lagged_euler", "bdf2"] {
+        let case = pushed(scheme).set("checkpoint.every", "5").set("checkpoint.keep", "20");
+        let straight = case.run(2);
+        let before = ["probes.csv", "history.csv"].map(|name| straight.text(name));
+        for step in [5, 10] {
+            let file = straight.path(&format!("checkpoint-{step}.h5")).display().to_string();
+            case.run_with(2, &["--restart", &file]).expect(0).says(&format!("(step {step}"));
+            let results = case.results();
+            assert_eq!(before, ["probes.csv", "history.csv"].map(|name| results.text(name)), "{scheme}");
+        }
+    }
+}
+
+#[test]
+fn tables_with_more_kinks_than_steps_are_sampled_with_a_warning() {
+    let table = |kinks: u32| {
+        let points = (0..=kinks).map(|at| format!(", {}, {}", (f64::from(at) + 0.3) / 1000.0, at % 2));
+        format!("[{{ value = ['interpolate(t{})', 0] }}]", points.collect::<String>())
+    };
+    let sampled = Case::square(4).set("body_force", &table(300));
+    let warning = "body_force.0.value: 301 kinks of a table lie within steps of 0.0625 s";
+    sampled.run_with(1, &[]).expect(0).says(warning);
+    assert_eq!(sampled.results().number("steps"), 16.0);
+    let followed = Case::square(4).set("body_force", &table(20)).run(1);
+    assert_eq!(followed.number("steps"), 16.0 + 21.0);
+}
