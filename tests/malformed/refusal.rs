@@ -1,6 +1,6 @@
 //! Common properties of all refusals.
 
-use crate::launch::{Outcome, run};
+use crate::launch::{Outcome, run, unwrapped};
 use std::{
     path::Path,
     sync::atomic::{AtomicUsize, Ordering},
@@ -29,7 +29,8 @@ pub fn refused(outcome: &Outcome, words: &[String]) -> Result<(), String> {
     if outcome.code != 2 {
         return fault(format!("exit code {}", outcome.code));
     }
-    if let Some(missing) = words.iter().find(|part| !said.contains(*part)) {
+    let joined = unwrapped(said);
+    if let Some(missing) = words.iter().find(|part| !joined.contains(*part)) {
         return fault(format!("not said: {missing}"));
     }
     if ["panicked", "RUST_BACKTRACE", "MPI_ABORT", "Segmentation"].iter().any(|trace| said.contains(trace)) {

@@ -95,5 +95,5 @@ fn points_are_refused_where_boundaries_are_meant() {
     refused(make().set("support.0.fix", "'normal'"), "which have no normal");
     let spring = make().without("support.0.fix").set("support.0.stiffness", "{ normal = 1e3 }");
     refused(spring, "only a support with `fix` acts on them");
-    refused(make().set("support.1.on", "['axle']"), "the mesh has no boundary \"axle\"");
+    refused(make().set("support.1.on", "['axle']"), "the mesh has no boundary, point or curve \"axle\"");
 }
