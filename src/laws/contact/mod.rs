@@ -46,8 +46,9 @@ pub struct Contact {
     #[schemars(length(min = 1), example = ["bottom"])]
     pub on: Vec<String>,
     /// The part of these boundaries to which the contact applies: the facets at whose centre this expression in x, y, z is not 0. A
-    /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; with friction, a facet between them
-    /// must belong to neither. A product of conditions holds where all hold, their `max` where one holds. Absent: the whole boundaries.
+    /// boundary may be in several contact tables if each has a `where`, and no facet belongs to two; a node between them belongs to the
+    /// one with the larger part of its area. A product of conditions holds where all hold, their `max` where one holds. Absent: the
+    /// whole boundaries.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "where")]
     #[schemars(example = "x < 1", example = "(x > 1)*(x < 2)")]
     pub part: Option<Scalar>,

@@ -69,6 +69,14 @@ pub(super) struct Laws {
     pub friction: Option<FrictionLaw>,
 }
 
+/// The nodes on which a law acts.
+struct OnBranches {
+    /// Their abscissa and pressure in the plane of the law's graph.
+    nodes: Vec<[f64; 2]>,
+    /// For each node of the boundary its branch, if the law acts on it.
+    of_all: Vec<Option<usize>>,
+}
+
 impl<'a> Boundary<'a> {
     /// The rows of a profile at one time, and the body.
     pub(super) fn new(table: Table, name: &'a str, snapshot: Option<&'a Snapshot>) -> Self {
@@ -196,7 +204,9 @@ impl<'a> Boundary<'a> {
 
     /// The number of nodes on each branch of the law, as a table.
     pub(super) fn branch_table(&self) -> String {
-        let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return String::new() };
+        let (Some(law), Some(OnBranches { of_all: on, .. })) = (self.law, self.on_branches()) else {
+            return String::new();
+        };
         let rows = law.branches().into_iter().enumerate().map(|(at, branch)| {
             let count = on.iter().filter(|other| **other == Some(at)).count();
             let where_ =
@@ -315,7 +325,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// The nodes in the plane of the law's graph, and the branch of each node on which the law acts.
-    fn on_branches(&self) -> Option<(Vec<[f64; 2]>, Vec<Option<usize>>)> {
+    fn on_branches(&self) -> Option<OnBranches> {
         let law = self.law?;
         let column = |name: &str| self.table.column(name);
         let (v, p) = (column("normal_velocity")?, column("contact_pressure")?);
@@ -326,17 +336,19 @@ impl<'a> Boundary<'a> {
         for (n, branch) in acts.iter().zip(law.branches_of(&nodes)) {
             on[*n] = Some(branch);
         }
-        (!nodes.is_empty()).then_some((nodes, on))
+        (!nodes.is_empty()).then_some(OnBranches { nodes, of_all: on })
     }
 
     /// The nodes in the plane of the law's graph: abscissa and pressure.
     pub(super) fn law_nodes(&self) -> Vec<[f64; 2]> {
-        self.on_branches().map_or(Vec::new(), |(nodes, _)| nodes)
+        self.on_branches().map_or(Vec::new(), |on| on.nodes)
     }
 
     /// The nodes on the graph of the law, which also reaches these other nodes.
     pub(super) fn on_law(&self, others: &[[f64; 2]]) -> Result<Option<Picture>> {
-        let (Some(law), Some((nodes, on))) = (self.law, self.on_branches()) else { return Ok(None) };
+        let (Some(law), Some(OnBranches { nodes, of_all: on })) = (self.law, self.on_branches()) else {
+            return Ok(None);
+        };
         let reached = [&nodes, others].concat();
         let line = Series { colour: [0x55; 3], ..Series::new(0, "", Look::Line, law.line(&reached)) };
         let mut series = vec![line];
@@ -376,7 +388,9 @@ impl<'a> Boundary<'a> {
 
     /// The parts of the boundary on each branch; borders are half way between nodes.
     fn bands(&self) -> Vec<Band> {
-        let (Some(law), Some((_, on))) = (self.law, self.on_branches()) else { return Vec::new() };
+        let (Some(law), Some(OnBranches { of_all: on, .. })) = (self.law, self.on_branches()) else {
+            return Vec::new();
+        };
         let names = law.branches();
         let mut bands: Vec<Band> = Vec::new();
         let mut at = 0;
