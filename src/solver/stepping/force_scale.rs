@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// The least size as a share of the norm of `b`: rounding errors of `K v` allow no more.
-const LEAST_SHARE: f64 = 1e-3;
+const LEAST_SHARE: f64 = 0.1;
 
 /// The masses that belong to the velocity components.
 #[derive(Debug)]
