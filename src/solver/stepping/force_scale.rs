@@ -12,7 +12,7 @@ use crate::{
     parallel::session::Session,
 };
 
-/// The least size as a share of the norm of `b`: rounding errors of `K v` allow no more.
+/// The least size as a share of the norm of `b`: below a smaller one rounding errors of `K v` often make steps be solved twice.
 const LEAST_SHARE: f64 = 0.1;
 
 /// The masses that belong to the velocity components.
