@@ -27,6 +27,17 @@ const NO_PHYSICS: &[&str] = &[
     "time.end",
 ];
 
+impl MeshSource {
+    /// The numbers of cells along the axes; empty for a mesh file.
+    pub fn cells(&self) -> Vec<u32> {
+        match self {
+            Self::Rectangle(mesh) => mesh.cells.to_vec(),
+            Self::Box(mesh) => mesh.cells.to_vec(),
+            Self::File(_) => Vec::new(),
+        }
+    }
+}
+
 impl Job {
     /// The dimension, 2 or 3; `None` for a mesh file, which has to be read first.
     pub fn dimension(&self) -> Option<usize> {

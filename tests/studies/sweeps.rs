@@ -69,3 +69,24 @@ fn a_response_that_no_run_has_fails_with_the_nearest_name() {
     assert!(density(0) != density(1) && [0, 1].iter().all(|run| (0.5..2.0).contains(&density(*run))));
     assert!(number(&results, "/runs/0/response/0") > 0.0);
 }
+
+#[test]
+fn a_value_that_the_job_refuses_is_a_failed_run_and_all_its_faults_are_listed() {
+    let sweep = "[sweep]\n\"material.density\" = [-1.0, 1.0]\n\"material.viscosity.shear\" = [-50.0, 50.0]\n";
+    let response = "[[response]]\nof = \"history.kinetic_energy\"\n";
+    let scene = Scene::new(crate::scene::SQUARE, &format!("{sweep}{response}"));
+    let outcome = scene.study(2, &[]).expect(1).says("3 of 4 runs failed").says("density-1.0-shear-50.0");
+    let refused = |run: &str| outcome.stdout.matches(&format!("run refused   {run}")).count();
+    assert_eq!(refused("density--1.0-shear--50.0"), 1, "{}", outcome.stdout);
+    assert_eq!(outcome.stdout.matches("run refused").count(), 3, "{}", outcome.stdout);
+    let results = scene.results();
+    assert_eq!(results["runs"][0]["status"], "completed");
+    assert!(number(&results, "/runs/0/response/0") > 0.0);
+    let error = results["runs"][1]["error"].as_str().expect("a reason");
+    assert!(error.contains("density") && error.contains("shear"), "both faults: {error}");
+    assert_eq!(results["runs"].as_array().map(Vec::len), Some(4));
+    // A sweep without a value that can be used is refused as a whole, before anything is run.
+    let all = Scene::new(crate::scene::SQUARE, "[sweep]\n\"material.densty\" = [0.5, 1.0]\n");
+    all.study(1, &[]).expect(2).says("did you mean");
+    assert!(!all.path("out/study").exists());
+}

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::parallel::agreement::pass;
+use crate::solver::stepping::without_rounding;
 use std::{
     fmt::{self, Display, Formatter},
     fs::{File, OpenOptions},
@@ -22,7 +23,8 @@ pub(super) struct CsvFile {
 }
 
 impl CsvFile {
-    /// Starts an empty table, or continues one after the row whose first column is `goes_on_after`.
+    /// Starts an empty table, or continues one after the row whose first column, a step or a time as tables show it, is
+    /// `goes_on_after`.
     pub(super) fn open(path: &Path, header: &str, goes_on_after: Option<f64>) -> Result<Self> {
         goes_on_after.map_or_else(|| Self::create(path, header), |last| Self::resume(path, header, last))
     }
@@ -107,6 +109,15 @@ impl Display for Number {
     }
 }
 
+/// A time: a step that ends at the last number before a jump at 0.003 s is shown at 0.003, not at 0.0029999999999999996.
+pub(super) struct Time(pub f64);
+
+impl Display for Time {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        Number(without_rounding(self.0)).fmt(f)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,5 +148,7 @@ mod tests {
             assert_eq!(Number(value).to_string().parse::<f64>().unwrap(), value);
         }
         assert_eq!(Numbers(&[0.5, 1e-9]).to_string(), "0.5,1e-9");
+        assert_eq!(Time(0.003f64.next_down()).to_string(), "0.003");
+        assert_eq!(Time(1.0 / 3.0).to_string().parse::<f64>().unwrap(), 1.0 / 3.0);
     }
 }

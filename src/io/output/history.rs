@@ -1,6 +1,6 @@
 //! `history.csv`, with one row per step.
 
-use super::csv::{CsvFile, Number, Numbers};
+use super::csv::{CsvFile, Number, Numbers, Time};
 use crate::{
     error::Result,
     fem::effect::{CONTACT, ENERGIES, Energy, EnergyKind, NUMERICAL, Peaks, Role},
@@ -216,7 +216,7 @@ impl History {
     ) -> Result<()> {
         self.0.row(format_args!(
             "{step},{},{},{},{},{},{},{}",
-            Number(time),
+            Time(time),
             Number(length),
             outcome.newton_iterations,
             outcome.linear_iterations,

@@ -4,6 +4,7 @@ use super::seal::{CHECKPOINT, is_sealed, verify_alone};
 use crate::{
     error::{Error, Result},
     job::by_extension,
+    solver::stepping::without_rounding,
 };
 use hdf5::types::FixedAscii;
 use std::fmt::Write;
@@ -83,7 +84,7 @@ fn describe_fields(file: &hdf5::File) -> hdf5::Result<String> {
     line(&mut text, format!("\nsteps: {steps}"));
     let times = file.dataset("VTKHDF/Steps/Values")?.read_raw::<f64>()?;
     for (step, time) in times.iter().enumerate().take(usize::try_from(steps).unwrap_or(0)) {
-        line(&mut text, format!("  {step:>6}  t = {time} s"));
+        line(&mut text, format!("  {step:>6}  t = {} s", without_rounding(*time)));
     }
     Ok(text)
 }

@@ -1,6 +1,6 @@
 //! `probes.csv`: displacement and velocity at points of the body, with one row per step and probe.
 
-use super::csv::{CsvFile, Number, Numbers};
+use super::csv::{CsvFile, Numbers, Time};
 use crate::{
     error::{Error, Result},
     fem::{space::Simplex, state::State},
@@ -95,7 +95,7 @@ impl<const D: usize> Probes<D> {
         self.values(session, state)?;
         let Some(file) = &mut self.file else { return Ok(()) };
         for (name, values) in self.names.iter().zip(self.room[1].chunks_exact(2 * D)) {
-            file.row(format_args!("{},{},{name},{}", state.step, Number(state.time), Numbers(values)))?;
+            file.row(format_args!("{},{},{name},{}", state.step, Time(state.time), Numbers(values)))?;
         }
         Ok(())
     }

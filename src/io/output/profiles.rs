@@ -1,6 +1,6 @@
 //! `profiles.csv`: values along boundaries, with one row per facet node, output time and profile.
 
-use super::csv::{CsvFile, Number, Numbers};
+use super::csv::{CsvFile, Numbers, Time};
 use crate::{
     error::Result,
     fem::{
@@ -13,6 +13,7 @@ use crate::{
     linear_algebra::tensor::{Mandel, add_scaled, apply, dot, norm},
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
+    solver::stepping::without_rounding,
 };
 use std::{collections::HashMap, path::Path};
 
@@ -87,7 +88,7 @@ impl<const D: usize> Profiles<D> {
         let header = format!(
             "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{gap}{friction}{tangential}"
         );
-        self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
+        self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(without_rounding))?);
         Ok(())
     }
 
@@ -112,7 +113,7 @@ impl<const D: usize> Profiles<D> {
                 let gap_at = if self.with.gap { D + 3 } else { width };
                 let mut row = |row: &[f64]| {
                     let (before, gap) = row.split_at(gap_at);
-                    let (time, name, before) = (Number(state.time), &profile.name, Numbers(before));
+                    let (time, name, before) = (Time(state.time), &profile.name, Numbers(before));
                     match gap.split_first() {
                         None => file.row(format_args!("{time},{name},{before}")),
                         Some((gap, after)) if gap.is_nan() => {

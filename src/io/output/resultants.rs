@@ -1,6 +1,6 @@
 //! `resultants.csv`: forces and moments on the body, with one row per step and source.
 
-use super::csv::{CsvFile, Number, Numbers};
+use super::csv::{CsvFile, Numbers, Time};
 use crate::{
     error::Result,
     fem::{
@@ -107,7 +107,7 @@ impl<const D: usize> ResultantTable<D> {
                 file.row(format_args!(
                     "{},{},{name},{},{}{areas}{path}{turn}",
                     state.step,
-                    Number(state.time),
+                    Time(state.time),
                     Numbers(&resultant.force),
                     Numbers(moment),
                 ))?;

@@ -15,7 +15,7 @@ pub struct Slip {
     pub speed: f64,
     /// Friction traction in Pa, not negative.
     pub traction: f64,
-    /// Derivative of the velocity by the parameter in m/(Pa s): 0 where the point sticks.
+    /// Derivative of the velocity by the parameter in m/(Pa s): 0 where the point sticks or creeps too slowly to matter.
     pub derivative: f64,
     /// Slope of the graph in Pa s/m, where the point slides.
     pub slope: f64,

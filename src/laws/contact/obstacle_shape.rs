@@ -90,6 +90,12 @@ impl Shape {
         })
     }
 
+    /// The largest coordinate of the corners of the surface, in m, by which distances from it are rounded; 0 for an expression.
+    fn extent(&self) -> f64 {
+        let triangles = self.surface.as_ref().and_then(|surface| surface.triangles.as_ref());
+        triangles.map_or(0.0, |triangles| triangles.extent())
+    }
+
     /// Sets the surface to the contents of its STL file. An error says what is wrong with it.
     pub fn read_surface(&mut self, bytes: &[u8]) -> Result<(), String> {
         if let Some(surface) = &mut self.surface {
@@ -108,7 +114,7 @@ impl Shape {
     /// Infinite if the ray does not meet the obstacle, NaN if the expression is no number or no distance there.
     pub(super) fn along<const D: usize>(&self, offset: &Vector<D>, normal: &Vector<D>) -> f64 {
         let first = self.distance_at(offset);
-        let size = offset.iter().fold(0.0, |most, x| larger(most, x.abs()));
+        let size = offset.iter().fold(self.extent(), |most, x| larger(most, x.abs()));
         if first.abs() <= ZERO * size {
             return first;
         }
@@ -212,6 +218,38 @@ mod tests {
             assert!((found * cosine / 0.25 - 1.0).abs() < 1e-13, "{degrees}: {found}");
             let inside = floor.along(&[3.0, -0.25], &[sine, -cosine]);
             assert!((inside * cosine / 0.25 + 1.0).abs() < 1e-13, "{degrees}: {inside}");
+        }
+    }
+
+    #[test]
+    fn triangles_far_larger_than_the_body_have_its_gap_also_where_it_touches() {
+        // A tetrahedron below z = 0 with sides of 2 km, and its top turned about the x axis.
+        let tilt: f64 = 0.3;
+        let corners =
+            [[-900.0, -700.0, 0.0], [1100.0, -600.0, 0.0], [-100.0, 1300.0, 0.0], [0.0, 0.0, -1000.0]];
+        let turned =
+            corners.map(|[x, y, z]| [x, tilt.cos() * y - tilt.sin() * z, tilt.sin() * y + tilt.cos() * z]);
+        let triangles = vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        for (corners, top) in [(corners, [0.0, 0.0, 1.0]), (turned, [0.0, -tilt.sin(), tilt.cos()])] {
+            let surface = TriangulatedSurface::new(&corners, triangles.clone()).expect("a surface");
+            let surface = Surface { file: PathBuf::new(), triangles: Some(Arc::new(surface)) };
+            let shape = Shape { surface: Some(surface), ..Shape::default() };
+            for height in [0.0, 1e-9, 1e-4, 0.1, 2.0] {
+                for number in 0..50 {
+                    let x = f64::from(number) * 0.037 - 1.0;
+                    let [y, z] = [0.7 - 0.9 * x, 0.0];
+                    let on_top = [x, top[2] * y, -top[1] * y + z];
+                    let place = add_scaled(&on_top, height, &top);
+                    for slant in [0.0, 0.5] {
+                        let toward = [slant * top[2], 0.0, 0.0];
+                        let normal: Vector<3> = std::array::from_fn(|i| toward[i] - top[i]);
+                        let length = crate::linear_algebra::tensor::norm(&normal);
+                        let found = shape.along(&place, &normal.map(|x| x / length));
+                        let wanted = height * length;
+                        assert!((found - wanted).abs() <= 1e-12, "{found} for {wanted} at {place:?}");
+                    }
+                }
+            }
         }
     }
 

@@ -20,6 +20,7 @@ const BESIDE: f64 = 1e-6;
 pub(super) struct TriangulatedSurface {
     triangles: TriMesh,
     digest: u64,
+    extent: f64,
 }
 
 impl PartialEq for TriangulatedSurface {
@@ -55,11 +56,12 @@ impl TriangulatedSurface {
         }
         check_closed(corners, &triangles)?;
         let digest = digest(corners, &triangles);
+        let extent = corners.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let points = corners.iter().map(|&[x, y, z]| Point::new(x, y, z)).collect();
         // There are fewer corners than triangles, and fewer triangles than 2^32.
         let indices = triangles.iter().map(|corners| corners.map(|corner| corner as u32)).collect();
         let mesh = TriMesh::with_flags(points, indices, TriMeshFlags::ORIENTED);
-        let surface = Self { triangles: mesh.map_err(|error| error.to_string())?, digest };
+        let surface = Self { triangles: mesh.map_err(|error| error.to_string())?, digest, extent };
         surface.check_intersections()?;
         Ok(surface)
     }
@@ -67,6 +69,11 @@ impl TriangulatedSurface {
     /// A hash of the corners of all triangles.
     pub(super) fn digest(&self) -> u64 {
         self.digest
+    }
+
+    /// The largest coordinate of a corner in m.
+    pub(super) fn extent(&self) -> f64 {
+        self.extent
     }
 
     /// The distance in m of a place from the surface, negative inside of the obstacle.

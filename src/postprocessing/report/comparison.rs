@@ -11,13 +11,15 @@ use super::{
 };
 use crate::error::Result;
 use base64::{Engine, engine::general_purpose::STANDARD};
+use std::collections::BTreeMap;
 
-/// Pictures of the same name beside each other, and the members of both summaries in one table.
+/// The keys in which the jobs differ, pictures of the same name beside each other, and the members of both summaries in one table.
 pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
     let names = [0, 1].map(|run| found[run].folder.display().to_string());
     let titles = [0, 1].map(|run| title(&found[run]));
-    let mut page =
-        Page::new(&titles.join(" and "), paragraph(&format!("Left: {}. Right: {}.", names[0], names[1])));
+    let [left, right] = [0, 1].map(|run| format!("{} ({})", titles[run], names[run]));
+    let mut page = Page::new(&titles.join(" and "), paragraph(&format!("Left: {left}. Right: {right}.")));
+    page.section("Jobs", &differences(found, &names), vec![]);
     let bodies = [0, 1].map(|run| drawn_body(&found[run], options));
     let common = Body::in_common("the other run", &bodies.iter().flatten().collect::<Vec<_>>(), false);
     let bodies = bodies.map(|body| body.map(|body| body.with_common(&common)));
@@ -77,6 +79,45 @@ fn figure(side: usize, picture: Option<Picture>) -> String {
         STANDARD.encode(picture.file()),
         escape(&picture.caption)
     )
+}
+
+/// A table of the keys in which the effective jobs differ, apart from the output folder.
+fn differences(found: &[Found; 2], names: &[String; 2]) -> String {
+    let [left, right] = [0, 1].map(|run| {
+        let mut keys = BTreeMap::new();
+        let job = found[run].text.as_ref().and_then(|text| text.parse::<toml::Table>().ok());
+        flatten("", &toml::Value::Table(job.unwrap_or_default()), &mut keys);
+        keys.remove("output.folder");
+        keys
+    });
+    let mut rows = Vec::new();
+    for key in left.keys().chain(right.keys().filter(|key| !left.contains_key(*key))) {
+        if left.get(key) != right.get(key) {
+            let value =
+                |keys: &BTreeMap<String, String>| keys.get(key).cloned().unwrap_or_else(|| "absent".into());
+            rows.push(vec![key.clone(), value(&left), value(&right)]);
+        }
+    }
+    if rows.is_empty() {
+        return paragraph("The effective jobs are the same.");
+    }
+    table("Keys in which the jobs differ", &["key", &names[0], &names[1]], &rows)
+}
+
+/// Adds the values below `path`; entries of lists of tables are numbered from 0, as `--set` numbers them.
+fn flatten(path: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
+    let below = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+    match value {
+        toml::Value::Table(table) => {
+            table.iter().for_each(|(name, value)| flatten(&below(name), value, keys))
+        }
+        toml::Value::Array(list) if list.iter().any(toml::Value::is_table) => {
+            list.iter().enumerate().for_each(|(at, value)| flatten(&below(&at.to_string()), value, keys));
+        }
+        value => {
+            keys.insert(path.to_owned(), value.to_string());
+        }
+    }
 }
 
 fn summaries(names: &[String; 2], rows: [Vec<(String, String)>; 2]) -> String {

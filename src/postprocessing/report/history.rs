@@ -19,41 +19,70 @@ const MOST_PROBES: usize = 7;
 const ROUNDING: f64 = 1e-9;
 
 /// Each quantity of the probes over time, with a line for each probe.
-pub(super) fn probes(table: &Table) -> Result<Vec<Picture>> {
+pub(super) fn probes(table: &Table) -> Result<OverTime> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
-    let mut out = Vec::new();
+    let mut out = OverTime::default();
     for column in table.header().iter().filter(|name| !["step", "time", "probe"].contains(&name.as_str())) {
-        let series = names.iter().zip(&tables).enumerate().map(|(place, (name, table))| {
-            Series::new(place, name.clone(), Look::Line, table.curve("time", column))
-        });
+        let curves: Vec<Vec<[f64; 2]>> = tables.iter().map(|table| table.curve("time", column)).collect();
         let (vector, axis) = column.rsplit_once('_').unwrap_or((column, ""));
         let quantity = format!("{} {axis}", vector.replace('_', " "));
+        let quantity = quantity.trim_end();
         let unit = unit_by_name(column);
-        let ends = names.iter().zip(&tables).map(|(name, table)| {
-            let last = table.column(column).and_then(|values| values.last().copied()).unwrap_or(0.0);
-            format!("{name} {} {unit}", number(last))
-        });
+        let last = |curve: &[[f64; 2]]| curve.last().map_or(0.0, |point| point[1]);
+        let range = |curve: &Vec<[f64; 2]>| extent(curve.iter().map(|point| point[1]));
+        if curves.iter().filter_map(range).all(is_constant) {
+            let pairs = names.iter().zip(&curves);
+            let named =
+                pairs.map(|(name, curve)| format!("{quantity} of {name}: {} {unit}", number(last(curve))));
+            out.constant.extend(named);
+            continue;
+        }
+        let ends =
+            names.iter().zip(&curves).map(|(name, curve)| format!("{name} {} {unit}", number(last(curve))));
         let ends = ends.collect::<Vec<_>>().join(", ");
         let left_out = if names.len() > MOST_PROBES {
             format!(" The first {MOST_PROBES} of {} probes.", names.len())
         } else {
             String::new()
         };
-        let chart = Chart::new(TIME, Axis { quantity: quantity.trim_end(), unit }, series.collect());
-        out.push(Picture::new(
+        let series = names.iter().zip(curves).enumerate();
+        let series = series.map(|(place, (name, curve))| Series::new(place, name.clone(), Look::Line, curve));
+        let chart = Chart::new(TIME, Axis { quantity, unit }, series.collect());
+        out.pictures.push(Picture::new(
             &format!("probes_{column}"),
-            format!("Chart of {} of the probes over time; at the end {ends}", quantity.trim_end()),
-            format!("{} of the probes. At the end: {ends}.{left_out}", capital(quantity.trim_end())),
+            format!("Chart of {quantity} of the probes over time; at the end {ends}"),
+            format!("{} of the probes. At the end: {ends}.{left_out}", capital(quantity)),
             chart.svg()?,
         ));
     }
     Ok(out)
 }
 
+/// Charts over time, and quantities that are constant: these are named with their value instead of drawn.
+#[derive(Debug, Default)]
+pub(super) struct OverTime {
+    /// The charts.
+    pub pictures: Vec<Picture>,
+    /// Such as `touching area of contact bottom: 0.2 m`.
+    pub constant: Vec<String>,
+}
+
+/// Columns of a table that share a chart.
+struct Columns<'a> {
+    /// Name of the picture.
+    name: &'a str,
+    /// Its subject in the caption.
+    what: &'a str,
+    /// The source of the rows; empty if there is only one.
+    source: &'a str,
+    quantity: &'a str,
+    unit: &'a str,
+    columns: &'a [&'a str],
+}
+
 /// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
-/// Forces that are zero but for rounding errors are named instead.
-pub(super) fn resultants(table: &Table, dimension: usize) -> Result<(Vec<Picture>, Vec<String>)> {
+pub(super) fn resultants(table: &Table, dimension: usize) -> Result<OverTime> {
     let of = |unit: [&'static str; 2]| unit[dimension - 2];
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
@@ -61,57 +90,55 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<(Vec<Picture
     let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
     let columns = forces.iter().filter_map(|force| table.column(force));
     let largest = columns.flatten().fold(0.0, |most, force| f64::max(most, force.abs()));
-    let (mut out, mut none) = (Vec::new(), Vec::new());
+    let mut out = OverTime::default();
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
-        let what = if source == "momentum" { "rate of momentum" } else { source };
-        let quantity = if source == "momentum" { "rate of momentum" } else { "force" };
-        let name = format!("force_{number}");
+        let (what, quantity) = match source.as_str() {
+            "momentum" => ("rate of momentum", "rate of momentum"),
+            source => (source, "force"),
+        };
         let is_felt = |force: &&str| exceeds(&rows, force, ROUNDING * largest);
         let (felt, unfelt): (Vec<&str>, Vec<&str>) = forces.iter().copied().partition(is_felt);
-        none.extend(unfelt.iter().map(|force| format!("{} of {what}", force.replace('_', " "))));
-        out.extend(sums(&rows, &name, (what, quantity), of(["N/m", "N"]), &felt)?);
+        let unit = of(["N/m", "N"]);
+        let none = unfelt.iter().map(|force| format!("{} of {what}: 0 {unit}", force.replace('_', " ")));
+        out.constant.extend(none);
+        let name = format!("force_{number}");
+        let drawn = Columns { name: &name, what, source: what, quantity, unit, columns: &felt };
+        draw(&rows, &drawn, &mut out)?;
         if source.starts_with("contact") {
-            let name = format!("area_{number}");
-            out.extend(sums(&rows, &name, (source, "area"), of(["m", "m²"]), &areas)?);
             for (name, quantity, unit, columns) in [
-                ("pressure", "contact pressure", "Pa", &["mean_pressure", "largest_pressure"][..]),
-                (
-                    "obstacle_displacement",
-                    "displacement of the obstacle",
-                    "m",
-                    &["obstacle_displacement"][..],
-                ),
-                ("obstacle_rotation", "rotation of the obstacle", "rad", &["obstacle_rotation"][..]),
+                ("area", "area", of(["m", "m²"]), &areas[..]),
+                ("pressure", "contact pressure", "Pa", &["mean_pressure", "largest_pressure"]),
+                ("obstacle_displacement", "displacement of the obstacle", "m", &["obstacle_displacement"]),
+                ("obstacle_rotation", "rotation of the obstacle", "rad", &["obstacle_rotation"]),
             ] {
-                let words = format!("{source}, {quantity}");
-                out.extend(sums(
+                let name = format!("{name}_{number}");
+                let what = format!("{source}, {quantity}");
+                draw(
                     &rows,
-                    &format!("{name}_{number}"),
-                    (words.as_str(), quantity),
-                    unit,
-                    columns,
-                )?);
+                    &Columns { name: &name, what: &what, source, quantity, unit, columns },
+                    &mut out,
+                )?;
             }
         }
     }
-    Ok((out, none))
+    Ok(out)
 }
 
 /// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
-pub(super) fn energies(table: &Table, unit: &str) -> Result<Vec<Picture>> {
+pub(super) fn energies(table: &Table, unit: &str) -> Result<OverTime> {
     let columns = |roles: &[Role]| -> Vec<&str> {
         ENERGIES.iter().filter(|kind| roles.contains(&kind.role)).map(|kind| kind.column).collect()
     };
     let spent = [columns(&[Role::Work]), columns(&[Role::Dissipated, Role::Numerical])].concat();
-    let mut out = Vec::new();
-    for (name, quantity, columns) in [
+    let mut out = OverTime::default();
+    for (name, what, columns) in [
         ("energies", "energy", columns(&[Role::Stored])),
         ("dissipation", "work and dissipation since t = 0", spent),
     ] {
-        out.extend(sums(table, name, (quantity, quantity), unit, &columns)?);
+        draw(table, &Columns { name, what, source: "", quantity: what, unit, columns: &columns }, &mut out)?;
     }
-    out.extend(over_time(
+    out.pictures.extend(over_time(
         table,
         Curve {
             column: "energy_imbalance",
@@ -130,38 +157,47 @@ fn exceeds(table: &Table, column: &str, size: f64) -> bool {
     table.column(column).is_some_and(|values| values.iter().any(|value| value.abs() > size))
 }
 
-/// A chart of several columns of one quantity over time; none if all of them are zero.
-fn sums(
-    table: &Table,
-    name: &str,
-    (what, quantity): (&str, &str),
-    unit: &str,
-    columns: &[&str],
-) -> Result<Option<Picture>> {
+/// Whether values from `low` to `high` are the same in the digits that are shown.
+fn is_constant((low, high): (f64, f64)) -> bool {
+    number(low) == number(high)
+}
+
+/// Adds a chart of several columns over time, and names the columns that are constant: in the caption of the chart, or in the list if
+/// all of them are.
+fn draw(table: &Table, columns: &Columns<'_>, out: &mut OverTime) -> Result<()> {
+    let Columns { name, what, source, quantity, unit, columns } = *columns;
     let mut series = Vec::new();
-    let (mut ends, mut zero) = (Vec::new(), Vec::new());
+    let (mut ends, mut constant) = (Vec::new(), Vec::new());
     for column in columns {
-        let Some(values) = table.column(column) else { continue };
+        let points = table.curve("time", column);
+        let Some(range) = extent(points.iter().map(|point| point[1])) else { continue };
         let words = column.replace('_', " ");
-        if values.iter().all(|value| value.is_nan()) {
-            continue;
+        let last = points.last().map_or(0.0, |point| point[1]);
+        if is_constant(range) {
+            constant.push((words, last));
+        } else {
+            ends.push(format!("{words} {} {unit}", number(last)));
+            series.push(Series::new(series.len(), words, Look::Line, points));
         }
-        if values.iter().all(|value| *value == 0.0 || value.is_nan()) {
-            zero.push(words);
-            continue;
-        }
-        ends.push(format!("{words} {} {unit}", number(values.last().copied().unwrap_or(0.0))));
-        series.push(Series::new(series.len(), words, Look::Line, table.curve("time", column)));
     }
     if series.is_empty() {
-        return Ok(None);
+        let of = if source.is_empty() { String::new() } else { format!(" of {source}") };
+        let named = constant.iter().map(|(words, value)| format!("{words}{of}: {} {unit}", number(*value)));
+        out.constant.extend(named);
+        return Ok(());
     }
     let ends = ends.join(", ");
-    let zero =
-        if zero.is_empty() { String::new() } else { format!(" Zero throughout: {}.", zero.join(", ")) };
+    let constant: Vec<String> =
+        constant.iter().map(|(words, value)| format!("{words} {} {unit}", number(*value))).collect();
+    let constant = match &constant[..] {
+        [] => String::new(),
+        all => format!(" Constant: {}.", all.join(", ")),
+    };
     let svg = Chart::new(TIME, Axis { quantity, unit }, series).svg()?;
     let alt = format!("Chart of {what} over time; at the end {ends}");
-    Ok(Some(Picture::new(name, alt, format!("{}. At the end: {ends}.{zero}", capital(what)), svg)))
+    let caption = format!("{}. At the end: {ends}.{constant}", capital(what));
+    out.pictures.push(Picture::new(name, alt, caption, svg));
+    Ok(())
 }
 
 /// Properties of the steps: Newton and linear iterations, length, changed branches, inclusion residual with its tolerance.
@@ -207,7 +243,7 @@ fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
     let points = table.curve("time", column);
     let Some((low, high)) = extent(points.iter().map(|p| p[1])) else { return Ok(None) };
     // No picture of what is constant, such as the length of the steps of most runs.
-    if low == high || (!is_logarithmic && number(low) == number(high)) {
+    if low == high || (!is_logarithmic && is_constant((low, high))) {
         return Ok(None);
     }
     let unseen = points.iter().filter(|p| is_logarithmic && p[1] <= 0.0).count();
@@ -234,16 +270,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn forces_of_rounding_errors_are_named_and_the_motion_of_the_obstacle_is_drawn() {
-        let text = "step,time,source,force_x,force_y,largest_pressure,obstacle_displacement\n1,0.1,contact top,1e-12,5,3,0.1\n\
-                    2,0.2,contact top,2e-12,6,4,0.2\n1,0.1,support left,3e-13,0,,\n2,0.2,support left,0,0,,\n";
+    fn constant_quantities_and_rounding_errors_are_named_and_the_motion_of_the_obstacle_is_drawn() {
+        let text = "step,time,source,force_x,force_y,largest_pressure,obstacle_displacement,touching_area\n1,0.1,contact top,1e-12,5,3,0.1,0.5\n\
+                    2,0.2,contact top,2e-12,6,4,0.2,0.5000000001\n1,0.1,support left,3e-13,0,,,\n2,0.2,support left,0,0,,,\n";
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("resultants.csv");
         std::fs::write(&path, text).expect("written");
         let table = Table::read(&path, "source").expect("table");
-        let (pictures, none) = resultants(&table, 2).expect("drawn");
+        let OverTime { pictures, constant } = resultants(&table, 2).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);
-        assert_eq!(none, ["force x of contact top", "force x of support left", "force y of support left"]);
+        assert_eq!(
+            constant,
+            [
+                "force x of contact top: 0 N/m",
+                "touching area of contact top: 0.5 m",
+                "force x of support left: 0 N/m",
+                "force y of support left: 0 N/m"
+            ]
+        );
     }
 }

@@ -4,7 +4,8 @@ use super::{
     artifacts::{Found, Gap},
     body::{self, Body, Drawn},
     boundary::{Boundary, Laws},
-    facts, history,
+    facts,
+    history::{self, OverTime},
     law::Law,
     markup::{escape, paragraph},
     motion,
@@ -245,25 +246,26 @@ fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>
 }
 
 fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
+    let mut add = |heading: &str, mut words: String, OverTime { pictures, constant }: OverTime| {
+        if !constant.is_empty() {
+            words += &paragraph(&format!("Not drawn, because constant: {}.", constant.join(", ")));
+        }
+        sections.push((heading.into(), words, pictures));
+    };
     if let Some(probes) = found.probes.as_ref().filter(|probes| !probes.is_empty()) {
-        sections.push(("Probes".into(), String::new(), history::probes(probes)?));
+        add("Probes", String::new(), history::probes(probes)?);
     }
     let dimension = found.dimension().unwrap_or(3);
     if let Some(resultants) = found.resultants.as_ref().filter(|resultants| !resultants.is_empty()) {
-        let mut words = "Forces on the body. In every step they add up to the rate of momentum.".to_owned();
-        let (pictures, none) = history::resultants(resultants, dimension)?;
-        if !none.is_empty() {
-            words += &format!(" Zero in all steps: {}.", none.join(", "));
-        }
-        sections.push(("Resultants".into(), paragraph(&words), pictures));
+        let words = "Forces on the body. In every step they add up to the rate of momentum.";
+        add("Resultants", paragraph(words), history::resultants(resultants, dimension)?);
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
-        sections.push(("Energy".into(), paragraph("history.csv contains no steps yet."), vec![]));
+        add("Energy", paragraph("history.csv contains no steps yet."), OverTime::default());
         return Ok(());
     }
-    let unit = Energy::unit(dimension);
-    sections.push(("Energy".into(), String::new(), history::energies(history, unit)?));
+    add("Energy", String::new(), history::energies(history, Energy::unit(dimension))?);
     let tolerance = found.job.as_ref().map(|job| job.solver.inclusion_tolerance);
     sections.push(("Steps".into(), String::new(), history::steps(history, tolerance)?));
     Ok(())

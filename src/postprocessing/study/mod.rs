@@ -44,8 +44,8 @@ use crate::{
 use compare::Compared;
 use document::Take;
 use execute::{announced, speaker};
-use plan::{Planned, PlannedReference};
-use record::{Ran, seconds_of};
+use plan::{Planned, PlannedReference, RefusedRun};
+use record::{Counts, Ran, seconds_of};
 use results::RunResult;
 use side_by_side::{Numbered, execute_all};
 
@@ -72,6 +72,7 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
     let numbered = |(index, planned)| (planned, repetitions, number(index));
     let runs: Vec<Numbered> = plan.runs.iter().enumerate().map(numbered).collect();
     let once = |planned, what| announced(session, planned, 1, what, &say);
+    announce_refused(plan, &say);
     let reference = reference_run(plan).map(|planned| once(planned, "reference"));
     let Some(reference) = reference.into_iter().collect::<Result<Option<Vec<Ran>>>>()? else {
         return stopped(&say);
@@ -91,7 +92,8 @@ pub fn study(session: &Session, plan: &Plan, with_ablation: bool) -> Result<Exit
     say(&format!("\n{tables}\nfiles      {}", plan.folder.display()));
     let failed = results.runs.iter().chain(&results.reference).filter(|run| run.error.is_some()).count();
     if failed > 0 {
-        say(&format!("{failed} of {} runs failed or could not be compared; see above", plan.runs.len()));
+        let all = plan.runs.len() + plan.refused.len();
+        say(&format!("{failed} of {all} runs failed or could not be compared; see above"));
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
@@ -106,6 +108,7 @@ pub fn study_part(session: &Session, plan: &Plan, part: Part) -> Result<Exit> {
     let all: Vec<_> = once.chain(plan.runs.iter().map(|planned| (planned, repetitions))).collect();
     let mine = all.iter().enumerate().filter(|(index, _)| part.has(*index));
     let count = |index: usize| format!("{}/{}", index + 1, all.len());
+    announce_refused(plan, &say);
     let mine: Vec<Numbered> =
         mine.map(|(index, (planned, repetitions))| (*planned, *repetitions, count(index))).collect();
     let Some(ran) = execute_all(session, plan, &mine, &say)? else { return stopped(&say) };
@@ -118,6 +121,13 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
     match &plan.reference {
         Some(PlannedReference::Run(planned)) => Some(planned),
         _ => None,
+    }
+}
+
+/// Says which runs of the sweep are refused, before the first run starts.
+fn announce_refused(plan: &Plan, say: &dyn Fn(&str)) {
+    for run in &plan.refused {
+        say(&format!("run refused   {}\n{}", run.name, run.error.trim_end()));
     }
 }
 
@@ -164,7 +174,33 @@ fn assembled(
     convergence::add_published(plan, ran, &mut results);
     compare::add_tolerances(session, plan, ran, &mut results)?;
     results.targets = targets::targets(study, &results);
+    results.runs.extend(plan.refused.iter().map(|run| refused(plan, run)));
     Ok(results)
+}
+
+/// The result of a run whose job is refused: that of a failed run, with the scheme, mesh and step of the base job.
+fn refused(plan: &Plan, run: &RefusedRun) -> RunResult {
+    let job = &plan.base.job;
+    RunResult {
+        name: run.name.clone(),
+        scheme: job.time.scheme.name().to_owned(),
+        cells: job.mesh.source.cells(),
+        step: job.time.step,
+        adaptive: job.time.adaptive.as_ref().map(|adaptive| adaptive.tolerance),
+        tolerance: job.solver.tolerance,
+        set: run.set.clone(),
+        sweep: run.swept.clone(),
+        response: vec![None; plan.study.response.len()],
+        status: "failed".into(),
+        error: Some(run.error.clone()),
+        notes: Vec::new(),
+        found: false,
+        counts: Counts::default(),
+        seconds: None,
+        repetitions: Vec::new(),
+        errors: Vec::new(),
+        places: Vec::new(),
+    }
 }
 
 fn result(planned: &Planned, ran: &Ran, take: Take) -> RunResult {

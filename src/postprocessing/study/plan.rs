@@ -42,6 +42,19 @@ pub struct Planned {
     pub loaded: Loaded,
 }
 
+/// A run of the sweep whose job is refused: the study reports it as failed and executes the others.
+#[derive(Debug)]
+pub struct RefusedRun {
+    /// Name of the run.
+    pub name: String,
+    /// Overrides with the values.
+    pub set: Vec<String>,
+    /// A value for each key of the sweep.
+    pub swept: Vec<SweptValue>,
+    /// What is wrong with the job.
+    pub error: String,
+}
+
 /// The solution with which runs are compared.
 #[derive(Debug)]
 pub enum PlannedReference {
@@ -64,6 +77,8 @@ pub struct Plan {
     pub base: Loaded,
     /// The runs, in the order of the study.
     pub runs: Vec<Planned>,
+    /// The runs of the sweep whose jobs are refused.
+    pub refused: Vec<RefusedRun>,
     /// The solution with which they are compared.
     pub reference: Option<PlannedReference>,
     /// The runs with the steps of the reference on the meshes of the other runs, if errors are split.
@@ -93,13 +108,24 @@ impl Plan {
         let mut taken = vec!["reference".to_owned()];
         let mut refusals = Vec::new();
         let mut runs = Vec::new();
+        let mut refused = Vec::new();
         let has_groups = study.timing.ranks.is_some();
         for Member { run, values } in wanted {
             let is_side_by_side = has_groups || !values.is_empty();
             match job.planned(&run, None, &output, &mut taken) {
                 Ok(planned) => runs.push(Planned { swept: values, is_side_by_side, ..planned }),
-                Err(error) => refusals.push(error.to_string()),
+                Err(error) if values.is_empty() => refusals.push(error.to_string()),
+                Err(error) => refused.push(RefusedRun {
+                    name: run.name.unwrap_or_default(),
+                    set: run.set,
+                    swept: values,
+                    error: error.to_string(),
+                }),
             }
+        }
+        if runs.is_empty() {
+            // No value can be used: more likely an error in the study than a limit that the sweep crosses.
+            refusals.extend(refused.iter().map(|run| run.error.clone()));
         }
         let mut split = Vec::new();
         let reference = match &study.reference {
@@ -134,7 +160,7 @@ impl Plan {
             }
             return Err(Error::Refused(refusals.join("\n\n")));
         }
-        let mut plan = Self { study, name, folder: output, base, runs, reference, split };
+        let mut plan = Self { study, name, folder: output, base, runs, refused, reference, split };
         plan.choose_times()?;
         Ok(plan)
     }
@@ -229,11 +255,7 @@ impl Source<'_> {
             Error::Refused(format!("the job of run {} is refused:\n{error}", called(run, fixed_name)))
         })?;
         let job = &mut loaded.job;
-        let cells = match &job.mesh.source {
-            MeshSource::Rectangle(mesh) => mesh.cells.to_vec(),
-            MeshSource::Box(mesh) => mesh.cells.to_vec(),
-            MeshSource::File(_) => Vec::new(),
-        };
+        let cells = job.mesh.source.cells();
         let mut name = match (fixed_name, &run.name) {
             (Some(fixed), _) => fixed.to_owned(),
             (None, Some(given)) => given.clone(),

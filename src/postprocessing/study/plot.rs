@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     error::Result,
+    fem::effect::{ENERGIES, Energy},
     io::output::field_snapshot::Snapshot,
     job::Job,
     postprocessing::drawing::{
@@ -19,7 +20,7 @@ use crate::{
         chart::{Axis, Chart, Look, Series},
         colour::{LINES, VIRIDIS},
         picture::Picture,
-        scale::{extent, number, size},
+        scale::{extent, number, size, unit_by_name},
     },
 };
 
@@ -49,7 +50,7 @@ pub(super) fn all(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
         pictures.extend(over_time(plan, results, at, norm, &unit_of_norm(of, dimension, false))?);
         pictures.extend(on_the_body(plan, results, at, norm, of)?);
     }
-    pictures.extend(responses(plan, results)?);
+    pictures.extend(responses(plan, results, dimension)?);
     Ok(pictures)
 }
 
@@ -141,7 +142,7 @@ fn front(points: &[Point]) -> Vec<Point> {
 
 /// A chart of each response over each key of the sweep whose values are different numbers. Listed values of the other keys make a line
 /// each, if there are not too many; random draws are dots.
-fn responses(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
+fn responses(plan: &Plan, results: &Results, dimension: usize) -> Result<Vec<Picture>> {
     let is_drawn = |key: &String| matches!(plan.study.sweep.get(key), Some(Values::Draws(_)));
     let mut pictures = Vec::new();
     for (position, key) in results.sweep.iter().enumerate() {
@@ -161,7 +162,12 @@ fn responses(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
                     None => curves.push(Curve { name: line, points: vec![[x, y]] }),
                 }
             }
-            pictures.extend(response(results, [key, name], curves, look)?);
+            pictures.extend(response(
+                results,
+                ([key, name], unit_of_response(name, dimension)),
+                curves,
+                look,
+            )?);
         }
     }
     Ok(pictures)
@@ -170,7 +176,7 @@ fn responses(plan: &Plan, results: &Results) -> Result<Vec<Picture>> {
 /// A chart of a response over a key; `None` if there are no two different values of the key.
 fn response(
     results: &Results,
-    [key, name]: [&String; 2],
+    ([key, name], unit): ([&String; 2], &str),
     mut curves: Vec<Curve>,
     look: Look,
 ) -> Result<Option<Picture>> {
@@ -187,8 +193,9 @@ fn response(
     } else {
         look
     };
+    let space = if unit.is_empty() { "" } else { " " };
     let words = format!(
-        "{name} over {key}: from {} to {} for {key} from {} to {}",
+        "{name} over {key}: from {} to {}{space}{unit} for {key} from {} to {}",
         size(values.0),
         size(values.1),
         size(keys.0),
@@ -198,7 +205,7 @@ fn response(
         curve.points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Series::new(place, curve.name, look, curve.points)
     });
-    let [x, y] = [key, name].map(|quantity| Axis { quantity, unit: "" });
+    let [x, y] = [(key, ""), (name, unit)].map(|(quantity, unit)| Axis { quantity, unit });
     let is_wide = keys.0 > 0.0 && keys.1 >= WIDE * keys.0;
     let chart = Chart { logarithmic_x: is_wide, ..Chart::new(x, y, series.collect()) };
     let over = if results.sweep.len() > 1 { format!("-over-{}", short(key)) } else { String::new() };
@@ -208,6 +215,32 @@ fn response(
         format!("{words}."),
         chart.svg()?,
     )))
+}
+
+/// The unit of a response of bodies of this dimension; empty for numbers without one.
+fn unit_of_response(name: &str, dimension: usize) -> &'static str {
+    let of = |units: [&'static str; 2]| units[dimension - 2];
+    let (source, column) = (name.split('.').next(), name.rsplit('.').next().unwrap_or(name));
+    if source == Some("history") {
+        let is_energy = ENERGIES.iter().any(|kind| kind.column == column);
+        return if is_energy { Energy::unit(dimension) } else { unit_by_name(column) };
+    }
+    let known = [
+        ("force_", of(["N/m", "N"])),
+        ("moment_", of(["N", "N m"])),
+        ("_area", of(["m", "m²"])),
+        ("angular_velocity", "rad/s"),
+        ("rotation", "rad"),
+        ("von_mises", "Pa"),
+        ("_seconds", "s"),
+        ("_bytes", "bytes"),
+    ];
+    let unit = known.iter().find(|(word, _)| column.contains(word)).map(|(_, unit)| *unit);
+    match column {
+        "x" | "y" | "z" => "m",
+        "time" | "dt" => "s",
+        _ => unit.unwrap_or_else(|| unit_by_name(column)),
+    }
 }
 
 /// The unit of a quantity whose norm is taken: that of the strain or the strain rate in V.

@@ -29,7 +29,7 @@ pub struct Results {
     pub response: Vec<String>,
     /// Norms, then probes.
     pub norms: Vec<NormResult>,
-    /// The runs, in the order of the study.
+    /// The runs, in the order of the study; those of the sweep whose jobs are refused come last.
     pub runs: Vec<RunResult>,
     /// Changes by looser tolerances of the solver.
     pub tolerances: Vec<ToleranceResult>,

@@ -43,5 +43,5 @@ pub use linear_solver::{FactorPrecision, FrictionIteration, Method, Precondition
 pub use outcome::StepOutcome;
 pub use step_clock::{StepClock, StepTraffic};
 pub use step_error::{Norms, StepError};
-pub use step_length::{Breakpoint, Landing, Landings, TIME_TOLERANCE};
+pub use step_length::{Breakpoint, Landing, Landings, TIME_TOLERANCE, without_rounding};
 pub use stepper::{MatrixOfStep, Stepper, StepperSettings};

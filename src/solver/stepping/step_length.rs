@@ -135,13 +135,14 @@ fn snapped_to_multiple(time: f64, length: f64) -> f64 {
 
 /// The decimal number with 14 digits that equals a time up to the rounding of a product, if there is one: 0.95, not
 /// 0.9500000000000001, is 19 steps of 0.05.
-fn without_rounding(time: f64) -> f64 {
+pub fn without_rounding(time: f64) -> f64 {
     // Powers of ten up to this one are exact.
     let digits = 13 - time.abs().log10().floor().clamp(-100.0, 100.0) as i32;
     if !(0..=22).contains(&digits) {
         return time;
     }
     let scale = 10f64.powi(digits);
+    // The last number before a jump is as near.
     let decimal = (time * scale).round() / scale;
     if (decimal - time).abs() <= 2.0 * f64::EPSILON * time.abs() { decimal } else { time }
 }
