@@ -93,7 +93,7 @@ test64: test64-lib
 	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --test jobs on_two_ranks
 
 test64-lib: deps64
-	PETSC_DIR=$(PETSC64_DIR) cargo test --release --locked --target-dir $(TARGET64) --lib
+	PETSC_DIR=$(PETSC64_DIR) cargo --config profile.release.package.clarke.opt-level=1 test --release --locked --target-dir $(TARGET64) --lib
 
 check64: deps64
 	PETSC_DIR=$(PETSC64_DIR) cargo clippy --locked -- -D warnings

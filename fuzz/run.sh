@@ -5,20 +5,17 @@
 #
 # Needs a C++ compiler for libFuzzer and nothing else: no nightly Rust, no cargo-fuzz. Starts from fuzz/corpus,
 # the jobs and the meshes; what is new goes to fuzz/target/corpus, an input that crashes to fuzz/target/TARGET-crash-...; a crash is
-# repeated by: fuzz/target/.../TARGET FILE.
+# repeated by: target/release/TARGET FILE.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")"
+here=$(dirname "${BASH_SOURCE[0]}")
+# The folder of the solver's build, whose crates serve here, too.
+built=$(realpath -m "${CARGO_TARGET_DIR:-$here/../target}")
+cd "$here"
 seconds=${1:-600}
 targets=("${@:2}")
 [[ ${#targets[@]} -gt 0 ]] || targets=(job mesh checkpoint)
 
-# Coverage for libFuzzer, in everything but build scripts, which --target keeps apart.
-host=$(rustc -vV | sed -n 's/^host: //p')
-flags="--cfg fuzzing -Cpasses=sancov-module -Clink-dead-code"
-for argument in level=4 inline-8bit-counters pc-table trace-compares; do
-    flags+=" -Cllvm-args=-sanitizer-coverage-$argument"
-done
-RUSTFLAGS="$flags" cargo build --release --locked --target "$host"
+RUSTC_WRAPPER="$PWD/instrument.sh" cargo build --release --locked --target-dir "$built"
 
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 for target in "${targets[@]}"; do
@@ -28,7 +25,7 @@ for target in "${targets[@]}"; do
     mkdir -p "target/corpus/$target"
     found=0
     # Memory stays bounded: no input may make a reader take more.
-    "target/$host/release/$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 \
+    "$built/release/$target" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 \
         -print_final_stats=1 -verbosity=0 -artifact_prefix="target/$target-" \
         "target/corpus/$target" "corpus/$target" "${more[@]}" 2>&1 |
         grep -E 'stat::number_of_executed|ERROR|SUMMARY|panicked|Test unit' || found=${PIPESTATUS[0]}

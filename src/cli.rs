@@ -25,7 +25,7 @@ use std::{
     io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 const EXAMPLES: &str = "\
@@ -164,7 +164,8 @@ struct RunArguments {
     /// Override a key of every job: time.step=0.01, contact.0.quadrature=gauss.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Continue from the newest intact checkpoint of the output folder, or from this file.
+    /// Continue from the newest intact checkpoint of the output folder, or from this file. Of several jobs, those whose results
+    /// are complete are passed over.
     #[arg(long, value_name = "FILE.h5", num_args = 0..=1)]
     restart: Option<Option<PathBuf>>,
     /// Print errors only; run.log has the rest.
@@ -454,9 +455,9 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
     if let Some(words) = arguments.jobs.iter().find_map(|job| misspelt_command(job)) {
         return Err(Error::Refused(words));
     }
-    if arguments.jobs.len() > 1 && arguments.restart.is_some() {
-        let words =
-            "--restart continues one job: continue the stage that was stopped, then run the next ones";
+    if arguments.jobs.len() > 1 && matches!(from, Start::From(_)) {
+        let words = "a checkpoint continues one job; --restart without a file continues several jobs with the first one that is \
+                     not complete";
         return Err(Error::Refused(words.into()));
     }
     in_session(|session, clock| {
@@ -464,15 +465,8 @@ fn run_job(arguments: &RunArguments) -> Result<Exit> {
         let load = |job: &PathBuf| Job::load_coloured(job, &arguments.overrides, colour);
         // All jobs are checked before the first one runs.
         let stages = arguments.jobs.iter().map(load).collect::<Result<Vec<Loaded>>>().and_then(stages);
-        let mut clock = Clock { on_terminal: !arguments.quiet, logs_every_step: arguments.verbose, ..clock };
-        for stage in session.agree(stages)? {
-            let exit = run::run(session, stage, &from, clock)?;
-            if exit != Exit::Done {
-                return Ok(exit);
-            }
-            clock = Clock { began: Instant::now(), launched: Duration::ZERO, ..clock };
-        }
-        Ok(Exit::Done)
+        let clock = Clock { on_terminal: !arguments.quiet, logs_every_step: arguments.verbose, ..clock };
+        Ok(run::run_stages(session, session.agree(stages)?, &from, clock)?)
     })
 }
 

@@ -25,6 +25,17 @@ pub(super) fn claim_folder(job: &Job, start: &Start, log: &mut Log) -> Result<()
     if *start == Start::Anew { refuse_unfinished(folder) } else { Ok(()) }
 }
 
+/// Where a stage of several goes on: `None` if its folder holds its complete results. On one rank.
+pub(super) fn continuation(job: &Job) -> Result<Option<Start>> {
+    let folder = job.output_folder();
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_str(&read(SUMMARY)).unwrap_or_default();
+    if summary["status"] == "completed" && read("job.toml") == job.to_toml()? {
+        return Ok(None);
+    }
+    Ok(Some(if list(folder)?.is_empty() { Start::Anew } else { Start::Newest }))
+}
+
 /// Refuses a folder that can't be written or created. On one rank; changes no file.
 pub(super) fn refuse_unwritable(folder: &Path) -> Result<()> {
     let there = folder.ancestors().find(|path| path.symlink_metadata().is_ok()).unwrap_or(folder);

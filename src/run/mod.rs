@@ -36,6 +36,11 @@ use crate::{
     laws::material::Hypothesis,
     parallel::{agreement::Agreed, session::Session},
 };
+use std::{
+    io::Write,
+    time::{Duration, Instant},
+};
+
 /// Calls a function of a submodule on a job's mesh, for its dimension and hypothesis.
 macro_rules! on_the_mesh {
     ($session:ident, $loaded:ident, $module:ident::$function:ident $(, $more:expr)*) => {{
@@ -53,6 +58,44 @@ macro_rules! on_the_mesh {
 /// Runs a job to its end or to a request to stop. Collective.
 pub fn run(session: &Session, loaded: Loaded, start: &Start, clock: Clock) -> Result<Exit, Agreed> {
     on_the_mesh!(session, loaded, time_loop::run, start, clock)
+}
+
+/// Runs stages one after the other, each from the start that the command line asks for. Stages that are continued begin with the first
+/// one whose results are not complete, from its newest checkpoint if it has one; the later ones start anew. Collective.
+pub fn run_stages(
+    session: &Session,
+    stages: Vec<Loaded>,
+    start: &Start,
+    clock: Clock,
+) -> Result<Exit, Agreed> {
+    let mut clock = clock;
+    let are_continued = stages.len() > 1 && *start == Start::Newest;
+    let mut has_begun = !are_continued;
+    for stage in stages {
+        let mut start = start.clone();
+        if !has_begun {
+            let found = session.on_first(|| folder::continuation(&stage.job))?;
+            // The first rank alone reads the folder.
+            let is = |wanted: Option<Start>| session.total(usize::from(found == Some(wanted))) > 0;
+            if is(None) {
+                if session.is_first() && clock.on_terminal {
+                    let folder = stage.job.output_folder().display();
+                    let _ = writeln!(std::io::stdout(), "{folder}: completed before");
+                }
+                continue;
+            }
+            start = if is(Some(Start::Newest)) { Start::Newest } else { Start::Anew };
+            has_begun = true;
+        } else if are_continued {
+            start = Start::Anew;
+        }
+        let exit = run(session, stage, &start, clock)?;
+        if exit != Exit::Done {
+            return Ok(exit);
+        }
+        clock = Clock { began: Instant::now(), launched: Duration::ZERO, ..clock };
+    }
+    Ok(Exit::Done)
 }
 
 /// Sets a job up as a run does and reports on it, without steps and without files. Collective.

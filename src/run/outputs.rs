@@ -18,7 +18,7 @@ use crate::{
     },
     job::{Every, Job},
     parallel::{agreement::Agreed, session::Session},
-    solver::stepping::StepOutcome,
+    solver::stepping::{StepOutcome, without_rounding},
 };
 use std::{
     collections::BTreeMap,
@@ -86,12 +86,15 @@ impl<const D: usize, const S: usize> Outputs<D, S> {
         } else {
             due(&every, state) && !is_there
         };
-        let profiled = time.map(|time| if rewrites { time.next_down() } else { time });
+        let before_rewritten = |time: f64| if rewrites { time.next_down() } else { time };
+        let profiled = time.map(before_rewritten);
+        // The same of the times in the table.
+        let last_row = time.map(|time| before_rewritten(without_rounding(time)));
         let tables = || {
             write_whole(&folder.join("job.toml"), &job.to_toml()?)?;
             resultants.open(&folder, step)?;
             probes.open(&folder, step)?;
-            profiles.open(&folder, profiled)?;
+            profiles.open(&folder, last_row)?;
             History::open(&folder, step)
         };
         let history = session.on_first(tables)?;

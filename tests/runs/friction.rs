@@ -234,3 +234,57 @@ fn a_body_that_starts_inside_or_behind_its_obstacle_is_warned_of_on_any_number_o
         Case::of("conveyor_belt").set("contact.0.obstacle.plane.normal", "[0, -1]").set("time.end", "0.001");
     assert!(wrong.run(2).text("run.log").contains("warning: contact.0: the body lies behind its obstacle"));
 }
+
+/// The force per area in Pa of a spring of `stiffness` in Pa/m that a belt of `velocity` in m/s stretches through rate-and-state friction
+/// with the parameters of the job `rate_and_state_belt` under 1 MPa, at `time`: the equations of the spring and of the state, by the
+/// classical Runge-Kutta method.
+fn spring_on_a_belt(slips: bool, stiffness: f64, velocity: f64, time: f64) -> f64 {
+    let (pressure, reference, direct, evolution, distance, v0) = (1e6, 0.6, 0.01, 0.015, 1e-5, 1e-6);
+    let rates = |[u, state]: [f64; 2]| {
+        let strength = (reference + evolution * (v0 * state / distance).ln()) / direct;
+        let sliding = 2.0 * v0 * (stiffness * u / (pressure * direct)).sinh() * (-strength).exp();
+        let x = sliding * state / distance;
+        let evolves = match slips {
+            true if x > 0.0 => -x * x.ln(),
+            true => 0.0,
+            false => 1.0 - x,
+        };
+        [velocity - sliding, evolves]
+    };
+    let count = 200_000;
+    let h = time / f64::from(count);
+    let mut at = [0.0, distance / v0];
+    for _ in 0..count {
+        let moved = |rate: [f64; 2], share: f64| [0, 1].map(|i| at[i] + share * h * rate[i]);
+        let first = rates(at);
+        let second = rates(moved(first, 0.5));
+        let third = rates(moved(second, 0.5));
+        let fourth = rates(moved(third, 1.0));
+        at = [0, 1].map(|i| at[i] + h / 6.0 * (first[i] + 2.0 * (second[i] + third[i]) + fourth[i]));
+    }
+    stiffness * at[0]
+}
+
+#[test]
+fn a_block_on_a_spring_follows_the_equations_of_rate_and_state_friction() {
+    for (law, slips) in [("ageing", false), ("slip", true)] {
+        // Before the spring carries the friction of steady sliding, at its peak, and while the state evolves.
+        for time in [4.0, 6.4, 8.0] {
+            let exact = 0.2 * spring_on_a_belt(slips, 1e10, 1e-5, time);
+            let errors = [0.04, 0.02].map(|step| {
+                let case = Case::of("rate_and_state_belt")
+                    .set("contact.0.obstacle.plane.point", "['1e-5*t', 0.0]")
+                    .set("contact.0.friction.rate_and_state.law", &format!("'{law}'"))
+                    .set("support", "[{ on = ['top'], stiffness = { tangential = 1e10 } }]")
+                    .set("time.step", &step.to_string())
+                    .set("time.end", &time.to_string());
+                let force =
+                    case.run(2).table("resultants.csv").only("source", "contact bottom").last("force_x");
+                (force - exact) / exact
+            });
+            assert!(errors.iter().all(|error| error.abs() < 0.01), "{law} at {time} s: {errors:?}");
+            let is_halved = (errors[1] / errors[0] - 0.5).abs() < 0.1;
+            assert!(is_halved || errors[0].abs() < 1e-4, "{law} at {time} s: {errors:?}");
+        }
+    }
+}

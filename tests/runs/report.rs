@@ -232,7 +232,7 @@ fn histories_are_drawn_and_what_is_the_same_everywhere_is_named() {
     let page = report(&intact.folder().join("out"));
     assert!(!check_page(&page).iter().any(|name| name == "damage"));
     let html = std::fs::read_to_string(page).expect("page");
-    assert!(html.contains("Not drawn, because the same everywhere: damage (0)."));
+    assert!(html.contains("Not drawn, because constant: damage: 0."));
 }
 
 #[test]
@@ -276,8 +276,22 @@ fn two_runs_stand_side_by_side() {
     assert!(pair[1].contains("von Mises") && pair[0] != pair[1], "{pair:?}");
     assert!(pair.iter().all(|words| words.contains("colours as in the other run")), "{pair:?}");
     assert!(captions.iter().any(|words| words == "The run on the left does not have this picture."));
-    let cells =
-        elements(&document, "tr").into_iter().find(|row| words_of(*row).starts_with("cells")).expect("cells");
+    let row = |word: &str| {
+        elements(&document, "tr").into_iter().find(|row| words_of(*row).starts_with(word)).expect("a row")
+    };
+    // Of a list of numbers, of a key that only one job has, and none of a key that both have.
+    assert!(html.contains("Keys in which the jobs differ"));
+    assert!(
+        words_of(row("mesh.rectangle.cells")).contains("[8"),
+        "{}",
+        words_of(row("mesh.rectangle.cells"))
+    );
+    assert!(
+        words_of(row("mesh.file")).contains("absent") || words_of(row("mesh.rectangle")).contains("absent")
+    );
+    let keys = elements(&document, "tr").into_iter().map(words_of).collect::<Vec<_>>();
+    assert!(!keys.iter().any(|row| row.starts_with("output.folder")), "{keys:?}");
+    let cells = row("cells");
     let numbers: Vec<String> = cells.children().filter(Node::is_element).map(words_of).collect();
     assert_eq!(numbers[..2], ["cells", "128"]);
     assert!(numbers[2].parse::<u64>().is_ok_and(|count| count != 128), "{numbers:?}");

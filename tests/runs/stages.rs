@@ -155,7 +155,35 @@ fn stages_run_one_after_another() {
     assert_eq!(second.results().number("time"), 0.5);
     let both = ["run".to_owned(), one.clone(), one.clone()];
     launch::run(1, &both).expect(2).says("two stages write to");
-    launch::run(1, &["run".into(), one, two, "--restart".into()]).expect(2).says("continues one job");
+    let file = format!("{from}/checkpoint-8.h5");
+    launch::run(1, &["run".into(), one, two, "--restart".into(), file]).expect(2).says("continues one job");
+}
+
+#[test]
+fn stages_that_were_stopped_go_on_with_the_first_one_that_is_not_complete() {
+    let first = first("lagged_euler");
+    let second = second("lagged_euler", &out(&first)).set("checkpoint.every", "4");
+    let [one, two] = [&first, &second].map(|case| case.written().display().to_string());
+    let both = |more: &[&str]| {
+        [&["run", &one, &two][..], more].concat().iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    launch::run(2, &both(&[])).expect(0);
+    let tables = ["probes.csv", "history.csv"];
+    let straight = tables.map(|name| second.results().text(name));
+    // Both are complete: nothing is run.
+    let log = second.results().text("run.log");
+    launch::run(2, &both(&["--restart"])).expect(0).says("out: completed before");
+    assert_eq!(second.results().text("run.log"), log);
+    // The second is stopped half way.
+    launch::run(2, &["run", &two, "--set", "time.end=0.25"]).expect(0);
+    let outcome =
+        launch::run(2, &both(&["--restart"])).expect(0).says("out: completed before").says("continuing from");
+    assert_eq!(outcome.stdout.matches("completed before").count(), 1, "{}", outcome.stdout);
+    assert_eq!(straight, tables.map(|name| second.results().text(name)));
+    // The first is stopped half way: the second starts again from its end.
+    launch::run(2, &["run", &one, "--set", "time.end=0.25", "--force"]).expect(0);
+    launch::run(2, &both(&["--restart"])).expect(0).says("removed");
+    assert_eq!(straight, tables.map(|name| second.results().text(name)));
 }
 
 #[test]

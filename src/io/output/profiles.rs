@@ -13,7 +13,6 @@ use crate::{
     linear_algebra::tensor::{Mandel, add_scaled, apply, dot, norm},
     mesh::shape::facet_normal,
     parallel::{agreement::Agreed, exchange::exchange, session::Session},
-    solver::stepping::without_rounding,
 };
 use std::{collections::HashMap, path::Path};
 
@@ -88,7 +87,7 @@ impl<const D: usize> Profiles<D> {
         let header = format!(
             "time,profile,{axes},normal_displacement,normal_velocity,contact_pressure{gap}{friction}{tangential}"
         );
-        self.file = Some(CsvFile::open(&path, &header, goes_on_after.map(without_rounding))?);
+        self.file = Some(CsvFile::open(&path, &header, goes_on_after)?);
         Ok(())
     }
 

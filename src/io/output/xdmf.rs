@@ -1,10 +1,7 @@
 //! The XDMF file, which describes the numbers in the field file for other readers.
 
 use super::field::{FieldKind, Place, Shape, data_group, file_width};
-use crate::{
-    error::{Error, Result},
-    solver::stepping::without_rounding,
-};
+use crate::error::{Error, Result};
 use std::fmt::Write;
 use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write as _};
@@ -75,7 +72,6 @@ fn grid(mesh: Mesh, kinds: &[FieldKind], step: usize, time: f64) -> String {
         6 => "Tri_6",
         _ => "Tet_10",
     };
-    let time = without_rounding(time);
     let mut text = format!(
         "<Grid Name=\"step {step}\" GridType=\"Uniform\">\n<Time Value=\"{time:?}\"/>\n\
          <Topology TopologyType=\"{topology}\" NumberOfElements=\"{cells}\">{}</Topology>\n\

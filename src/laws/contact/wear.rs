@@ -15,7 +15,7 @@ use crate::laws::law::LawFault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Wear of the body's surface.
+/// Wear of the body's surface. With every time scheme, the depth of wear has an error of first order in the step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wear {

@@ -225,8 +225,8 @@ impl<'a> Body<'a> {
         let range = common.map(|(range, _)| range).or_else(|| quantity.range());
         let (low, high) = range.unwrap_or_default();
         if range.is_some() && is_uniform(low, high) {
-            let words = format!("{words} ({} {unit}", number(low));
-            return Ok(Drawn::Uniform(format!("{})", words.trim_end())));
+            let words = format!("{words}: {} {unit}", number(low));
+            return Ok(Drawn::Uniform(words.trim_end().to_owned()));
         }
         let look = Coloured { name, quantity: words, unit, shades: VIRIDIS };
         let common = common.map(|(_, words)| words);
@@ -498,8 +498,8 @@ fn size(snapshot: &Snapshot) -> f64 {
 /// The range of the values and that of their colours, in words.
 fn words_of(shown: &Values, unit: &str) -> (String, String) {
     let (low, high) = extent(shown.values.iter().copied()).unwrap_or((0.0, 0.0));
-    let range = |low: f64, high: f64| format!("from {} to {} {unit}", number(low), number(high));
-    let mut figures = range(low, high).trim_end().to_owned();
+    let range = |low: f64, high: f64| shown.scale.range([low, high], unit);
+    let mut figures = range(low, high);
     if shown.regions.is_some() {
         figures += " in the cells";
     }
@@ -512,7 +512,7 @@ fn words_of(shown: &Values, unit: &str) -> (String, String) {
     if let Some(common) = shown.common {
         colours += &format!("; colours as in {common}");
     } else if shown.is_clipped {
-        colours += &format!("; colours {}, the 1st to the 99th percentile", ends.trim_end());
+        colours += &format!("; colours {ends}, the 1st to the 99th percentile");
     }
     (figures, colours)
 }
@@ -655,7 +655,7 @@ mod tests {
         snapshot.fields.insert("von_mises", vec![3.0; 2]);
         snapshot.fields.insert("velocity", vec![0.0; 12]);
         let body = Body::new(&snapshot);
-        for (field, expected) in [(&VON_MISES, "von Mises stress (3 Pa)"), (&VELOCITY, "speed (0 m/s)")] {
+        for (field, expected) in [(&VON_MISES, "von Mises stress: 3 Pa"), (&VELOCITY, "speed: 0 m/s")] {
             match body.of_field(field).expect("drawn") {
                 Some(Drawn::Uniform(words)) => assert_eq!(words, expected),
                 other => panic!("{other:?}"),

@@ -57,6 +57,28 @@ impl Scale {
         shown.is_finite().then_some(shown)
     }
 
+    /// A range of values in words, with the power of ten of this scale, if it has one.
+    pub(super) fn range(&self, ends: [f64; 2], unit: &str) -> String {
+        let [low, high] = ends.map(|end| end * self.factor);
+        let words = match &self.power {
+            None => format!("from {} to {} {unit}", number(low), number(high)),
+            Some(power) => {
+                let largest = low.abs().max(high.abs()).max(1e-300);
+                let decimals = 3.0 - largest.log10().floor();
+                let [low, high] = [low, high].map(|end| {
+                    // A small end keeps a digit, so that only zero is shown as zero.
+                    let first = -end.abs().max(1e-12).log10().floor();
+                    let decimals = if end == 0.0 { decimals } else { decimals.max(first) };
+                    let decimals = decimals.clamp(0.0, 12.0) as usize;
+                    let digits = format!("{end:.decimals$}");
+                    with_minus_sign(without_trailing_zeros(&digits).to_owned())
+                });
+                format!("from {low} to {high} × {power} {unit}")
+            }
+        };
+        words.trim_end().to_owned()
+    }
+
     /// The label of a quantity with its unit in this scale.
     pub(super) fn words(&self, quantity: &str, unit: &str) -> String {
         match (&self.power, unit) {
@@ -166,6 +188,16 @@ fn with_minus_sign(digits: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn captions_have_the_power_of_ten_of_the_bar() {
+        let range = |low: f64, high: f64, unit: &str| {
+            Scale::linear([low, high].into_iter(), false).range([low, high], unit)
+        };
+        assert_eq!(range(4554.7, 5.5678e7, "Pa"), "from 0.005 to 55.68 × 10⁶ Pa");
+        assert_eq!(range(-0.25, 0.5, "m"), "from −0.25 to 0.5 m");
+        assert_eq!(range(-3e-6, 1.25e-6, ""), "from −3 to 1.25 × 10⁻⁶");
+    }
 
     fn words(scale: &Scale) -> Vec<&str> {
         scale.ticks.iter().map(|(_, word)| word.as_str()).collect()

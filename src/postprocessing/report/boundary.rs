@@ -6,6 +6,7 @@ use super::{
     chart::{Axis, Band, Chart, Look, Series},
     colour::{CIVIDIS, LINES, lightened},
     friction::{self, Rubbing},
+    history::Pictures,
     law::Law,
     markup::table,
     picture::Picture,
@@ -159,25 +160,30 @@ impl<'a> Boundary<'a> {
         self.points.iter().map(|p| nodes.get(&bits(p)).copied()).collect()
     }
 
-    /// All pictures: quantities along the boundary (on its surface in 3D), and its nodes on the graph of the law.
-    pub(super) fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Vec<Picture>> {
-        let mut out = Vec::new();
-        let columns: Vec<&String> = self.table.header().iter().filter(|name| is_quantity(name)).collect();
-        for column in ["normal_velocity", "contact_pressure", "normal_displacement"] {
-            if columns.iter().any(|name| *name == column) {
-                out.extend(self.quantity(column, snapshot)?);
-            }
-        }
+    /// Quantities along the boundary, on its surface in 3D.
+    pub(super) fn pictures(&self, snapshot: Option<&Snapshot>) -> Result<Pictures> {
+        let columns: Vec<&str> =
+            self.table.header().iter().filter(|name| is_quantity(name)).map(String::as_str).collect();
         let first = ["normal_velocity", "contact_pressure", "normal_displacement"];
-        for column in columns.into_iter().filter(|name| !first.contains(&name.as_str())) {
-            out.extend(self.quantity(column, snapshot)?);
-        }
-        for (name, values) in self.fields_of_nodes() {
-            if let Some(mut picture) = self.drawn(name, &values, snapshot)? {
-                if name == CONTACT_STATUS.name {
-                    picture.caption += " 1: open, 2: touching, without friction, 3: sticking, 4: sliding.";
+        let rest = columns.iter().copied().filter(|name| !first.contains(name));
+        let columns = first.into_iter().filter(|name| columns.contains(name)).chain(rest);
+        let of_profile = columns.map(|name| (name, self.table.column(name).unwrap_or_default()));
+        let mut out = Pictures::default();
+        for (name, values) in of_profile.chain(self.fields_of_nodes()) {
+            let (quantity, unit) = (name.replace('_', " "), unit_by_name(name));
+            match extent(values.iter().copied()) {
+                Some((low, high)) if number(low) == number(high) => {
+                    out.constant.push(format!("{quantity}: {} {unit}", number(low)).trim_end().to_owned());
                 }
-                out.push(picture);
+                Some(range) => {
+                    let mut picture = self.drawn((name, &quantity, unit), &values, range, snapshot)?;
+                    if let (Some(picture), true) = (&mut picture, name == CONTACT_STATUS.name) {
+                        picture.caption +=
+                            " 1: open, 2: touching, without friction, 3: sticking, 4: sliding.";
+                    }
+                    out.pictures.extend(picture);
+                }
+                None => {}
             }
         }
         Ok(out)
@@ -231,34 +237,28 @@ impl<'a> Boundary<'a> {
         table(&words, &header, &rows.collect::<Vec<_>>())
     }
 
-    fn quantity(&self, column: &str, snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
-        self.drawn(column, &self.table.column(column).unwrap_or_default(), snapshot)
-    }
-
-    /// Values at the nodes along the boundary; no picture of what is zero everywhere. Nodes without a contact have no
-    /// gap, and it is infinite where the normal meets no obstacle: such nodes are left out.
-    fn drawn(&self, column: &str, values: &[f64], snapshot: Option<&Snapshot>) -> Result<Option<Picture>> {
-        if values.iter().all(|value| *value == 0.0 || !value.is_finite()) {
-            return Ok(None);
-        }
-        let (quantity, unit) = (column.replace('_', " "), unit_by_name(column));
+    /// Values at the nodes along the boundary. Nodes without a contact have no gap, and it is infinite where the normal meets no
+    /// obstacle: such nodes are left out.
+    fn drawn(
+        &self,
+        (column, quantity, unit): (&str, &str, &str),
+        values: &[f64],
+        (low, high): (f64, f64),
+        snapshot: Option<&Snapshot>,
+    ) -> Result<Option<Picture>> {
         let name = format!("{}_{column}", self.name);
         if self.dimension == 3 {
-            return self.map(&name, &quantity, unit, values, snapshot);
+            return self.map(&name, quantity, unit, values, snapshot);
         }
         let points = self.arc.iter().zip(values).filter(|(_, value)| value.is_finite());
         let points: Vec<[f64; 2]> = points.map(|(s, v)| [*s, *v]).collect();
-        if points.is_empty() {
-            return Ok(None);
-        }
         let place =
             ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
         let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
         let series = Series::new(place, "", look, points);
         let x = Axis { quantity: "arc length", unit: "m" };
-        let mut chart = Chart::new(x, Axis { quantity: &quantity, unit }, vec![series]);
+        let mut chart = Chart::new(x, Axis { quantity, unit }, vec![series]);
         chart.bands = self.bands();
-        let (low, high) = extent(values.iter().copied()).unwrap_or((0.0, 0.0));
         let figures = format!("from {} to {} {unit}", number(low), number(high));
         let bands = if chart.bands.is_empty() { "" } else { " Backgrounds: branches of the contact law." };
         Ok(Some(Picture::new(
@@ -266,7 +266,7 @@ impl<'a> Boundary<'a> {
             format!("Chart of the {quantity} along {} at {} s, {figures}", self.name, number(self.time)),
             format!(
                 "{} along {} at t = {} s, {figures}, over the arc length of the undeformed boundary{}.{bands}",
-                capital(&quantity),
+                capital(quantity),
                 self.name,
                 number(self.time),
                 self.start()
@@ -310,7 +310,7 @@ impl<'a> Boundary<'a> {
         let look = Coloured { name, quantity, unit, shades: CIVIDIS };
         let axes = ["x", "y", "z"];
         let body = Body::new(&flat).with_axes([axes[first], axes[second]]);
-        let (low, high) = extent(values.iter().copied()).unwrap_or((0.0, 0.0));
+        let (low, high) = extent(values.iter().copied()).unwrap_or_default();
         let figures = format!("from {} to {} {unit}", number(low), number(high));
         let mut picture = body.nodal(look, values)?;
         picture.alt = format!("Map of the {quantity} on {} at {} s, {figures}", self.name, number(self.time));

@@ -19,10 +19,10 @@ const MOST_PROBES: usize = 7;
 const ROUNDING: f64 = 1e-9;
 
 /// Each quantity of the probes over time, with a line for each probe.
-pub(super) fn probes(table: &Table) -> Result<OverTime> {
+pub(super) fn probes(table: &Table) -> Result<Pictures> {
     let names = table.names();
     let tables: Vec<Table> = names.iter().take(MOST_PROBES).map(|name| table.of(name)).collect();
-    let mut out = OverTime::default();
+    let mut out = Pictures::default();
     for column in table.header().iter().filter(|name| !["step", "time", "probe"].contains(&name.as_str())) {
         let curves: Vec<Vec<[f64; 2]>> = tables.iter().map(|table| table.curve("time", column)).collect();
         let (vector, axis) = column.rsplit_once('_').unwrap_or((column, ""));
@@ -59,10 +59,10 @@ pub(super) fn probes(table: &Table) -> Result<OverTime> {
     Ok(out)
 }
 
-/// Charts over time, and quantities that are constant: these are named with their value instead of drawn.
+/// Pictures, and quantities that are constant: these are named with their value instead of drawn.
 #[derive(Debug, Default)]
-pub(super) struct OverTime {
-    /// The charts.
+pub(super) struct Pictures {
+    /// The pictures.
     pub pictures: Vec<Picture>,
     /// Such as `touching area of contact bottom: 0.2 m`.
     pub constant: Vec<String>,
@@ -82,7 +82,7 @@ struct Columns<'a> {
 }
 
 /// The components of the force of each source; of each contact the area by state, the pressure and the motion of its obstacle.
-pub(super) fn resultants(table: &Table, dimension: usize) -> Result<OverTime> {
+pub(super) fn resultants(table: &Table, dimension: usize) -> Result<Pictures> {
     let of = |unit: [&'static str; 2]| unit[dimension - 2];
     let axes = ["x", "y", "z"];
     let forces: Vec<String> = axes[..dimension].iter().map(|axis| format!("force_{axis}")).collect();
@@ -90,7 +90,7 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<OverTime> {
     let areas = ["touching_area", "open_area", "sticking_area", "slipping_area"];
     let columns = forces.iter().filter_map(|force| table.column(force));
     let largest = columns.flatten().fold(0.0, |most, force| f64::max(most, force.abs()));
-    let mut out = OverTime::default();
+    let mut out = Pictures::default();
     for (number, source) in table.names().iter().enumerate() {
         let rows = table.of(source);
         let (what, quantity) = match source.as_str() {
@@ -126,12 +126,12 @@ pub(super) fn resultants(table: &Table, dimension: usize) -> Result<OverTime> {
 }
 
 /// Energies, dissipations with work, and the error of their balance. `unit` is the unit of energies.
-pub(super) fn energies(table: &Table, unit: &str) -> Result<OverTime> {
+pub(super) fn energies(table: &Table, unit: &str) -> Result<Pictures> {
     let columns = |roles: &[Role]| -> Vec<&str> {
         ENERGIES.iter().filter(|kind| roles.contains(&kind.role)).map(|kind| kind.column).collect()
     };
     let spent = [columns(&[Role::Work]), columns(&[Role::Dissipated, Role::Numerical])].concat();
-    let mut out = OverTime::default();
+    let mut out = Pictures::default();
     for (name, what, columns) in [
         ("energies", "energy", columns(&[Role::Stored])),
         ("dissipation", "work and dissipation since t = 0", spent),
@@ -164,7 +164,7 @@ fn is_constant((low, high): (f64, f64)) -> bool {
 
 /// Adds a chart of several columns over time, and names the columns that are constant: in the caption of the chart, or in the list if
 /// all of them are.
-fn draw(table: &Table, columns: &Columns<'_>, out: &mut OverTime) -> Result<()> {
+fn draw(table: &Table, columns: &Columns<'_>, out: &mut Pictures) -> Result<()> {
     let Columns { name, what, source, quantity, unit, columns } = *columns;
     let mut series = Vec::new();
     let (mut ends, mut constant) = (Vec::new(), Vec::new());
@@ -277,7 +277,7 @@ mod tests {
         let path = folder.path().join("resultants.csv");
         std::fs::write(&path, text).expect("written");
         let table = Table::read(&path, "source").expect("table");
-        let OverTime { pictures, constant } = resultants(&table, 2).expect("drawn");
+        let Pictures { pictures, constant } = resultants(&table, 2).expect("drawn");
         let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(names, ["force_0", "pressure_0", "obstacle_displacement_0"]);
         assert_eq!(

@@ -5,7 +5,7 @@ use super::{
     body::{self, Body, Drawn},
     boundary::{Boundary, Laws},
     facts,
-    history::{self, OverTime},
+    history::{self, Pictures},
     law::Law,
     markup::{escape, paragraph},
     motion,
@@ -17,7 +17,7 @@ use crate::{
     fem::effect::Energy,
     io::output::{
         field_list::{FIELDS, VON_MISES},
-        field_snapshot::Snapshot,
+        field_snapshot::{History, Snapshot},
         fields::Place,
     },
     job::Contact,
@@ -138,7 +138,10 @@ fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Secti
     for field in &FIELDS {
         drawn.extend(body.of_field(field)?);
     }
-    for history in snapshot.histories.iter().filter(|history| history.place == Place::Cell) {
+    // Histories of contact nodes are drawn along their boundaries, if there are profiles.
+    let has_profiles = found.profiles.as_ref().is_some_and(|profiles| !profiles.is_empty());
+    let is_of_body = |history: &&History| history.place == Place::Cell || !has_profiles;
+    for history in snapshot.histories.iter().filter(is_of_body) {
         drawn.push(body.of_history(history)?);
     }
     for direction in contact_directions(found, snapshot) {
@@ -159,9 +162,7 @@ fn body_section(found: &Found, body: &Body, snapshot: &Snapshot) -> Result<Secti
     if pictures.is_empty() && uniform.is_empty() {
         words += &paragraph("fields.vtkhdf contains a mesh, but no fields yet.");
     }
-    if !uniform.is_empty() {
-        words += &paragraph(&format!("Not drawn, because the same everywhere: {}.", uniform.join(", ")));
-    }
+    words += &not_drawn(&uniform);
     if body.lacks_regions() {
         words += &paragraph(
             "Each cell has one colour: [output] also = [\"region\"] in the job would tell the regions apart, within which \
@@ -208,7 +209,7 @@ fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>
             let whole = new();
             // The backgrounds of curves show the branches of one law.
             let boundary = if let [part] = &parts[..] { part } else { &whole };
-            let mut pictures = boundary.pictures(snapshot)?;
+            let Pictures { mut pictures, constant } = boundary.pictures(snapshot)?;
             for (at, part) in parts.iter().enumerate() {
                 let named = |picture: Picture| match at {
                     0 => picture,
@@ -223,8 +224,8 @@ fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>
                 pictures.extend(boundary.arrows(body)?);
             }
             let heading = format!("{} {name}", if here.is_empty() { "Boundary" } else { "Contact boundary" });
-            let tables = parts.iter().map(Boundary::branch_table).collect();
-            sections.push((heading, tables, pictures));
+            let tables: String = parts.iter().map(Boundary::branch_table).collect();
+            sections.push((heading, not_drawn(&constant) + &tables, pictures));
         }
     }
     let mut unseen: Vec<&String> =
@@ -245,11 +246,17 @@ fn boundary_sections(sections: &mut Sections, found: &Found, body: Option<&Body>
     Ok(())
 }
 
+/// The quantities that have no picture because they are constant.
+fn not_drawn(constant: &[String]) -> String {
+    if constant.is_empty() {
+        return String::new();
+    }
+    paragraph(&format!("Not drawn, because constant: {}.", constant.join(", ")))
+}
+
 fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
-    let mut add = |heading: &str, mut words: String, OverTime { pictures, constant }: OverTime| {
-        if !constant.is_empty() {
-            words += &paragraph(&format!("Not drawn, because constant: {}.", constant.join(", ")));
-        }
+    let mut add = |heading: &str, mut words: String, Pictures { pictures, constant }: Pictures| {
+        words += &not_drawn(&constant);
         sections.push((heading.into(), words, pictures));
     };
     if let Some(probes) = found.probes.as_ref().filter(|probes| !probes.is_empty()) {
@@ -262,7 +269,7 @@ fn time_sections(sections: &mut Sections, found: &Found) -> Result<()> {
     }
     let Some(history) = found.history.as_ref() else { return Ok(()) };
     if history.is_empty() {
-        add("Energy", paragraph("history.csv contains no steps yet."), OverTime::default());
+        add("Energy", paragraph("history.csv contains no steps yet."), Pictures::default());
         return Ok(());
     }
     add("Energy", String::new(), history::energies(history, Energy::unit(dimension))?);

@@ -30,7 +30,7 @@ pub enum Decay {
 }
 
 /// Friction whose coefficient decreases from static to dynamic with the accumulated slip distance of a point. Field files and
-/// checkpoints contain the slip as `slip`.
+/// checkpoints contain the slip as `slip`, which with every time scheme has an error of first order in the step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceWeakening {

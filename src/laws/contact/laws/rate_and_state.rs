@@ -41,7 +41,8 @@ pub enum Evolution {
 }
 
 /// Rate-and-state friction: a coefficient that depends on the sliding velocity and on a state, which tends to `distance` over the sliding
-/// velocity. Field files and checkpoints contain the state as `friction_state`, in s.
+/// velocity. Field files and checkpoints contain the state as `friction_state`, in s; with every time scheme it has an error of first
+/// order in the step. Points whose creep is too slow to matter count as sticking.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RateAndState {
