@@ -66,6 +66,12 @@ pub fn paragraph(words: &str) -> String {
     format!("<p>{}</p>\n", escape(words))
 }
 
+/// With an initial capital letter.
+pub fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

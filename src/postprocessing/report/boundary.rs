@@ -6,9 +6,9 @@ use super::{
     chart::{Axis, Band, Chart, Look, Series},
     colour::{CIVIDIS, LINES, lightened},
     friction::{self, Rubbing},
-    history::Pictures,
     law::Law,
-    markup::table,
+    markup::{capital, table},
+    page::Pictures,
     picture::Picture,
     scale::{extent, number, unit_by_name},
     table::Table,
@@ -485,12 +485,6 @@ impl<'a> Boundary<'a> {
 
 fn is_quantity(column: &str) -> bool {
     !["time", "profile", "x", "y", "z"].contains(&column)
-}
-
-/// With an initial capital letter.
-pub(super) fn capital(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Pictures of quantities over time: probes, energies, steps.
 
 use super::{
-    boundary::capital,
     chart::{Axis, Chart, Look, Series},
+    markup::capital,
+    page::Pictures,
     picture::Picture,
     scale::{extent, number, unit_by_name},
     table::Table,
@@ -57,15 +58,6 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
         ));
     }
     Ok(out)
-}
-
-/// Pictures, and quantities that are constant: these are named with their value instead of drawn.
-#[derive(Debug, Default)]
-pub(super) struct Pictures {
-    /// The pictures.
-    pub pictures: Vec<Picture>,
-    /// Such as `touching area of contact bottom: 0.2 m`.
-    pub constant: Vec<String>,
 }
 
 /// Columns of a table that share a chart.

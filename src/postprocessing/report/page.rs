@@ -8,6 +8,15 @@ use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");
 
+/// Pictures for a section, and quantities that are constant: these are named with their value instead of drawn.
+#[derive(Debug, Default)]
+pub(super) struct Pictures {
+    /// The pictures.
+    pub pictures: Vec<Picture>,
+    /// Such as `touching area of contact bottom: 0.2 m`.
+    pub constant: Vec<String>,
+}
+
 /// A page under construction.
 #[derive(Debug, Default)]
 pub(super) struct Page {

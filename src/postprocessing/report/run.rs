@@ -4,12 +4,11 @@ use super::{
     artifacts::{Found, Gap},
     body::{self, Body, Drawn},
     boundary::{Boundary, Laws},
-    facts,
-    history::{self, Pictures},
+    facts, history,
     law::Law,
     markup::{escape, paragraph},
     motion,
-    page::Page,
+    page::{Page, Pictures},
     picture::Picture,
 };
 use crate::{

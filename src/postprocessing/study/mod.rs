@@ -124,10 +124,11 @@ fn reference_run(plan: &Plan) -> Option<&Planned> {
     }
 }
 
-/// Says which runs of the sweep are refused, before the first run starts.
+/// Says which runs of the sweep are refused, each with its first fault, before the first run starts.
 fn announce_refused(plan: &Plan, say: &dyn Fn(&str)) {
     for run in &plan.refused {
-        say(&format!("run refused   {}\n{}", run.name, run.error.trim_end()));
+        let fault = run.error.lines().next().unwrap_or_default();
+        say(&format!("run refused   {:<40} {fault}", run.name));
     }
 }
 

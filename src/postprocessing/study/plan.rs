@@ -114,7 +114,7 @@ impl Plan {
             let is_side_by_side = has_groups || !values.is_empty();
             match job.planned(&run, None, &output, &mut taken) {
                 Ok(planned) => runs.push(Planned { swept: values, is_side_by_side, ..planned }),
-                Err(error) if values.is_empty() => refusals.push(error.to_string()),
+                Err(error) if values.is_empty() => refusals.push(refusal(&run, None, &error)),
                 Err(error) => refused.push(RefusedRun {
                     name: run.name.unwrap_or_default(),
                     set: run.set,
@@ -125,7 +125,8 @@ impl Plan {
         }
         if runs.is_empty() {
             // No value can be used: more likely an error in the study than a limit that the sweep crosses.
-            refusals.extend(refused.iter().map(|run| run.error.clone()));
+            let words = |run: &RefusedRun| format!("the job of run {} is refused:\n{}", run.name, run.error);
+            refusals.extend(refused.iter().map(words));
         }
         let mut split = Vec::new();
         let reference = match &study.reference {
@@ -139,7 +140,7 @@ impl Plan {
                     Some(PlannedReference::Run(Box::new(planned)))
                 }
                 Err(error) => {
-                    refusals.push(error.to_string());
+                    refusals.push(refusal(run, Some("reference"), &error));
                     None
                 }
             },
@@ -251,9 +252,7 @@ impl Source<'_> {
         overrides.extend(run.scheme.map(|scheme| format!("time.scheme={}", scheme.name())));
         overrides.extend(run.tolerance.map(|tolerance| format!("solver.tolerance={tolerance:?}")));
         overrides.extend(run.set.iter().cloned());
-        let mut loaded = Job::load(&self.file, &overrides).map_err(|error| {
-            Error::Refused(format!("the job of run {} is refused:\n{error}", called(run, fixed_name)))
-        })?;
+        let mut loaded = Job::load(&self.file, &overrides)?;
         let job = &mut loaded.job;
         let cells = job.mesh.source.cells();
         let mut name = match (fixed_name, &run.name) {
@@ -316,7 +315,8 @@ impl Source<'_> {
             }
             let name = format!("reference-{}", cells_name(cells));
             let run = Run { cells: Some(cells.clone()), ..reference.clone() };
-            found.push(self.planned(&run, Some(&name), output, &mut Vec::new())?);
+            let planned = self.planned(&run, Some(&name), output, &mut Vec::new());
+            found.push(planned.map_err(|error| Error::Refused(refusal(&run, Some(&name), &error)))?);
         }
         Ok(found)
     }
@@ -333,6 +333,10 @@ pub(super) fn remove_unused_output(job: &mut Job, folder: &Path) {
     job.output.profiles = None;
     job.checkpoint = None;
     job.check.clear();
+}
+
+fn refusal(run: &Run, fixed_name: Option<&str>, error: &Error) -> String {
+    format!("the job of run {} is refused:\n{error}", called(run, fixed_name))
 }
 
 fn called(run: &Run, fixed_name: Option<&str>) -> String {
