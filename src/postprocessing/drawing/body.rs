@@ -5,8 +5,9 @@ use super::{
     common::{Common, is_uniform},
     frame::{Frame, colour_bar},
     paint::{Style, Triangle, paint},
-    picture::{Picture, open_svg, text},
+    picture::Picture,
     scale::{Scale, extent, number, percentiles, unit_by_name},
+    svg::{open_svg, text},
     view::{Face, View, cross, dot, faces, minus, outline},
 };
 use crate::{

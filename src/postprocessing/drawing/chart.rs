@@ -3,8 +3,8 @@
 
 use super::{
     colour::{Colour, INK, LINES},
-    picture::{LETTERS, WIDTH, text_width},
     scale::{Scale, extent},
+    svg::{LETTERS, WIDTH, text_width},
 };
 use crate::error::{Error, Result};
 use plotters::coord::{
@@ -58,12 +58,24 @@ impl Series {
 }
 
 /// A quantity along an axis.
-#[derive(Debug, Clone, Copy)]
-pub struct Axis<'a> {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Axis {
     /// Description.
-    pub quantity: &'a str,
+    pub quantity: String,
     /// Its unit, empty for dimensionless numbers.
-    pub unit: &'a str,
+    pub unit: String,
+}
+
+impl Axis {
+    /// The axis of a quantity with its unit.
+    pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { quantity: quantity.into(), unit: unit.into() }
+    }
+
+    /// The axis of time.
+    pub fn time() -> Self {
+        Self::new("t", "s")
+    }
 }
 
 /// A part of the horizontal axis with a background.
@@ -79,17 +91,19 @@ pub struct Band {
 
 /// A chart.
 #[derive(Debug, Clone)]
-pub struct Chart<'a> {
+pub struct Chart {
     /// Horizontal axis.
-    pub x: Axis<'a>,
+    pub x: Axis,
     /// Vertical axis.
-    pub y: Axis<'a>,
+    pub y: Axis,
     /// Whether y is logarithmic.
     pub logarithmic: bool,
     /// Whether x is logarithmic.
     pub logarithmic_x: bool,
     /// Whether the vertical axis starts at zero.
     pub from_zero: bool,
+    /// Points that the axes also reach, although they are not drawn: those of a chart beside this one.
+    pub reach: Vec<[f64; 2]>,
     /// The series.
     pub series: Vec<Series>,
     /// Bands in the background.
@@ -136,20 +150,31 @@ impl ValueFormatter<f64> for Marked {
     }
 }
 
-impl<'a> Chart<'a> {
+impl Chart {
     /// A chart of these series with linear axes.
-    pub fn new(x: Axis<'a>, y: Axis<'a>, series: Vec<Series>) -> Self {
+    pub fn new(x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Self {
             x,
             y,
             logarithmic: false,
             logarithmic_x: false,
             from_zero: false,
+            reach: vec![],
             series,
             bands: vec![],
             levels: vec![],
             orders: &[],
         }
+    }
+
+    /// With axes that also reach the series of another chart of the same quantities.
+    pub fn beside(&self, other: &Self) -> Self {
+        let mut chart = self.clone();
+        let kind = |chart: &Self| (chart.logarithmic, chart.logarithmic_x);
+        if (&self.x, &self.y, kind(self)) == (&other.x, &other.y, kind(other)) {
+            chart.reach.extend(other.series.iter().flat_map(|series| &series.points));
+        }
+        chart
     }
 
     /// The drawing as an `svg` element.
@@ -167,8 +192,8 @@ impl<'a> Chart<'a> {
     }
 
     fn scales(&self) -> (Scale, Scale) {
-        let coordinate =
-            |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
+        let points = || self.series.iter().flat_map(|series| &series.points).chain(&self.reach);
+        let coordinate = |axis: usize| points().map(move |point| point[axis]);
         let levels = self.levels.iter().map(|level| level.0);
         let (low, high) = extent(coordinate(1)).unwrap_or((0.0, 0.0));
         // For almost constant values the axis includes zero, so that their variation is not magnified.
@@ -202,7 +227,7 @@ impl<'a> Chart<'a> {
             .bold_line_style(rgb([0xd9; 3]).stroke_width(FINE as u32))
             .axis_style(rgb([0x55; 3]).stroke_width(FINE as u32))
             .label_style(letters())
-            .x_desc(x.words(self.x.quantity, self.x.unit))
+            .x_desc(x.words(&self.x.quantity, &self.x.unit))
             .set_all_tick_mark_size(5 * FINE)
             .axis_desc_style(letters())
             .draw()
@@ -219,7 +244,8 @@ impl<'a> Chart<'a> {
     fn draw_legend(&self, area: &Area<Shift>, y: &Scale) -> std::result::Result<i32, String> {
         let row = 1.4 * LETTERS;
         let mut line = 4.0;
-        area.draw_text(&y.words(self.y.quantity, self.y.unit), &letters(), fine(6.0, line)).map_err(words)?;
+        area.draw_text(&y.words(&self.y.quantity, &self.y.unit), &letters(), fine(6.0, line))
+            .map_err(words)?;
         line += row;
         let named: Vec<&Series> = self.series.iter().filter(|series| !series.label.is_empty()).collect();
         let mut across = 8.0;

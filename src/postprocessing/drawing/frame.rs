@@ -2,8 +2,9 @@
 
 use super::{
     colour::{Shades, hex},
-    picture::{LETTERS, WIDTH, plain_name, text},
+    picture::plain_name,
     scale::Scale,
+    svg::{LETTERS, WIDTH, text},
 };
 use std::fmt::Write;
 

@@ -13,4 +13,5 @@ pub mod markup;
 mod paint;
 pub mod picture;
 pub mod scale;
+pub mod svg;
 pub mod view;

@@ -2,7 +2,7 @@
 
 use super::{
     colour::{Colour, dimmed},
-    picture::WIDTH,
+    svg::WIDTH,
 };
 use crate::error::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -195,7 +195,7 @@ impl Lines {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::postprocessing::drawing::picture::{Picture, open_svg};
+    use crate::postprocessing::drawing::{picture::Picture, svg::open_svg};
 
     const GREY: fn(f64) -> Colour = |share| [(255.0 * share).round() as u8; 3];
 

@@ -1,14 +1,10 @@
 //! A picture as SVG and as PNG.
 
-use super::markup::escape;
+use super::{chart::Chart, markup::escape};
 use crate::error::{Error, Result};
 use resvg::{tiny_skia, usvg};
 use std::sync::Arc;
 
-/// Width of all pictures in units of the view box.
-pub const WIDTH: f64 = 560.0;
-/// Height of letters in the same units: legible at a picture width of 370 pixels.
-pub const LETTERS: f64 = 16.0;
 /// Pixels of a PNG file per unit of the view box.
 const RESOLUTION: f32 = 2.0;
 /// The font of PNG files, so that they need no font of the computer.
@@ -25,13 +21,36 @@ pub struct Picture {
     pub caption: String,
     /// The drawing: a complete `svg` element.
     pub svg: String,
+    /// The chart that is drawn; none for other drawings.
+    pub chart: Option<Chart>,
 }
 
 impl Picture {
     /// A drawing with its texts; the name is converted to a valid file name.
     pub fn new(name: &str, alt: impl Into<String>, caption: impl Into<String>, svg: String) -> Self {
         let name = plain_name(name);
-        Self { name, alt: alt.into(), caption: caption.into(), svg }
+        Self { name, alt: alt.into(), caption: caption.into(), svg, chart: None }
+    }
+
+    /// A chart with its texts.
+    pub fn of_chart(
+        chart: Chart,
+        name: &str,
+        alt: impl Into<String>,
+        caption: impl Into<String>,
+    ) -> Result<Self> {
+        let svg = chart.svg()?;
+        Ok(Self { chart: Some(chart), ..Self::new(name, alt, caption, svg) })
+    }
+
+    /// Two pictures to be seen beside each other: charts of the same quantities get the same axes.
+    pub fn beside_each_other(pair: [Self; 2]) -> Result<[Self; 2]> {
+        let [left, right] = &pair;
+        let (Some(of_left), Some(of_right)) = (&left.chart, &right.chart) else { return Ok(pair) };
+        let [on_left, on_right] = [of_left.beside(of_right), of_right.beside(of_left)];
+        let redrawn =
+            |picture: &Self, chart| Self::of_chart(chart, &picture.name, &*picture.alt, &*picture.caption);
+        Ok([redrawn(left, on_left)?, redrawn(right, on_right)?])
     }
 
     /// The same with another name.
@@ -78,31 +97,33 @@ pub(super) fn plain_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
 }
 
-/// The opening tag of a drawing of this height.
-pub fn open_svg(height: f64) -> String {
-    format!(
-        "<svg width=\"{WIDTH}\" height=\"{height:.0}\" viewBox=\"0 0 {WIDTH} {height:.0}\" \
-         xmlns=\"http://www.w3.org/2000/svg\">\n"
-    )
-}
-
-/// A line of text in a drawing; `anchor` is start, middle or end.
-pub fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
-    format!(
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
-         font-size=\"{LETTERS}\" fill=\"#1a1a1a\">{}</text>\n",
-        escape(words)
-    )
-}
-
-/// Approximate width of a text in a drawing.
-pub fn text_width(words: &str) -> f64 {
-    0.6 * LETTERS * words.chars().count() as f64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::postprocessing::drawing::{
+        chart::{Axis, Look, Series},
+        svg::{open_svg, text},
+    };
+
+    #[test]
+    fn charts_of_the_same_quantities_get_the_same_axes_beside_each_other() {
+        let chart = |quantity: &str, points: [[f64; 2]; 2]| {
+            let series = vec![Series::new(0, "", Look::Line, points.to_vec())];
+            let chart = Chart::new(Axis::time(), Axis::new(quantity, "m"), series);
+            Picture::of_chart(chart, "p", "", "").expect("picture")
+        };
+        let small = || chart("gap", [[0.0, 0.0], [1.0, 1.0]]);
+        let large = || chart("gap", [[0.0, 0.0], [4.0, 10.0]]);
+        let has = |picture: &Picture, tick: &str| picture.svg.lines().any(|line| line.trim() == tick);
+        assert!(has(&large(), "10") && has(&large(), "4") && !has(&small(), "10") && !has(&small(), "4"));
+        for pair in [[small(), large()], [large(), small()]] {
+            let pair = Picture::beside_each_other(pair).expect("pair");
+            assert!(pair.iter().all(|picture| has(picture, "10") && has(picture, "4")), "{}", pair[0].svg);
+        }
+        let [left, right] =
+            Picture::beside_each_other([small(), chart("slip", [[0.0, 0.0], [4.0, 10.0]])]).expect("pair");
+        assert!(left.svg == small().svg && has(&right, "10"));
+    }
 
     #[test]
     fn letters_are_drawn_without_a_font_of_the_machine() {

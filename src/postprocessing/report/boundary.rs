@@ -256,12 +256,13 @@ impl<'a> Boundary<'a> {
             ["normal_velocity", "contact_pressure"].iter().position(|known| *known == column).unwrap_or(2);
         let look = if points.len() > MOST_DOTS { Look::Line } else { Look::Dotted };
         let series = Series::new(place, "", look, points);
-        let x = Axis { quantity: "arc length", unit: "m" };
-        let mut chart = Chart::new(x, Axis { quantity, unit }, vec![series]);
+        let x = Axis::new("arc length", "m");
+        let mut chart = Chart::new(x, Axis::new(quantity, unit), vec![series]);
         chart.bands = self.bands();
         let figures = format!("from {} to {} {unit}", number(low), number(high));
         let bands = if chart.bands.is_empty() { "" } else { " Backgrounds: branches of the contact law." };
-        Ok(Some(Picture::new(
+        let picture = Picture::of_chart(
+            chart,
             &name,
             format!("Chart of the {quantity} along {} at {} s, {figures}", self.name, number(self.time)),
             format!(
@@ -271,8 +272,8 @@ impl<'a> Boundary<'a> {
                 number(self.time),
                 self.start()
             ),
-            chart.svg()?,
-        )))
+        )?;
+        Ok(Some(picture))
     }
 
     fn start(&self) -> String {
@@ -367,10 +368,11 @@ impl<'a> Boundary<'a> {
             }
         }
         let (quantity, unit) = law.quantity();
-        let y = Axis { quantity: "contact pressure", unit: "Pa" };
-        let chart = Chart::new(Axis { quantity, unit }, y, series);
+        let y = Axis::new("contact pressure", "Pa");
+        let chart = Chart::new(Axis::new(quantity, unit), y, series);
         let counted = counts.join(", ");
-        Ok(Some(Picture::new(
+        let picture = Picture::of_chart(
+            chart,
             &format!("{}_on_law", self.name),
             format!(
                 "Nodes of {} on the graph of the contact law at {} s: {counted}",
@@ -382,8 +384,8 @@ impl<'a> Boundary<'a> {
                 self.place,
                 number(self.time)
             ),
-            chart.svg()?,
-        )))
+        )?;
+        Ok(Some(picture))
     }
 
     /// The parts of the boundary on each branch; borders are half way between nodes.

@@ -13,7 +13,8 @@ use crate::error::Result;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use std::collections::BTreeMap;
 
-/// The keys in which the jobs differ, pictures of the same name beside each other, and the members of both summaries in one table.
+/// The keys in which the jobs differ, pictures of the same name beside each other on the same scales, and the members of both
+/// summaries in one table.
 pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
     let names = [0, 1].map(|run| found[run].folder.display().to_string());
     let titles = [0, 1].map(|run| title(&found[run]));
@@ -28,6 +29,10 @@ pub(super) fn page(found: &[Found; 2], options: Options) -> Result<Page> {
     for (heading, pairs) in paired(left, right) {
         let mut html = String::from("<div class=\"pairs\">\n");
         for pair in pairs {
+            let pair = match pair {
+                [Some(left), Some(right)] => Picture::beside_each_other([left, right])?.map(Some),
+                pair => pair,
+            };
             for (side, picture) in pair.into_iter().enumerate() {
                 html += &figure(side, picture);
             }

@@ -4,8 +4,9 @@ use super::{
     artifacts::Found,
     colour::{LINES, hex},
     markup::{escape, facts, paragraph, table},
-    picture::{LETTERS, Picture, WIDTH, open_svg, text, text_width},
+    picture::Picture,
     scale::{number, size},
+    svg::{LETTERS, WIDTH, open_svg, text, text_width},
 };
 use crate::{io::output::field_list::FIELDS, job::Accept, solver::certificate::Certificates};
 use serde_json::Value;

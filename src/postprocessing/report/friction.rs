@@ -66,16 +66,17 @@ pub(super) fn picture(
         if law.follows_pressure() { ("friction over pressure", "") } else { ("friction traction", "Pa") };
     let chart = Chart {
         from_zero: true,
-        ..Chart::new(Axis { quantity: "sliding velocity", unit: "m/s" }, Axis { quantity, unit }, series)
+        ..Chart::new(Axis::new("sliding velocity", "m/s"), Axis::new(quantity, unit), series)
     };
     let counted = counts.join(", ");
     let when = number(time);
-    Ok(Some(Picture::new(
+    let picture = Picture::of_chart(
+        chart,
         &format!("{name}_on_friction"),
         format!("Nodes of {place} on the graph of the friction law at {when} s: {counted}"),
         format!("The friction law (grey) and the nodes of {place} at t = {when} s: {counted}."),
-        chart.svg()?,
-    )))
+    )?;
+    Ok(Some(picture))
 }
 
 #[cfg(test)]

@@ -13,7 +13,6 @@ use crate::{
     fem::effect::{ENERGIES, Role},
 };
 
-const TIME: Axis = Axis { quantity: "t", unit: "s" };
 /// Number of probes in one chart above which lines cannot be distinguished.
 const MOST_PROBES: usize = 7;
 /// A force below this share of the largest one of the run is a rounding error.
@@ -49,13 +48,13 @@ pub(super) fn probes(table: &Table) -> Result<Pictures> {
         };
         let series = names.iter().zip(curves).enumerate();
         let series = series.map(|(place, (name, curve))| Series::new(place, name.clone(), Look::Line, curve));
-        let chart = Chart::new(TIME, Axis { quantity, unit }, series.collect());
-        out.pictures.push(Picture::new(
+        let chart = Chart::new(Axis::time(), Axis::new(quantity, unit), series.collect());
+        out.pictures.push(Picture::of_chart(
+            chart,
             &format!("probes_{column}"),
             format!("Chart of {quantity} of the probes over time; at the end {ends}"),
             format!("{} of the probes. At the end: {ends}.{left_out}", capital(quantity)),
-            chart.svg()?,
-        ));
+        )?);
     }
     Ok(out)
 }
@@ -185,10 +184,10 @@ fn draw(table: &Table, columns: &Columns<'_>, out: &mut Pictures) -> Result<()> 
         [] => String::new(),
         all => format!(" Constant: {}.", all.join(", ")),
     };
-    let svg = Chart::new(TIME, Axis { quantity, unit }, series).svg()?;
+    let chart = Chart::new(Axis::time(), Axis::new(quantity, unit), series);
     let alt = format!("Chart of {what} over time; at the end {ends}");
     let caption = format!("{}. At the end: {ends}.{constant}", capital(what));
-    out.pictures.push(Picture::new(name, alt, caption, svg));
+    out.pictures.push(Picture::of_chart(chart, name, alt, caption)?);
     Ok(())
 }
 
@@ -247,14 +246,14 @@ fn over_time(table: &Table, curve: Curve<'_>) -> Result<Option<Picture>> {
         logarithmic: is_logarithmic,
         from_zero: !is_logarithmic,
         levels,
-        ..Chart::new(TIME, Axis { quantity, unit }, vec![series])
+        ..Chart::new(Axis::time(), Axis::new(quantity, unit), vec![series])
     };
     let space = if unit.is_empty() { "" } else { " " };
     let most = format!("at least {}, at most {}{space}{unit}", number(low), number(high));
     let unseen =
         if unseen > 0 { format!(" {unseen} steps with the value 0 are not shown.") } else { String::new() };
     let alt = format!("Chart over time. {caption}; {most}");
-    Ok(Some(Picture::new(column, alt, format!("{caption}; {most}.{unseen}"), chart.svg()?)))
+    Picture::of_chart(chart, column, alt, format!("{caption}; {most}.{unseen}")).map(Some)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ mod table;
 
 use crate::{
     error::{Error, Result},
-    postprocessing::drawing::{body, chart, colour, markup, picture, scale, view},
+    postprocessing::drawing::{body, chart, colour, markup, picture, scale, svg, view},
     run::VERSION,
 };
 use artifacts::Found;

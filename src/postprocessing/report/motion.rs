@@ -4,8 +4,9 @@ use super::{
     artifacts::Found,
     body::{Body, Drawn, Look},
     boundary::{Boundary, Laws},
-    picture::{Picture, open_svg},
+    picture::Picture,
     scale::number,
+    svg::open_svg,
 };
 use crate::{
     error::Result,

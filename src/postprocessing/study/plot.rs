@@ -71,8 +71,8 @@ fn costs(results: &Results, norm: usize, shown: &NormResult, unit: &str) -> Resu
     if by_time.iter().map(|curve| curve.points.len()).sum::<usize>() < 2 {
         return Ok(Vec::new());
     }
-    let time = Axis { quantity: "computing time", unit: "s" };
-    let unknowns = Axis { quantity: "unknowns × steps", unit: "" };
+    let time = Axis::new("computing time", "s");
+    let unknowns = Axis::new("unknowns × steps", "");
     Ok(vec![
         cost((shown, unit), &by_time, time, "time")?,
         cost((shown, unit), &curves(results, norm, work), unknowns, "work")?,
@@ -92,19 +92,19 @@ fn cost((norm, unit): (&NormResult, &str), curves: &[Curve], axis: Axis, ending:
         logarithmic: true,
         logarithmic_x: true,
         orders: &[1, 2],
-        ..Chart::new(axis, Axis { quantity: &quantity, unit }, series)
+        ..Chart::new(axis.clone(), Axis::new(quantity, unit), series)
     };
     let best = curves.iter().map(|curve| {
         let error = curve.points.iter().map(|point| point[1]).fold(f64::INFINITY, f64::min);
         format!("{} down to {}", curve.name, size(error))
     });
     let best = best.collect::<Vec<_>>().join(", ");
-    Ok(Picture::new(
+    Picture::of_chart(
+        chart,
         &format!("work-precision-{}-{ending}", norm.name),
         format!("Chart of errors over {}, one line per scheme: {best}", axis.quantity),
         format!("{} over {}: {best}.", norm.meaning, axis.quantity),
-        chart.svg()?,
-    ))
+    )
 }
 
 fn curves(results: &Results, norm: usize, cost: impl Fn(&RunResult) -> Option<f64>) -> Vec<Curve> {
@@ -205,16 +205,17 @@ fn response(
         curve.points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Series::new(place, curve.name, look, curve.points)
     });
-    let [x, y] = [(key, ""), (name, unit)].map(|(quantity, unit)| Axis { quantity, unit });
+    let [x, y] = [(key, ""), (name, unit)].map(|(quantity, unit)| Axis::new(quantity, unit));
     let is_wide = keys.0 > 0.0 && keys.1 >= WIDE * keys.0;
     let chart = Chart { logarithmic_x: is_wide, ..Chart::new(x, y, series.collect()) };
     let over = if results.sweep.len() > 1 { format!("-over-{}", short(key)) } else { String::new() };
-    Ok(Some(Picture::new(
+    let picture = Picture::of_chart(
+        chart,
         &format!("response-{name}{over}"),
         format!("Chart of {words}"),
         format!("{words}."),
-        chart.svg()?,
-    )))
+    )?;
+    Ok(Some(picture))
 }
 
 /// The unit of a response of bodies of this dimension; empty for numbers without one.
@@ -296,24 +297,25 @@ fn tolerances(results: &Results, norm: usize, shown: &NormResult) -> Result<Opti
     let lines = curves.iter().take(LINES.len()).enumerate();
     let series =
         lines.map(|(place, c)| Series::new(place, c.name.clone(), Look::Dotted, c.points.clone())).collect();
-    let tolerance = Axis { quantity: "tolerance of the solver", unit: "" };
+    let tolerance = Axis::new("tolerance of the solver", "");
     let chart = Chart {
         logarithmic: true,
         logarithmic_x: true,
         levels: vec![(1.0, "as large as the error of mesh and steps".into())],
-        ..Chart::new(tolerance, Axis { quantity: "change over the error", unit: "" }, series)
+        ..Chart::new(tolerance, Axis::new("change over the error", ""), series)
     };
     let most = curves.iter().map(|curve| {
         let harmless = curve.points.iter().filter(|point| point[1] <= 0.1).map(|point| point[0]);
         format!("{} up to {}", curve.name, size(harmless.fold(0.0, f64::max)))
     });
     let most = most.collect::<Vec<_>>().join("; ");
-    Ok(Some(Picture::new(
+    let picture = Picture::of_chart(
+        chart,
         &format!("solver-tolerance-{}", shown.name),
         format!("Chart of changes by the solver's tolerance; below a tenth of the error: {most}"),
         format!("Effect of the solver's tolerance, {}. Below a tenth of the error: {most}.", shown.meaning),
-        chart.svg()?,
-    )))
+    )?;
+    Ok(Some(picture))
 }
 
 /// Errors over time of the runs listed in the study, or of the most accurate run of each scheme.
@@ -342,20 +344,21 @@ fn over_time(
     let series = chosen.iter().take(LINES.len()).enumerate().map(|(place, run)| {
         Series::new(place, run.name.clone(), Look::Line, run.places[norm].over_time.clone())
     });
-    let time = Axis { quantity: "t", unit: "s" };
-    let shown_error = Axis { quantity: "error", unit };
+    let time = Axis::time();
+    let shown_error = Axis::new("error", unit);
     let chart =
         Chart { logarithmic: true, logarithmic_x: true, ..Chart::new(time, shown_error, series.collect()) };
     let worst = chosen.iter().map(|run| {
         format!("{} ({} steps) largest at t = {} s", run.name, run.counts.steps, size(run.places[norm].worst))
     });
     let worst = worst.collect::<Vec<_>>().join("; ");
-    Ok(Some(Picture::new(
+    let picture = Picture::of_chart(
+        chart,
         &format!("error-over-time-{}", shown.name),
         format!("Chart of errors over time: {worst}"),
         format!("Error over time, {}: {worst}.", shown.meaning),
-        chart.svg()?,
-    )))
+    )?;
+    Ok(Some(picture))
 }
 
 /// Errors of cells on the body, for the runs listed in the study.
@@ -424,8 +427,8 @@ mod tests {
             Curve { name: "bdf2".into(), points: vec![[0.03, 0.1]] },
         ];
         let norm = NormResult { name: "v_max".into(), meaning: "max ||v||_H".into(), is_published: false };
-        let picture = cost((&norm, "m/s"), &curves, Axis { quantity: "computing time", unit: "s" }, "time")
-            .expect("picture");
+        let picture =
+            cost((&norm, "m/s"), &curves, Axis::new("computing time", "s"), "time").expect("picture");
         for words in ["<svg", "lagged_euler", "bdf2", "computing time / s", "10⁻²"] {
             assert!(picture.svg.contains(words), "{words}");
         }
